@@ -1,0 +1,1 @@
+//! Order, loss, staleness and blending of received light.

@@ -1,0 +1,2 @@
+//! The `lumencast` program.
+fn main() {}

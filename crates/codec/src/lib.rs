@@ -1,0 +1,1 @@
+//! Light fields, scene state and catalogs as bytes.

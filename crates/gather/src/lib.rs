@@ -1,0 +1,1 @@
+//! Gathering of light: receivers in, sums out.

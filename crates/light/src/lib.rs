@@ -1,0 +1,1 @@
+//! Light fields: spherical harmonics, probe volumes, sampling.

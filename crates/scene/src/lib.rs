@@ -1,0 +1,1 @@
+//! glTF and built-in scenes, animation, and edits as data.

@@ -1,0 +1,1 @@
+//! The tick: edits, animation, gather, encode, publish.

@@ -1,0 +1,1 @@
+//! Codec frames over Media over QUIC.
