@@ -1,1 +1,11 @@
-//! Light fields: spherical harmonics, probe volumes, sampling.
+//! Light fields: what a server computes and a client shades with.
+//!
+//! A light field holds *indirect* light only: light of punctual lights after at least one surface,
+//! and light of emissive surfaces and of the environment. Probes store the spherical-harmonic
+//! coefficients of arriving radiance (cd/m²) in world axes.
+
+pub mod sh;
+mod volume;
+
+pub use sh::Order;
+pub use volume::{Grid, ProbeVolume, VolumeId};

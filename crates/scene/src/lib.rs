@@ -1,1 +1,54 @@
-//! glTF and built-in scenes, animation, and edits as data.
+//! Scenes as data: glTF and built-in scenes, their animation, and edits.
+//!
+//! A [`Scene`] is loaded once, changed by [`Edit`]s and by time, and asked for a [`Snapshot`]: one
+//! moment of it, flattened to placed instances and lights, which is all that a gatherer sees.
+//!
+//! Space is glTF's: right-handed, +Y up, metres. Colours are linear Rec. 709. Lights have the units
+//! of KHR_lights_punctual (candela, lux); emission is a radiance in cd/m².
+
+mod edit;
+mod environment;
+mod light;
+mod material;
+mod mesh;
+mod snapshot;
+
+pub use edit::{Edit, InstanceSource, LightSpec, MaterialChange, Playback, Transform};
+pub use environment::{Environment, HdrImage};
+pub use light::{Light, LightKind, PlacedLight};
+pub use material::{AlphaMode, Filter, Image, Material, TextureRef, Wrap};
+pub use mesh::{Mesh, MorphTarget, Primitive, Vertices};
+pub use snapshot::{Instance, Snapshot};
+
+macro_rules! id {
+    ($(#[$doc:meta])* $name:ident) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+        #[serde(transparent)]
+        pub struct $name(pub u32);
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                self.0.fmt(f)
+            }
+        }
+    };
+}
+
+id! {
+    /// A node: its index in the glTF file, or, for nodes added by edits, the next free number.
+    /// Numbers are never used twice, so every replica of the scene agrees on them.
+    NodeId
+}
+id! {
+    /// A material: its index in the glTF file; materials of assets added later follow.
+    MaterialId
+}
+id! {
+    /// A mesh: its index in the glTF file; meshes of assets added later follow.
+    MeshId
+}
+id! {
+    /// An animation: its index in the glTF file; animations of assets added later follow.
+    AnimationId
+}

@@ -1,0 +1,62 @@
+//! Punctual lights.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::NodeId;
+
+/// A punctual light as in KHR_lights_punctual. It shines along its node's −Z.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Light {
+    /// Point, spot or directional.
+    #[serde(flatten)]
+    pub kind: LightKind,
+    /// Linear colour, each channel ≥ 0.
+    #[serde(default = "white")]
+    pub color: Vec3,
+    /// Candela (point, spot) or lux on a surface that faces it (directional); ≥ 0.
+    #[serde(default = "one")]
+    pub intensity: f32,
+    /// Distance in metres past which the light is cut off smoothly as KHR_lights_punctual
+    /// recommends; infinite when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range: Option<f32>,
+}
+
+fn white() -> Vec3 {
+    Vec3::ONE
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+/// The kind of a punctual light.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum LightKind {
+    /// Shines alike in every direction.
+    Point,
+    /// Shines in a cone; falloff between the half-angles (radians) as in KHR_lights_punctual.
+    Spot {
+        /// Half-angle where falloff begins, 0 ≤ inner < outer.
+        inner: f32,
+        /// Half-angle where the light ends, at most π/2.
+        outer: f32,
+    },
+    /// Parallel light from infinitely far.
+    Directional,
+}
+
+/// A light at its place in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedLight {
+    /// The node that carries it.
+    pub node: NodeId,
+    /// What it is.
+    pub light: Light,
+    /// World position, metres.
+    pub position: Vec3,
+    /// Unit vector along which it shines.
+    pub direction: Vec3,
+}

@@ -1,0 +1,68 @@
+//! Geometry: triangle lists with their vertex attributes.
+
+use glam::{Vec2, Vec3, Vec4};
+
+use crate::MaterialId;
+
+/// A glTF mesh: one or more triangle lists, each with one material.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Name in the file, for messages.
+    pub name: String,
+    /// Triangle lists.
+    pub primitives: Vec<Primitive>,
+    /// Morph weights at rest, one a target.
+    pub morph_weights: Vec<f32>,
+}
+
+impl Mesh {
+    /// Number of triangles in all primitives.
+    pub fn triangle_count(&self) -> usize {
+        self.primitives.iter().map(|p| p.triangles.len()).sum()
+    }
+}
+
+/// A triangle list with one material. Strips and fans are unrolled by the loader, which also
+/// guarantees that every index lies inside the vertices and every position and normal is finite.
+#[derive(Clone, Debug, Default)]
+pub struct Primitive {
+    /// Indices into the vertices; counter-clockwise seen from the front.
+    pub triangles: Vec<[u32; 3]>,
+    /// Vertices at rest, in object space.
+    pub vertices: Vertices,
+    /// Texture coordinates 0 and 1; empty where the file has none, else one a vertex.
+    pub uv: [Vec<Vec2>; 2],
+    /// Vertex colours (linear, multiplied into the base colour); empty or one a vertex.
+    pub colors: Vec<Vec4>,
+    /// Joint indices into the skin of the node, four a vertex; empty where the mesh is not skinned.
+    pub joints: Vec<[u16; 4]>,
+    /// Weights of the joints, normalised to sum 1.
+    pub weights: Vec<Vec4>,
+    /// Morph targets (displacements).
+    pub morph_targets: Vec<MorphTarget>,
+    /// Material; the default material of glTF has a number of its own.
+    pub material: MaterialId,
+}
+
+/// The vertex attributes that deformation changes.
+#[derive(Clone, Debug, Default)]
+pub struct Vertices {
+    /// Metres, object space.
+    pub positions: Vec<Vec3>,
+    /// Unit length, one a vertex; flat normals where the file has none.
+    pub normals: Vec<Vec3>,
+    /// xyz unit tangent, w = ±1 the sign of the bitangent; empty where neither the file nor a
+    /// normal map asks for it.
+    pub tangents: Vec<Vec4>,
+}
+
+/// Displacements of one morph target; each list is empty or has one entry a vertex.
+#[derive(Clone, Debug, Default)]
+pub struct MorphTarget {
+    /// Metres.
+    pub positions: Vec<Vec3>,
+    /// Added to normals before normalisation.
+    pub normals: Vec<Vec3>,
+    /// Added to the xyz of tangents.
+    pub tangents: Vec<Vec3>,
+}

@@ -1,0 +1,41 @@
+//! One moment of a scene: what a gatherer traces.
+
+use std::sync::Arc;
+
+use glam::Affine3A;
+
+use crate::{Environment, Material, Mesh, MeshId, NodeId, PlacedLight, Vertices};
+
+/// One moment of a scene. Immutable; cheap to clone and to send to other threads.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// Grows by one at every change that can change light (accepted edits, animation steps).
+    /// Every lighting update carries the version it was computed from.
+    pub version: u64,
+    /// Scene time in seconds.
+    pub time: f64,
+    /// Placed meshes.
+    pub instances: Vec<Instance>,
+    /// Indexed by [`crate::MaterialId`].
+    pub materials: Arc<[Material]>,
+    /// Punctual lights with an intensity above zero.
+    pub lights: Vec<PlacedLight>,
+    /// Light from afar.
+    pub environment: Environment,
+}
+
+/// A mesh at its place.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// The node that carries it.
+    pub node: NodeId,
+    /// Which mesh: equal ids have equal `mesh` pointers, so acceleration structures can be kept.
+    pub mesh_id: MeshId,
+    /// The mesh at rest.
+    pub mesh: Arc<Mesh>,
+    /// Skinned or morphed vertices, one entry a primitive; absent for rigid meshes. A skinned
+    /// mesh's vertices are in the space of `world_from_object` like any other's.
+    pub deformed: Option<Arc<Vec<Vertices>>>,
+    /// Affine, invertible; a negative determinant mirrors and flips the winding.
+    pub world_from_object: Affine3A,
+}
