@@ -1,0 +1,3 @@
+import { WIRE_VERSION } from '@lumencast/three';
+
+document.title = `Lumencast, wire version ${WIRE_VERSION}`;
