@@ -1,2 +1,43 @@
-//! Set-up, tests and demo.
-fn main() {}
+//! What one runs by hand in this repository: `cargo xtask demo`, `cargo xtask test`, `cargo xtask setup`.
+#![expect(clippy::print_stdout, reason = "a program for the terminal")]
+
+mod demo;
+mod run;
+mod setup;
+mod test;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+#[derive(Parser)]
+#[command(name = "cargo xtask", about = "Set-up, tests and demo of Lumencast", version)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Install what is missing, build everything, serve a scene and print the page's address
+    Demo(demo::Demo),
+    /// Everything that CI runs: formatting, lints, tests, licences, the web packages, the browser
+    Test(test::Test),
+    /// Install what building and testing need (as root), or print the commands that do
+    Setup,
+}
+
+fn main() -> ExitCode {
+    let outcome = match Args::parse().command {
+        Command::Demo(demo) => demo.run(),
+        Command::Test(test) => test.run(),
+        Command::Setup => setup::install(setup::Purpose::Test),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("\nerror: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

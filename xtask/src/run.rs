@@ -1,0 +1,62 @@
+//! Running other programs, with a heading, the time it took, and an error that says what failed.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+
+/// The repository's root folder.
+pub(crate) fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask lies in the root").to_owned()
+}
+
+/// Where cargo puts what it builds.
+pub(crate) fn target_dir() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
+}
+
+/// A program to run in the repository's root.
+pub(crate) fn command(program: &str, args: &[&str]) -> Command {
+    let mut command = Command::new(program);
+    command.args(args).current_dir(root());
+    command
+}
+
+/// `cargo`, the one that runs us.
+pub(crate) fn cargo(args: &[&str]) -> Command {
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
+    let mut command = command(&cargo, args);
+    // What `cargo run` sets for us is not meant for the cargo that we start.
+    command.env_remove("CARGO_MANIFEST_DIR");
+    command
+}
+
+/// `npm` in the folder of the web packages.
+pub(crate) fn npm(args: &[&str]) -> Command {
+    let mut command = command("npm", args);
+    command.current_dir(root().join("web"));
+    command
+}
+
+/// Runs a step and shows its heading and time.
+pub(crate) fn step(title: &str, mut command: Command) -> Result<()> {
+    println!("\n── {title}");
+    let start = Instant::now();
+    let status = command.status().with_context(|| {
+        format!("{title}: could not start `{}`", command.get_program().to_string_lossy())
+    })?;
+    if !status.success() {
+        let args: Vec<_> = command.get_args().map(|a| a.to_string_lossy()).collect();
+        let program = command.get_program().to_string_lossy();
+        bail!("{title}: `{program} {}` ended with {status}", args.join(" "));
+    }
+    println!("── {title}: done in {:.0} s", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+/// What a program prints on its standard output, or `None` when it can't be run or fails.
+pub(crate) fn output(program: &str, args: &[&str]) -> Option<String> {
+    let output = Command::new(program).args(args).output().ok()?;
+    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
+}

@@ -1,0 +1,40 @@
+//! Everything that CI runs, in the order in which mistakes are found soonest.
+
+use anyhow::Result;
+use clap::Args;
+
+use crate::run::{cargo, npm, step, target_dir};
+use crate::setup::{self, Purpose};
+
+/// Options of `cargo xtask test`.
+#[derive(Args)]
+pub(crate) struct Test {
+    /// Leave out the browser test
+    #[arg(long)]
+    no_browser: bool,
+}
+
+impl Test {
+    pub(crate) fn run(&self) -> Result<()> {
+        setup::install(Purpose::Test)?;
+        step("formatting", cargo(&["fmt", "--all", "--check"]))?;
+        step("web packages", npm(&["ci", "--no-audit", "--no-fund"]))?;
+        step("web: types", npm(&["run", "typecheck"]))?;
+        step("web: tests", npm(&["test"]))?;
+        step("web: page", npm(&["run", "build"]))?;
+        let clippy = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
+        step("lints", cargo(&clippy))?;
+        step("tests", cargo(&["nextest", "run", "--workspace"]))?;
+        step("doctests", cargo(&["test", "--workspace", "--doc", "--quiet"]))?;
+        let deny = ["deny", "--all-features", "check", "bans", "licenses", "sources"];
+        step("licences and sources of dependencies", cargo(&deny))?;
+        if !self.no_browser {
+            step("the program", cargo(&["build", "-p", "lumencast-cli"]))?;
+            let mut browser = npm(&["run", "test:browser"]);
+            browser.env("LUMENCAST_BIN", target_dir().join("debug/lumencast"));
+            step("the page in a real browser", browser)?;
+        }
+        println!("\nAll steps passed.");
+        Ok(())
+    }
+}
