@@ -19,7 +19,8 @@ impl Test {
         setup::install(Purpose::Test)?;
         step("formatting", cargo(&["fmt", "--all", "--check"]))?;
         step("web packages", npm(&["ci", "--no-audit", "--no-fund"]))?;
-        step("web: types", npm(&["run", "typecheck"]))?;
+        step("web: formatting", npm(&["run", "format:check"]))?;
+        step("web: types", npm(&["run", "check"]))?;
         step("web: tests", npm(&["test"]))?;
         step("web: page", npm(&["run", "build"]))?;
         let clippy = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
