@@ -1,2 +1,13 @@
-/** Version of the wire format that this client speaks; see docs/wire.md. */
-export const WIRE_VERSION = 1;
+export * from './api.js';
+export { type AtlasLayout, atlasLayout, halfBits, packAtlas } from './atlas.js';
+export {
+  type Catalog,
+  type Field,
+  type Grid,
+  parseCatalog,
+  type Region,
+  valuesPerProbe,
+  WIRE_VERSION,
+} from './codec/catalog.js';
+export type * from './edit.js';
+export { WireError, type WireErrorKind } from './wire-error.js';

@@ -1,0 +1,184 @@
+import type { Catalog, Field } from './codec/catalog.js';
+import type { Edit, Vec3 } from './edit.js';
+
+/**
+ * One field of light as it stands at one moment.
+ *
+ * The arrays belong to the cache and change with the next call of `light`: read them, don't keep them.
+ */
+export interface FieldLight {
+  /** What the catalog says of the field: its grid, order and use. */
+  readonly field: Field;
+  /**
+   * Coefficients of arriving radiance, cd/m²: `(order+1)²` times r, g, b a probe, probe by probe with
+   * x fastest, then y, then z.
+   */
+  readonly coefficients: Float32Array;
+  /** A power of two near the largest coefficient, by which halves are divided. */
+  readonly scale: number;
+  /** Grows whenever the coefficients changed: equal revisions need no new upload. */
+  readonly revision: number;
+  /** Seconds since this light was computed, of its oldest region. */
+  readonly age: number;
+  /** Version of the scene that the light was computed from, of its oldest region. */
+  readonly sceneVersion: number;
+  /** Server tick in which it was computed, of its oldest region. */
+  readonly tick: number;
+  /** Regions that hold light, of all that the field has. */
+  readonly regions: { readonly lit: number; readonly all: number };
+}
+
+/** All light at one moment. */
+export interface LightState {
+  /** In the catalog's order; fields of which nothing has arrived yet are left out. */
+  readonly fields: readonly FieldLight[];
+  /** Seconds since the oldest part of the light was computed; `undefined` when there is none. */
+  readonly age: number | undefined;
+}
+
+/** How a session stands. */
+export type Status =
+  | {
+      readonly state: 'connecting';
+      /** 1 for the first attempt after the start or a loss. */
+      readonly attempt: number;
+    }
+  | { readonly state: 'connected'; readonly transport: 'webtransport' | 'websocket' }
+  | {
+      /** Nothing is received; the light stays and the session tries again by itself. */
+      readonly state: 'lost';
+      readonly reason: string;
+      /** Seconds until the next attempt. */
+      readonly retryIn: number;
+    }
+  | {
+      /** For good: closed by the program, or the server speaks another wire version. */
+      readonly state: 'closed';
+      readonly reason: string;
+    };
+
+/** An edit that the server has accepted, in the server's order. */
+export interface AcceptedEdit {
+  readonly edit: Edit;
+  /** Who made it; absent for the server's own (a script's). */
+  readonly client?: string;
+  readonly seq?: number;
+  /** Made by this session. */
+  readonly own: boolean;
+}
+
+/** An edit of this session that the server has refused. */
+export interface RefusedEdit {
+  readonly seq: number;
+  readonly edit: Edit;
+  readonly reason: string;
+}
+
+/** What a session tells; the values are the listeners' argument. */
+export interface SessionEvents {
+  /** The server's fields are known, or have changed. */
+  catalog: Catalog;
+  /**
+   * Edits that turn the scene as it stands in its file into the scene as it is now. Comes on joining,
+   * after a loss and after a restart of the server: start again from the file's state.
+   */
+  snapshot: readonly Edit[];
+  /** Another accepted edit, this session's own among them. */
+  edit: AcceptedEdit;
+  /** One of this session's edits was refused: undo what it showed. */
+  refused: RefusedEdit;
+  /** An update of a field arrived. */
+  light: { readonly field: number; readonly region: number; readonly tick: number };
+  status: Status;
+}
+
+/** Figures for a panel or a log. */
+export interface SessionStats {
+  /** Server ticks a second, measured over the last seconds; `undefined` before two have come. */
+  readonly tickRate: number | undefined;
+  /** Updates of light a second that arrive, of the region that gets most. */
+  readonly updateRate: number;
+  /** Age of the light in seconds; see {@link LightState.age}. */
+  readonly age: number | undefined;
+  /** Received bytes a second over all tracks. */
+  readonly bandwidth: number;
+  /** Received bytes a second by track. */
+  readonly bandwidthByTrack: ReadonlyMap<string, number>;
+  /** How long the server's last tick took, milliseconds. */
+  readonly tickMs: number | undefined;
+  /** Samples a probe in the server's last tick. */
+  readonly samples: number | undefined;
+  /** Queueing delay of arriving light over the least one seen, seconds. */
+  readonly delay: number | undefined;
+  /** Temporal layers that are subscribed to, 1 to 3; fewer than there are when the link is too slow. */
+  readonly layers: number;
+  /** Edits that the server has not dealt with yet. */
+  readonly pending: number;
+  /** Frames that could not be used: malformed ones, and deltas whose base was lost. */
+  readonly dropped: number;
+}
+
+/** When one update was computed and when it came; for measuring the way from the tick to the page. */
+export interface Timing {
+  readonly field: number;
+  readonly region: number;
+  readonly layer: number;
+  readonly tick: number;
+  /** The server's clock in seconds at the end of that tick, if its state frame has come. */
+  readonly clock: number | undefined;
+  /** `performance.timeOrigin + performance.now()` in milliseconds when the frame was handed over. */
+  readonly arrived: number;
+  /** The same after decoding. */
+  readonly decoded: number;
+  /** Bytes of the frame. */
+  readonly bytes: number;
+}
+
+/** A live connection to the light of one scene. */
+export interface Session {
+  /** The server's address, without a path. */
+  readonly origin: string;
+  /** Name of the scene. */
+  readonly scene: string;
+  /** This client's name in edits. */
+  readonly client: string;
+  readonly status: Status;
+  /** What the server offers; `undefined` before it has said so. */
+  readonly catalog: Catalog | undefined;
+  readonly stats: SessionStats;
+
+  /** Calls `listener` at each event of the kind; returns the function that ends this. */
+  on<K extends keyof SessionEvents>(event: K, listener: (value: SessionEvents[K]) => void): () => void;
+  /**
+   * Sends an edit. Resolves once the server has accepted it; rejects with an {@link EditError} when
+   * it refuses, has restarted, or the session is closed before. Without a connection it waits for one.
+   */
+  edit(edit: Edit): Promise<void>;
+  /** Edits that the server has not dealt with yet, oldest first. */
+  readonly pending: readonly Edit[];
+  /** The newest light, blended to this moment. `now` is `performance.now()` in milliseconds. */
+  light(now?: number): LightState;
+  /**
+   * Scene time in seconds at which animations stand on the server, estimated for `now`; less `delay`
+   * seconds (0.1 unless given), so that it seldom runs ahead of what has arrived.
+   */
+  sceneTime(now?: number, delay?: number): number | undefined;
+  /** Where the camera is, in world space: near regions come first. */
+  setCamera(position: Vec3): void;
+  /** The last 1,000 arrivals, oldest first. */
+  timings(): readonly Timing[];
+  /** Ends the session; pending edits reject. */
+  close(): void;
+}
+
+/** Why an edit came to nothing. */
+export class EditError extends Error {
+  override readonly name = 'EditError';
+  constructor(
+    /** `refused` by the server, `restarted` server, `closed` session, or `full` list of pending edits. */
+    readonly kind: 'refused' | 'restarted' | 'closed' | 'full',
+    reason: string,
+  ) {
+    super(reason);
+  }
+}

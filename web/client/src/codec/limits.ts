@@ -1,0 +1,12 @@
+/** The limits of docs/wire.md; a decoder refuses what exceeds them. */
+export const LIMITS = {
+  frameBytes: 1 << 20,
+  fields: 256,
+  regionsPerField: 4096,
+  probesPerField: 262_144,
+  regionCells: 16,
+  snapshotEdits: 65_536,
+  deltaEdits: 4096,
+  layers: 3,
+  fileBytes: 1 << 30,
+} as const;
