@@ -1,4 +1,4 @@
-/** What is wrong with bytes that came from outside. */
+/** What is wrong with bytes that came from outside: the words of `DecodeError::kind` in the Rust codec. */
 export type WireErrorKind =
   /** It ends too early. */
   | 'truncated'
@@ -8,6 +8,10 @@ export type WireErrorKind =
   | 'limit'
   /** It breaks a rule of docs/wire.md. */
   | 'malformed'
+  /** Text that is not the JSON expected. */
+  | 'json'
+  /** A frame that is not of the size or order that the catalog says. */
+  | 'mismatch'
   /** A delta whose base this decoder does not hold; a keyframe will mend it. */
   | 'missing_base';
 

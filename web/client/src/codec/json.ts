@@ -14,7 +14,7 @@ export function parseObject(bytes: Uint8Array, what: string): Json {
   try {
     value = JSON.parse(utf8.decode(bytes));
   } catch (error) {
-    throw new WireError('malformed', `${what} is not JSON: ${(error as Error).message}`);
+    throw new WireError('json', `${what} is not JSON: ${(error as Error).message}`);
   }
   if (!isObject(value)) throw new WireError('malformed', `${what} is not a JSON object`);
   return value;

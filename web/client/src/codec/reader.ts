@@ -1,0 +1,60 @@
+import { WireError } from '../wire-error.js';
+
+/** Reads little-endian numbers and varints (unsigned LEB128) from the front of bytes. */
+export class Reader {
+  private readonly view: DataView;
+  position = 0;
+
+  constructor(readonly bytes: Uint8Array) {
+    this.view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  }
+
+  get left(): number {
+    return this.bytes.length - this.position;
+  }
+
+  /** Moves on by `length` bytes and returns where they begin. */
+  private skip(length: number): number {
+    if (length > this.left) throw new WireError('truncated', 'the bytes end too early');
+    const start = this.position;
+    this.position += length;
+    return start;
+  }
+
+  u8(): number {
+    return this.bytes[this.skip(1)];
+  }
+
+  i8(): number {
+    return this.view.getInt8(this.skip(1));
+  }
+
+  f64(): number {
+    return this.view.getFloat64(this.skip(8), true);
+  }
+
+  /** A view of the next bytes, not a copy. */
+  take(length: number): Uint8Array {
+    const start = this.skip(length);
+    return this.bytes.subarray(start, start + length);
+  }
+
+  /** All that is left. */
+  rest(): Uint8Array {
+    return this.take(this.left);
+  }
+
+  /** An integer below 2⁵³ in at most 8 bytes. */
+  varint(): number {
+    let value = 0;
+    for (let factor = 1; factor < 2 ** 56; factor *= 128) {
+      const byte = this.u8();
+      value += (byte & 0x7f) * factor;
+      if (byte < 0x80) {
+        if (value > Number.MAX_SAFE_INTEGER) throw new WireError('malformed', 'a varint of 2^53 or more');
+        return value;
+      }
+    }
+    throw new WireError('malformed', 'a varint of more than 8 bytes');
+  }
+}

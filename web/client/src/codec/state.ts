@@ -1,0 +1,120 @@
+import type { Edit } from '../edit.js';
+import { WireError } from '../wire-error.js';
+import { parseEdit } from './edits.js';
+import { isObject, type Json, list, number, object, parseObject, text, whole } from './json.js';
+import { LIMITS } from './limits.js';
+
+/** What every frame of the state track tells. */
+export interface TickState {
+  /** Number of the tick. */
+  readonly tick: number;
+  /** Scene time in seconds, at which animations stand. */
+  readonly time: number;
+  /** The server's monotonic clock in seconds at sending. */
+  readonly clock: number;
+  /** Scene version after this tick's edits and animation. */
+  readonly version: number;
+  /** How long the last tick took. */
+  readonly tickMs: number;
+  /** Samples a probe in the last tick. */
+  readonly samples: number;
+}
+
+/** A frame of the state track. */
+export type StateFrame = TickState & (SnapshotPart | DeltaPart);
+
+export interface SnapshotPart {
+  readonly kind: 'snapshot';
+  /** Edits that turn the scene as it stands in its file into the scene as it is now. */
+  readonly edits: readonly Edit[];
+  /** The last sequence number dealt with, by client. */
+  readonly acks: ReadonlyMap<string, number>;
+}
+
+export interface DeltaPart {
+  readonly kind: 'delta';
+  /** What was accepted this tick, in the server's order. */
+  readonly edits: readonly StateEdit[];
+  readonly refused: readonly Refusal[];
+}
+
+/** An accepted edit; without client it is the server's own. */
+export interface StateEdit {
+  readonly client: string | undefined;
+  readonly seq: number | undefined;
+  /** `undefined` when this client does not know the edit. */
+  readonly edit: Edit | undefined;
+}
+
+export interface Refusal {
+  readonly client: string;
+  readonly seq: number;
+  readonly reason: string;
+}
+
+/** Reads a frame of the state track. Edits that this client does not know are skipped. */
+export function parseState(bytes: Uint8Array): StateFrame {
+  const json = parseObject(bytes, 'a state frame');
+  const tick: TickState = {
+    tick: whole(json.tick, 'tick'),
+    time: number(json.time, 'time'),
+    clock: number(json.clock, 'clock'),
+    version: whole(json.version, 'version'),
+    tickMs: number(json.tick_ms, 'tick_ms', 0),
+    samples: number(json.samples, 'samples', 0),
+  };
+  return { ...tick, ...(json.snapshot === undefined ? parseDelta(json) : parseSnapshot(json)) };
+}
+
+function parseSnapshot(json: Json): SnapshotPart {
+  const acks = object(json.acks ?? {}, 'acks');
+  return {
+    kind: 'snapshot',
+    edits: list(json.snapshot, 'snapshot', LIMITS.snapshotEdits)
+      .map(parseEdit)
+      .filter((edit) => edit !== undefined),
+    acks: new Map(Object.entries(acks).map(([client, seq]) => [client, whole(seq, 'acks')])),
+  };
+}
+
+function parseDelta(json: Json): DeltaPart {
+  return {
+    kind: 'delta',
+    edits: list(json.edits ?? [], 'edits', LIMITS.deltaEdits).map((value) => {
+      const entry = object(value, 'an entry of edits');
+      return {
+        client: absent(entry.client) ? undefined : text(entry.client, 'client'),
+        seq: absent(entry.seq) ? undefined : whole(entry.seq, 'seq'),
+        edit: parseEdit(entry.edit),
+      };
+    }),
+    refused: list(json.refused ?? [], 'refused', LIMITS.deltaEdits).map((value) => {
+      const entry = object(value, 'an entry of refused');
+      return {
+        client: text(entry.client, 'client'),
+        seq: whole(entry.seq, 'seq'),
+        reason: text(entry.reason, 'reason'),
+      };
+    }),
+  };
+}
+
+function absent(value: unknown): boolean {
+  return value === undefined || value === null;
+}
+
+const utf8 = new TextEncoder();
+
+/** The frame by which a client sends an edit. */
+export function encodeClientEdit(seq: number, edit: Edit): Uint8Array {
+  const bytes = utf8.encode(JSON.stringify({ seq, edit }));
+  if (bytes.length > LIMITS.frameBytes) throw new WireError('limit', `an edit of ${bytes.length} bytes`);
+  return bytes;
+}
+
+/** Whether a value could be an edit at all, so that a slip in a program fails where it was made. */
+export function checkEdit(edit: Edit): void {
+  if (!isObject(edit) || parseEdit(JSON.parse(JSON.stringify(edit))) === undefined) {
+    throw new TypeError(`not an edit: ${JSON.stringify(edit)}`);
+  }
+}
