@@ -1,0 +1,276 @@
+//! Who may read and who may edit.
+//!
+//! Names are slash-separated paths. The server's broadcasts have one part (`sponza`); a client's
+//! own lie below `<one part>/edits/`, and nowhere else, whatever its token says.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, SystemTime};
+
+use moq_auth::{Algorithm, Claims, Grant, Pattern, Patterns, Request, lease};
+use moq_relay::auth::{Admission, Admissions};
+
+use crate::{Error, Result};
+
+/// What anyone may read: the server's own broadcasts.
+const READABLE: &str = "*";
+/// What a client may publish at most.
+const EDITABLE: &str = "*/edits/**";
+
+/// Who may read the server's broadcasts, and who may publish edits.
+#[derive(Debug, Clone, Default)]
+#[non_exhaustive]
+pub enum Access {
+    /// Everyone on this machine may read and edit; the check of hosts and origins keeps foreign
+    /// web pages out. A server with this access listens on loopback only.
+    #[default]
+    Loopback,
+    /// Whoever reaches the server, from wherever, may read and edit.
+    Open,
+    /// Publishing needs a token (a JWT in the URL's query, `?jwt=…`) signed by `key`.
+    Token {
+        /// The key that tokens must be signed with.
+        key: Key,
+        /// Whether reading needs one too.
+        to_read: bool,
+    },
+}
+
+/// A key that signs and verifies tokens (HMAC-SHA256 as a JSON Web Key).
+#[derive(Clone)]
+pub struct Key(Arc<moq_auth::Key>);
+
+impl std::fmt::Debug for Key {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str("Key(…)")
+    }
+}
+
+impl Key {
+    /// A new random key.
+    pub fn generate() -> Result<Self> {
+        let key = moq_auth::Key::generate(Algorithm::HS256, None).map_err(key_error)?;
+        Ok(Self(Arc::new(key)))
+    }
+
+    /// Reads a key from a file, as [`Key::write`] or `moq auth generate` wrote it.
+    pub fn read(path: &Path) -> Result<Self> {
+        let key = moq_auth::Key::from_file(path)
+            .map_err(|err| Error::Key(format!("{}: {err}", path.display())))?;
+        Ok(Self(Arc::new(key)))
+    }
+
+    /// Writes the key to a file, which only its owner should be able to read.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        self.0.to_file(path).map_err(|err| Error::Key(format!("{}: {err}", path.display())))
+    }
+
+    /// A token that lets its bearer read `scene` and publish edits to it, until `lifetime` has
+    /// passed (a session still open then is closed), or for good.
+    pub fn issue_token(&self, scene: &str, lifetime: Option<Duration>) -> Result<String> {
+        let pattern =
+            |text: &str| text.parse::<Pattern>().map_err(|err| Error::Key(err.to_string()));
+        let claims = Claims::default()
+            .with_subscribe([pattern(scene)?])
+            .with_publish([pattern(&format!("{scene}/edits/**"))?])
+            .with_issued(SystemTime::now())
+            .with_expires(lifetime.map(|lifetime| SystemTime::now() + lifetime));
+        self.0.sign(&claims).map_err(key_error)
+    }
+}
+
+fn key_error(err: impl std::fmt::Display) -> Error {
+    Error::Key(err.to_string())
+}
+
+/// How many sessions are open, out of how many allowed.
+#[derive(Debug, Clone)]
+pub(crate) struct Sessions {
+    open: Arc<AtomicUsize>,
+    limit: usize,
+}
+
+impl Sessions {
+    pub(crate) fn new(limit: usize) -> Self {
+        Self { open: Arc::default(), limit }
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.open.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn full(&self) -> bool {
+        self.count() >= self.limit
+    }
+
+    /// Counts one more session until the ticket is dropped; `None` if that would be too many.
+    fn admit(&self) -> Option<Ticket> {
+        let below = |open| (open < self.limit).then_some(open + 1);
+        let counted = self.open.fetch_update(Ordering::Relaxed, Ordering::Relaxed, below);
+        counted.is_ok().then(|| Ticket(self.open.clone()))
+    }
+}
+
+struct Ticket(Arc<AtomicUsize>);
+
+impl Drop for Ticket {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// Answers every session that asks to be let in, until the server stops.
+pub(crate) async fn decide(mut admissions: Admissions, access: Access, sessions: Sessions) {
+    while let Some(admission) = admissions.next().await {
+        answer(admission, &access, &sessions);
+    }
+}
+
+fn answer(admission: Admission, access: &Access, sessions: &Sessions) {
+    let grant = match grant(access, &admission.request) {
+        Ok(grant) => grant,
+        Err(reason) => {
+            tracing::info!(remote = ?admission.request.remote, %reason, "session refused");
+            return admission.refuse(moq_relay::auth::Error::Refused);
+        }
+    };
+    let Some(ticket) = sessions.admit() else {
+        tracing::warn!(limit = sessions.limit, "session refused: too many are open");
+        return admission.refuse(moq_relay::auth::Error::Unavailable("too many sessions".into()));
+    };
+    let (producer, consumer) = lease::Producer::new(grant);
+    admission.grant(consumer);
+    tokio::spawn(async move {
+        producer.closed().await;
+        drop(ticket);
+    });
+}
+
+/// What a session that dialled `request.path` with the token in its query may do.
+fn grant(access: &Access, request: &Request) -> Result<Grant, String> {
+    let reader = Claims::default().with_subscribe([pattern(READABLE)]);
+    let claims = match (access, token(request.query.as_deref())) {
+        (Access::Loopback | Access::Open, _) => reader.with_publish([pattern(EDITABLE)]),
+        (Access::Token { to_read: false, .. }, None) => reader,
+        (Access::Token { to_read: true, .. }, None) => return Err("no token".into()),
+        (Access::Token { key, .. }, Some(token)) => {
+            limited(key.0.verify(token).map_err(|err| err.to_string())?)?
+        }
+    };
+    let permissions = claims.authorize(&request.path).map_err(|err| err.to_string())?;
+    let mut grant = Grant::new(permissions.publish, permissions.subscribe);
+    grant.expires = claims.expires;
+    Ok(grant)
+}
+
+/// The claims with absolute names, and of what they may publish only what any client may.
+fn limited(claims: Claims) -> Result<Claims, String> {
+    let absolute = |names: &Patterns| names.rooted(&claims.root).map_err(|err| err.to_string());
+    let editable = Patterns::from(pattern(EDITABLE));
+    let publish = absolute(&claims.publish)?.intersect(&editable).map_err(|err| err.to_string())?;
+    let subscribe = absolute(&claims.subscribe)?;
+    Ok(Claims::default()
+        .with_publish(publish.iter().cloned())
+        .with_subscribe(subscribe.iter().cloned())
+        .with_expires(claims.expires))
+}
+
+/// The token in a URL's query, where the transport's own tools put it.
+fn token(query: Option<&str>) -> Option<&str> {
+    query?.split('&').find_map(|pair| pair.strip_prefix("jwt=")).filter(|token| !token.is_empty())
+}
+
+fn pattern(text: &'static str) -> Pattern {
+    text.parse().expect("a constant pattern is valid")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ask(access: &Access, path: &str, query: Option<&str>) -> Result<Grant, String> {
+        let mut request = Request::new("test", moq_auth::Transport::Quic, path);
+        request.query = query.map(str::to_owned);
+        grant(access, &request)
+    }
+
+    fn token_access(to_read: bool) -> (Key, Access) {
+        let key = Key::generate().expect("a key");
+        (key.clone(), Access::Token { key, to_read })
+    }
+
+    #[test]
+    fn clients_publish_edits_only() {
+        let grant = ask(&Access::Loopback, "/", None).expect("granted");
+        for (path, allowed) in [
+            ("sponza/edits/a", true),
+            ("sponza/edits/a/b", true),
+            ("sponza", false),
+            ("sponza/edit", false),
+            ("edits/a", false),
+            ("a/b/edits/c", false),
+        ] {
+            assert_eq!(grant.publish.matches(path), allowed, "{path}");
+        }
+        assert!(grant.subscribe.matches("sponza"));
+        assert!(!grant.subscribe.matches("sponza/edits/a"));
+    }
+
+    #[test]
+    fn names_are_relative_to_the_path_dialled() {
+        let grant = ask(&Access::Loopback, "/sponza", None).expect("granted");
+        assert!(grant.publish.matches("edits/a"));
+        assert!(!grant.publish.matches(""));
+        assert!(grant.subscribe.matches(""));
+        assert!(ask(&Access::Loopback, "/elsewhere/deep", None).is_err());
+    }
+
+    #[test]
+    fn a_token_is_needed_to_publish() {
+        let (key, access) = token_access(false);
+        let anonymous = ask(&access, "/", None).expect("reading is open");
+        assert!(anonymous.publish.is_empty() && anonymous.subscribe.matches("sponza"));
+
+        let jwt = key.issue_token("sponza", Some(Duration::from_secs(60))).expect("a token");
+        let bearer = ask(&access, "/", Some(&format!("x=1&jwt={jwt}"))).expect("granted");
+        assert!(bearer.publish.matches("sponza/edits/a"));
+        assert!(!bearer.publish.matches("cornell/edits/a"));
+        assert!(bearer.expires.is_some());
+    }
+
+    #[test]
+    fn wrong_and_missing_tokens_are_refused() {
+        let (key, access) = token_access(true);
+        assert!(ask(&access, "/", None).is_err());
+        assert!(ask(&access, "/", Some("jwt=")).is_err());
+        assert!(ask(&access, "/", Some("jwt=rubbish")).is_err());
+        let stranger =
+            Key::generate().and_then(|key| key.issue_token("sponza", None)).expect("a token");
+        assert!(ask(&access, "/", Some(&format!("jwt={stranger}"))).is_err());
+        let jwt = key.issue_token("sponza", None).expect("a token");
+        assert!(ask(&access, "/", Some(&format!("jwt={jwt}"))).is_ok());
+    }
+
+    #[test]
+    fn a_token_cannot_claim_more_than_edits() {
+        let (key, access) = token_access(false);
+        let everything = "**".parse::<Pattern>().expect("a pattern");
+        let claims = Claims::default().with_root("sponza").with_publish([everything]);
+        let jwt = key.0.sign(&claims).expect("signed");
+        let grant = ask(&access, "/", Some(&format!("jwt={jwt}"))).expect("granted");
+        assert!(grant.publish.matches("sponza/edits/a"));
+        assert!(!grant.publish.matches("sponza"));
+        assert!(!grant.publish.matches("cornell/edits/a"));
+    }
+
+    #[test]
+    fn sessions_are_limited_and_given_back() {
+        let sessions = Sessions::new(2);
+        let first = sessions.admit().expect("room");
+        let _second = sessions.admit().expect("room");
+        assert!(sessions.admit().is_none() && sessions.full());
+        drop(first);
+        assert!(sessions.admit().is_some());
+    }
+}

@@ -1,0 +1,168 @@
+//! Which hosts and web origins a request may name.
+//!
+//! Any web page may open a connection to `localhost`, and any name may resolve to it (DNS
+//! rebinding). So every request on HTTP, WebSocket and WebTransport has to name a host that is
+//! this server's, and, where a browser says which page asks (`Origin`), a page of this server.
+//! Native clients send no `Origin`; they are judged by the host and by [`Access`](crate::Access).
+
+use std::net::{IpAddr, SocketAddr};
+
+/// Why a request is refused; the text is sent to its sender, with status 403.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum Refusal {
+    #[error("the request names no host")]
+    NoHost,
+    #[error("the host {0:?} is not this server's; name it among the allowed hosts to accept it")]
+    ForeignHost(String),
+    #[error(
+        "the origin {0:?} is not this server's; name it among the allowed origins to accept it"
+    )]
+    ForeignOrigin(String),
+    #[error("a page of another site asks without naming its origin")]
+    CrossSite,
+}
+
+/// The hosts and origins that one server answers to.
+#[derive(Debug, Clone)]
+pub(crate) struct OriginCheck {
+    port: u16,
+    hosts: Vec<String>,
+    origins: Vec<String>,
+}
+
+impl OriginCheck {
+    /// A check for a server at `address`, which also answers to `hosts` (names without port) and
+    /// to pages of `origins` (`scheme://host[:port]`).
+    pub(crate) fn new(address: SocketAddr, hosts: &[String], origins: &[String]) -> Self {
+        let lower = |list: &[String]| list.iter().map(|item| item.to_ascii_lowercase()).collect();
+        Self { port: address.port(), hosts: lower(hosts), origins: lower(origins) }
+    }
+
+    /// Checks one request by its `Host` (or `:authority`) and its `Origin`, where it has one.
+    pub(crate) fn check(&self, host: Option<&str>, origin: Option<&str>) -> Result<(), Refusal> {
+        let authority = host.ok_or(Refusal::NoHost)?.to_ascii_lowercase();
+        if !self.is_own_host(host_of(&authority)) {
+            return Err(Refusal::ForeignHost(authority));
+        }
+        match origin.map(str::to_ascii_lowercase) {
+            Some(origin) if !self.is_own_origin(&origin, &authority) => {
+                Err(Refusal::ForeignOrigin(origin))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a name cannot be an attacker's. An address literal is not resolved, so that it
+    /// cannot be rebound; of names, only the loopback ones and those that were configured count.
+    fn is_own_host(&self, host: &str) -> bool {
+        is_loopback_name(host)
+            || literal(host).is_some()
+            || self.hosts.iter().any(|own| own == host)
+    }
+
+    /// A page is our own if it came from the very authority it now asks, or from this machine's
+    /// loopback at our port, which nobody else can hold.
+    fn is_own_origin(&self, origin: &str, authority: &str) -> bool {
+        if self.origins.iter().any(|allowed| allowed == origin) {
+            return true;
+        }
+        let Some((scheme, rest)) = origin.split_once("://") else { return false };
+        let default_port = match scheme {
+            "http" => 80,
+            "https" => 443,
+            _ => return false,
+        };
+        let loopback =
+            is_loopback(host_of(rest)) && port_of(rest).unwrap_or(default_port) == self.port;
+        rest == authority || loopback
+    }
+}
+
+/// The host in `host[:port]`, an IPv6 literal without its brackets.
+fn host_of(authority: &str) -> &str {
+    if let Some(rest) = authority.strip_prefix('[') {
+        return rest.split(']').next().unwrap_or(rest);
+    }
+    authority.split(':').next().unwrap_or(authority)
+}
+
+/// The port in `host[:port]`.
+fn port_of(authority: &str) -> Option<u16> {
+    authority.rsplit_once(':').and_then(|(_, port)| port.parse().ok())
+}
+
+fn literal(host: &str) -> Option<IpAddr> {
+    host.parse().ok()
+}
+
+fn is_loopback_name(host: &str) -> bool {
+    host == "localhost" || host.ends_with(".localhost")
+}
+
+fn is_loopback(host: &str) -> bool {
+    is_loopback_name(host) || literal(host).is_some_and(|ip| ip.is_loopback())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check() -> OriginCheck {
+        OriginCheck::new(
+            "127.0.0.1:4443".parse().expect("an address"),
+            &["light.example".into()],
+            &["https://studio.example".into()],
+        )
+    }
+
+    #[test]
+    fn own_hosts_pass_and_others_do_not() {
+        for host in ["localhost:4443", "LOCALHOST", "127.0.0.1:4443", "[::1]:4443", "light.example"]
+        {
+            assert_eq!(check().check(Some(host), None), Ok(()), "{host}");
+        }
+        for host in ["evil.example:4443", "localhost.evil.example", "light.example.evil", ""] {
+            assert!(
+                matches!(check().check(Some(host), None), Err(Refusal::ForeignHost(_))),
+                "{host}"
+            );
+        }
+        assert_eq!(check().check(None, None), Err(Refusal::NoHost));
+    }
+
+    #[test]
+    fn only_own_pages_pass() {
+        let local = Some("localhost:4443");
+        for origin in [
+            "http://localhost:4443",
+            "http://127.0.0.1:4443",
+            "http://[::1]:4443",
+            "https://studio.example",
+        ] {
+            assert_eq!(check().check(local, Some(origin)), Ok(()), "{origin}");
+        }
+        for origin in [
+            "https://evil.example",
+            "http://localhost:5173",
+            "http://localhost",
+            "http://6.6.6.6:4443",
+            "http://localhost:4443@evil.example",
+            "http://localhost:4443.evil.example",
+            "null",
+            "file://",
+            "",
+        ] {
+            assert!(
+                matches!(check().check(local, Some(origin)), Err(Refusal::ForeignOrigin(_))),
+                "{origin}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_page_may_ask_the_address_it_came_from() {
+        let lan = Some("192.168.1.5:4443");
+        assert_eq!(check().check(lan, Some("http://192.168.1.5:4443")), Ok(()));
+        assert!(check().check(lan, Some("http://192.168.1.6:4443")).is_err());
+    }
+}

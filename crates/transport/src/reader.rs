@@ -1,0 +1,286 @@
+//! Reading: announcements, broadcasts of others, and the frames of their tracks.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytes::Bytes;
+use moq_net::{Pattern, Patterns, announce, broadcast, group, origin, track};
+
+use crate::{Error, Result};
+
+/// How long to wait before asking again for a track that its broadcast does not have (yet).
+const RETRY: Duration = Duration::from_millis(200);
+
+/// What a reader asks of a track.
+#[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
+pub struct ReadOptions {
+    /// Where a link is too slow for all, tracks of higher priority go first.
+    pub priority: u8,
+    /// How far behind the newest group an unfinished one may fall before it is skipped; at most
+    /// five seconds. Zero suits light, whose newest state is all that counts; a track whose every
+    /// frame matters needs more.
+    pub max_age: Duration,
+    /// The largest frame accepted, in bytes.
+    pub max_frame: usize,
+}
+
+impl Default for ReadOptions {
+    /// Priority 0, the newest group only, frames up to 16 MiB.
+    fn default() -> Self {
+        Self { priority: 0, max_age: Duration::ZERO, max_frame: 16 << 20 }
+    }
+}
+
+impl ReadOptions {
+    /// For a track read at this priority.
+    pub fn with_priority(mut self, priority: u8) -> Self {
+        self.priority = priority;
+        self
+    }
+
+    /// For a track of which groups up to `max_age` behind the newest still count.
+    pub fn with_max_age(mut self, max_age: Duration) -> Self {
+        self.max_age = max_age;
+        self
+    }
+
+    /// For a track whose frames have at most `bytes`.
+    pub fn with_max_frame(mut self, bytes: usize) -> Self {
+        self.max_frame = bytes;
+        self
+    }
+
+    fn subscription(&self) -> track::Subscription {
+        track::Subscription::default().with_priority(self.priority).with_max_age(self.max_age)
+    }
+}
+
+/// A frame as its writer wrote it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Frame {
+    /// The number of its group: higher for each newer group of the track.
+    pub group: u64,
+    /// Its place in the group, from 0.
+    pub index: u64,
+    /// Its content.
+    pub bytes: Bytes,
+}
+
+/// Where a reader finds its broadcast.
+enum Source {
+    /// Whatever is published under this path, now or later.
+    Path { origin: origin::Consumer, path: Arc<str> },
+    /// One broadcast, until it ends.
+    Broadcast(broadcast::Consumer),
+}
+
+/// The reading end of a track.
+pub struct TrackReader {
+    source: Source,
+    track: Arc<str>,
+    options: ReadOptions,
+    subscription: Option<track::Ordered>,
+    group: Option<group::Consumer>,
+    /// The last subscription failed or ended: wait a moment before the next.
+    pause: bool,
+}
+
+impl TrackReader {
+    /// A reader of whatever `path` names; it waits for it, and after an end for its return.
+    pub(crate) fn follow(
+        origin: origin::Consumer,
+        path: &str,
+        track: &str,
+        options: ReadOptions,
+    ) -> Self {
+        Self::new(Source::Path { origin, path: path.into() }, track, options)
+    }
+
+    fn new(source: Source, track: &str, options: ReadOptions) -> Self {
+        Self { source, track: track.into(), options, subscription: None, group: None, pause: false }
+    }
+
+    /// The track's name.
+    pub fn name(&self) -> &str {
+        &self.track
+    }
+
+    /// Changes the priority of what has not been sent yet.
+    pub fn set_priority(&mut self, priority: u8) {
+        self.options.priority = priority;
+        if let Some(subscription) = &mut self.subscription {
+            // It fails only on a closed track, which the next read deals with.
+            let _ = subscription.update(self.options.subscription());
+        }
+    }
+
+    /// The next frame. The first is that of the newest group; a group that has become stale is
+    /// left unfinished and reading goes on with a newer one, which shows in [`Frame::group`].
+    ///
+    /// A reader got from a [`Client`](crate::Client) waits while there is no connection, broadcast
+    /// or track, and goes on where the server does, from the beginning of its newest group (which
+    /// may repeat frames). `None` says that the broadcast has ended, or the client was closed.
+    ///
+    /// Dropping the future loses nothing.
+    ///
+    /// # Errors
+    /// [`Error::FrameTooLarge`], after which reading may go on with the next group.
+    pub async fn next(&mut self) -> Result<Option<Frame>> {
+        loop {
+            if self.group.is_some() {
+                if let Some(frame) = self.next_in_group().await? {
+                    return Ok(Some(frame));
+                }
+            } else if let Some(subscription) = &mut self.subscription {
+                match subscription.next_group().await {
+                    Ok(Some(group)) => self.group = Some(group),
+                    Ok(None) => self.subscription = None,
+                    Err(err) => {
+                        tracing::debug!(track = %self.track, %err, "subscription ended");
+                        self.subscription = None;
+                    }
+                }
+                self.pause = self.subscription.is_none();
+                if self.pause && !self.follows() {
+                    return Ok(None);
+                }
+            } else if self.pause {
+                tokio::time::sleep(RETRY).await;
+                self.pause = false;
+            } else if !self.subscribe().await {
+                return Ok(None);
+            }
+        }
+    }
+
+    fn follows(&self) -> bool {
+        matches!(self.source, Source::Path { .. })
+    }
+
+    /// The next frame of the open group; `None`, and no open group, at its end.
+    async fn next_in_group(&mut self) -> Result<Option<Frame>> {
+        let Some(group) = &mut self.group else { return Ok(None) };
+        let (sequence, index) = (group.sequence, group.index());
+        let bytes = match group.read_frame().await {
+            Ok(Some(frame)) => frame.payload,
+            Ok(None) => {
+                self.group = None;
+                return Ok(None);
+            }
+            Err(err) => {
+                tracing::debug!(track = %self.track, group = sequence, %err, "group skipped");
+                self.group = None;
+                return Ok(None);
+            }
+        };
+        let limit = self.options.max_frame;
+        if bytes.len() > limit {
+            self.group = None;
+            let track = self.track.to_string();
+            return Err(Error::FrameTooLarge { track, size: bytes.len(), limit });
+        }
+        Ok(Some(Frame { group: sequence, index, bytes }))
+    }
+
+    /// Subscribes; false if there is nothing left to subscribe to.
+    async fn subscribe(&mut self) -> bool {
+        let broadcast = match &self.source {
+            Source::Broadcast(broadcast) => Ok(broadcast.clone()),
+            Source::Path { origin, path } => origin.routed_broadcast(&**path).await,
+        };
+        let subscribed = match broadcast {
+            Ok(broadcast) => subscribe(&broadcast, &self.track, self.options).await,
+            Err(err) => Err(err),
+        };
+        match subscribed {
+            Ok(subscription) => self.subscription = Some(subscription),
+            Err(moq_net::Error::Closed) => return false,
+            Err(err) => {
+                tracing::debug!(track = %self.track, %err, "not subscribed");
+                self.pause = true;
+                return self.follows();
+            }
+        }
+        true
+    }
+}
+
+async fn subscribe(
+    broadcast: &broadcast::Consumer,
+    track: &str,
+    options: ReadOptions,
+) -> Result<track::Ordered, moq_net::Error> {
+    Ok(broadcast.track(track)?.subscribe(options.subscription()).await?.ordered())
+}
+
+/// A broadcast that somebody else publishes.
+#[derive(Clone)]
+pub struct RemoteBroadcast {
+    path: Arc<str>,
+    inner: broadcast::Consumer,
+}
+
+impl RemoteBroadcast {
+    /// The broadcast's path.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Reads a track until the broadcast ends.
+    pub fn subscribe(&self, track: &str, options: ReadOptions) -> TrackReader {
+        TrackReader::new(Source::Broadcast(self.inner.clone()), track, options)
+    }
+}
+
+/// A broadcast has appeared or gone.
+pub enum Announcement {
+    /// Somebody publishes this.
+    Appeared(RemoteBroadcast),
+    /// Nobody publishes this path any more.
+    Gone(String),
+}
+
+/// The broadcasts of others under a path, as they appear and go. First come those already there.
+pub struct Announcements {
+    origin: origin::Consumer,
+    updates: announce::Consumer,
+    appearing: Option<String>,
+}
+
+impl Announcements {
+    pub(crate) fn new(origin: &origin::Consumer, prefix: &str) -> Result<Self> {
+        let refused = |reason: String| Error::Publish { path: prefix.to_owned(), reason };
+        let pattern = Pattern::subtree(prefix).map_err(|err| refused(err.to_string()))?;
+        let origin =
+            origin.scope("", &Patterns::from(pattern)).map_err(|err| refused(err.to_string()))?;
+        let updates = origin.announced();
+        Ok(Self { origin, updates, appearing: None })
+    }
+
+    /// The next change; `None` once the server or client is closed. Dropping the future loses
+    /// nothing.
+    pub async fn next(&mut self) -> Option<Announcement> {
+        loop {
+            if let Some(path) = &self.appearing {
+                let found = self.origin.request_broadcast(path.as_str()).await;
+                let path: Arc<str> = path.as_str().into();
+                self.appearing = None;
+                match found {
+                    Ok(inner) => {
+                        return Some(Announcement::Appeared(RemoteBroadcast { path, inner }));
+                    }
+                    Err(err) => tracing::debug!(%path, %err, "announced broadcast not found"),
+                }
+            }
+            let update = self.updates.next().await?;
+            let path = update.prefix.as_str().to_owned();
+            match update.kind {
+                announce::Kind::Announced => self.appearing = Some(path),
+                announce::Kind::Updated => {}
+                announce::Kind::Retracted => return Some(Announcement::Gone(path)),
+            }
+        }
+    }
+}

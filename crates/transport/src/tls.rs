@@ -1,0 +1,126 @@
+//! The server's certificate: from files, or made for development.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::{Arc, Once, RwLock};
+use std::time::Duration;
+
+use moq_relay::web;
+use moq_tokio::rustls::ServerConfig as RustlsConfig;
+use moq_tokio::tls::{Identity, Listen, ReloadingServerConfig};
+use web_transport_moq::noq;
+
+use crate::{Error, Result};
+
+/// Where the server's certificate comes from.
+#[derive(Debug, Clone, Default)]
+#[non_exhaustive]
+pub enum Tls {
+    /// A certificate made at the start, and anew every week, for development. Browsers accept it
+    /// for WebTransport by its fingerprint, served at `/certificate.sha256`; HTTP and WebSocket
+    /// stay unencrypted.
+    #[default]
+    SelfSigned,
+    /// A certificate chain and its key, as PEM files; also for HTTPS and WebSocket. They are read
+    /// again when they change.
+    Files {
+        /// The chain, the server's own certificate first.
+        cert: PathBuf,
+        /// The key.
+        key: PathBuf,
+    },
+}
+
+/// How often a development certificate is replaced. Browsers accept by fingerprint only what is
+/// valid for at most 14 days.
+pub(crate) const RENEWAL: Duration = Duration::from_secs(7 * 24 * 3600);
+
+/// What the QUIC endpoint is configured with.
+pub(crate) struct Identified {
+    config: Arc<RustlsConfig>,
+    /// SHA-256 of a development certificate, in hexadecimal; others are trusted by their chain.
+    pub(crate) fingerprint: Option<String>,
+    /// Watches the certificate's files for as long as it lives.
+    _reloading: Option<ReloadingServerConfig>,
+}
+
+/// The fingerprint served now; it changes with the certificate.
+pub(crate) type Fingerprint = Arc<RwLock<Option<String>>>;
+
+/// Chooses the cryptography for every connection of the process, unless it is chosen already.
+pub(crate) fn install_provider() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        // It fails only if the program chose first, which is as good.
+        let _ = moq_tokio::rustls::crypto::aws_lc_rs::default_provider().install_default();
+    });
+}
+
+impl Tls {
+    /// The configuration for QUIC. Call inside a Tokio runtime.
+    pub(crate) fn for_quic(&self) -> Result<Identified> {
+        let mut listen = Listen::default();
+        let alpn = vec![web_transport_moq::ALPN.as_bytes().to_vec()];
+        match self {
+            Self::SelfSigned => {
+                let identity = Identity::generate(["localhost"]).map_err(tls_error)?;
+                let fingerprint = Some(identity.fingerprint().to_owned());
+                listen.identity = Some(identity);
+                let config = listen.server_config(alpn).map_err(tls_error)?;
+                Ok(Identified { config, fingerprint, _reloading: None })
+            }
+            Self::Files { cert, key } => {
+                listen.cert = vec![cert.clone()];
+                listen.key = vec![key.clone()];
+                let reloading = listen.server_config_reloading(alpn).map_err(tls_error)?;
+                let config = reloading.config();
+                Ok(Identified { config, fingerprint: None, _reloading: Some(reloading) })
+            }
+        }
+    }
+
+    /// The configuration of the TCP side: HTTPS with files, else plain HTTP.
+    pub(crate) fn for_http(&self, listen: SocketAddr) -> web::Config {
+        let mut config = web::Config::default();
+        match self {
+            Self::SelfSigned => config.http.listen = Some(listen),
+            Self::Files { cert, key } => {
+                config.https.listen = Some(listen);
+                config.https.cert = vec![cert.clone()];
+                config.https.key = vec![key.clone()];
+            }
+        }
+        config
+    }
+}
+
+/// A QUIC configuration that closes a silent connection after three seconds, so that both ends
+/// soon know.
+pub(crate) fn quic_config(identified: &Identified) -> Result<noq::ServerConfig> {
+    let crypto = noq::crypto::rustls::QuicServerConfig::try_from(identified.config.clone())
+        .map_err(tls_error)?;
+    let mut transport = noq::TransportConfig::default();
+    let idle = noq::IdleTimeout::try_from(crate::IDLE_TIMEOUT).map_err(tls_error)?;
+    transport.max_idle_timeout(Some(idle));
+    transport.keep_alive_interval(Some(crate::KEEP_ALIVE));
+    // Every subscription holds a stream, and every group being sent another.
+    let streams = noq::VarInt::from_u32(MAX_STREAMS);
+    transport.max_concurrent_bidi_streams(streams);
+    transport.max_concurrent_uni_streams(streams);
+    transport.receive_window(noq::VarInt::from_u32(RECEIVE_WINDOW));
+    // Controlled by delay, not loss: light is of use only while it is new.
+    let congestion = noq::congestion::Bbr3Config::default();
+    transport.congestion_controller_factory(Arc::new(congestion));
+    let mut config = noq::ServerConfig::with_crypto(Arc::new(crypto));
+    config.transport_config(Arc::new(transport));
+    Ok(config)
+}
+
+/// Streams that a client may have open at once, of each kind.
+const MAX_STREAMS: u32 = 1024;
+/// Bytes that a client may have on the way, over all its streams.
+const RECEIVE_WINDOW: u32 = 8 << 20;
+
+fn tls_error(err: impl std::fmt::Display) -> Error {
+    Error::Tls(err.to_string())
+}
