@@ -4,8 +4,10 @@
 //! and light of emissive surfaces and of the environment. Probes store the spherical-harmonic
 //! coefficients of arriving radiance (cd/m²) in world axes.
 
+mod scale;
 pub mod sh;
 mod volume;
 
+pub use scale::ScaleRule;
 pub use sh::Order;
 pub use volume::{Grid, ProbeVolume, VolumeId};
