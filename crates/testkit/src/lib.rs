@@ -1,3 +1,1 @@
 //! Analytic scenes, image metrics, simulated links and planted faults for tests.
-
-pub mod scenes;

@@ -1,0 +1,21 @@
+//! What decoders refuse to exceed (docs/wire.md, "Limits"). Every allocation of a decoder is bounded
+//! by these before a byte of it is made.
+
+/// Bytes of a frame.
+pub const FRAME_BYTES: usize = 1 << 20;
+/// Fields of a catalog.
+pub const FIELDS: usize = 256;
+/// Regions of a field.
+pub const REGIONS: usize = 4096;
+/// Probes of a field.
+pub const FIELD_PROBES: usize = 1 << 18;
+/// Probes of all fields of a catalog together.
+pub const CATALOG_PROBES: usize = 1 << 19;
+/// Cells of a region along an axis.
+pub const REGION_CELLS: u32 = 16;
+/// Edits of a snapshot.
+pub const SNAPSHOT_EDITS: usize = 1 << 16;
+/// Edits of a delta, and refusals.
+pub const DELTA_EDITS: usize = 4096;
+/// Bytes of a file.
+pub const FILE_BYTES: u64 = 1 << 30;
