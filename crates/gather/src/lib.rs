@@ -3,6 +3,15 @@
 //! A gatherer knows a [`Snapshot`](lumencast_scene::Snapshot) of the scene and receivers, not
 //! volumes or lightmaps. It works on its own threads; the caller submits and polls.
 
+mod accel;
+mod bsdf;
+mod lights;
+pub mod path_trace;
+pub mod reference;
+mod sampling;
+mod surface;
+mod world;
+
 use std::sync::Arc;
 
 use glam::Vec3;

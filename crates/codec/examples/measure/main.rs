@@ -48,7 +48,7 @@ const SEQUENCES: [(&str, Scene); 4] = [
     }),
     ("switch", |t| Room {
         lamp: Vec3::new(0.5, 1.5, 0.3),
-        intensity: if (t / 5.0) as u32 % 2 == 0 { 800.0 } else { 20.0 },
+        intensity: if ((t / 5.0) as u32).is_multiple_of(2) { 800.0 } else { 20.0 },
         ball: Vec3::new(-1.0, -1.0, 0.0),
     }),
     ("minute", |t| Room {

@@ -1,0 +1,304 @@
+//! The walk through the hierarchies.
+//!
+//! The walk itself ([`trace_with`]) is written once; what tests eight boxes or eight triangles is
+//! passed in, so that it can be compiled with and without AVX2. `is_x86_feature_detected!` chooses.
+//!
+//! Boxes: the slab test with far distances widened by 1 + 2γ(3), so that rounding errs towards
+//! visiting (Ize 2013, "Robust BVH ray traversal"). Triangles: signs of the ray's Plücker product
+//! with each edge, as in Embree's robust mode. For an edge that two triangles share, both compute
+//! exact negatives, so a ray cannot slip between them.
+
+use glam::{Vec3, Vec3A};
+
+use super::mesh_bvh::{Block, LANES};
+use super::wide::{LEAF, Node};
+use super::{Accel, Hit, Placed, Ray};
+
+/// Directions' components are kept at least this far from zero, so that no infinities arise.
+const TINY: f32 = 1e-18;
+/// 1 + 2γ(3).
+pub(super) const WIDEN: f32 = 1.0 + 2.0 * 3.0 * f32::EPSILON;
+
+/// Which instructions to use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kernel {
+    /// Plain Rust.
+    Portable,
+    /// AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+}
+
+/// Proof that the processor has AVX2 and FMA.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Avx2(());
+
+impl Kernel {
+    /// The fastest that this processor has.
+    pub(crate) fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            return Self::Avx2(Avx2(()));
+        }
+        Self::Portable
+    }
+}
+
+/// What is still to be visited; kept by the caller so that rays need not allocate.
+#[derive(Debug, Default)]
+pub(crate) struct Stack(Vec<Entry>);
+
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    child: u32,
+    t: f32,
+}
+
+/// A ray as the box and triangle tests want it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Setup {
+    pub(super) origin: [f32; 3],
+    pub(super) direction: [f32; 3],
+    pub(super) inverse: [f32; 3],
+    /// Rows of [`Node::planes`] that the ray meets first.
+    pub(super) near: [usize; 3],
+}
+
+impl Setup {
+    #[inline(always)]
+    fn new(origin: Vec3A, direction: Vec3A) -> Self {
+        let origin = origin.to_array();
+        let direction = direction.to_array();
+        let mut inverse = [0.0; 3];
+        let mut near = [0; 3];
+        for axis in 0..3 {
+            let d = direction[axis];
+            let safe = if d.abs() < TINY { TINY.copysign(d) } else { d };
+            inverse[axis] = 1.0 / safe;
+            near[axis] = if safe < 0.0 { axis + 3 } else { axis };
+        }
+        Self { origin, direction, inverse, near }
+    }
+
+    #[inline(always)]
+    fn transformed(ray: &Ray, placed: &Placed) -> Self {
+        let m = &placed.object_from_world;
+        Self::new(
+            m.transform_point3a(ray.origin.into()),
+            m.transform_vector3a(ray.direction.into()),
+        )
+    }
+}
+
+/// Lanes that a test found, and what it found there.
+pub(super) struct BoxHits {
+    pub(super) mask: u32,
+    pub(super) t: [f32; 8],
+}
+
+/// Lanes of the triangles that a test found.
+pub(super) struct TriangleHits {
+    pub(super) mask: u32,
+    pub(super) t: [f32; LANES],
+    pub(super) u: [f32; LANES],
+    pub(super) v: [f32; LANES],
+}
+
+/// The nearest hit, or with `ANY` the first found.
+#[inline]
+pub(super) fn trace<const ANY: bool>(
+    accel: &Accel,
+    ray: &Ray,
+    stack: &mut Stack,
+    accept: impl Fn(&Hit) -> bool,
+) -> Option<Hit> {
+    match accel.kernel {
+        Kernel::Portable => {
+            trace_with::<ANY>(accel, ray, stack, accept, boxes_portable, triangles_portable)
+        }
+        #[cfg(target_arch = "x86_64")]
+        Kernel::Avx2(_) => {
+            #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
+            // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for AVX2 and FMA.
+            unsafe {
+                super::kernel_avx2::trace::<ANY>(accel, ray, stack, accept)
+            }
+        }
+    }
+}
+
+/// The walk, both levels.
+#[inline(always)]
+pub(super) fn trace_with<const ANY: bool>(
+    accel: &Accel,
+    ray: &Ray,
+    stack: &mut Stack,
+    accept: impl Fn(&Hit) -> bool,
+    boxes: impl Fn(&Node, &Setup, f32) -> BoxHits,
+    triangles: impl Fn(&Block, &Setup, f32) -> TriangleHits,
+) -> Option<Hit> {
+    let mut best: Option<Hit> = None;
+    let world = Setup::new(ray.origin.into(), ray.direction.into());
+    stack.0.clear();
+    walk::<ANY>(&accel.nodes, &world, ray.t_max, stack, &boxes, |instance, t_max, stack| {
+        let placed = &accel.placed[instance as usize];
+        let bvh = &*placed.bvh;
+        let local = Setup::transformed(ray, placed);
+        walk::<ANY>(&bvh.nodes, &local, t_max, stack, &boxes, |block, t_max, _| {
+            let block = &bvh.blocks[block as usize];
+            match nearest(block, placed.instance, triangles(block, &local, t_max), &accept) {
+                Some(hit) => {
+                    best = Some(hit);
+                    hit.t
+                }
+                None => t_max,
+            }
+        })
+    });
+    best
+}
+
+/// Visits the leaves that the ray meets before `t_max`, near ones first; `leaf` returns the new
+/// `t_max`. Returns the last `t_max`. With `ANY` it ends as soon as a leaf lowers it.
+#[inline(always)]
+fn walk<const ANY: bool>(
+    nodes: &[Node],
+    ray: &Setup,
+    mut t_max: f32,
+    stack: &mut Stack,
+    boxes: &impl Fn(&Node, &Setup, f32) -> BoxHits,
+    mut leaf: impl FnMut(u32, f32, &mut Stack) -> f32,
+) -> f32 {
+    let base = stack.0.len();
+    let mut current = 0;
+    loop {
+        if current & LEAF != 0 {
+            let shorter = leaf(current & !LEAF, t_max, stack);
+            if ANY && shorter < t_max {
+                stack.0.truncate(base);
+                return shorter;
+            }
+            t_max = shorter;
+        } else {
+            let node = &nodes[current as usize];
+            let mut hits = boxes(node, ray, t_max);
+            let first = stack.0.len();
+            while hits.mask != 0 {
+                let lane = hits.mask.trailing_zeros() as usize;
+                hits.mask &= hits.mask - 1;
+                stack.0.push(Entry { child: node.child[lane & 7], t: hits.t[lane & 7] });
+            }
+            if !ANY {
+                far_first(&mut stack.0[first..]);
+            }
+        }
+        loop {
+            if stack.0.len() == base {
+                return t_max;
+            }
+            let Some(next) = stack.0.pop() else { return t_max };
+            if next.t <= t_max {
+                current = next.child;
+                break;
+            }
+        }
+    }
+}
+
+/// Insertion sort by falling distance: at most eight entries, mostly one or two.
+#[inline(always)]
+fn far_first(entries: &mut [Entry]) {
+    for i in 1..entries.len() {
+        let entry = entries[i];
+        let mut at = i;
+        while at > 0 && entries[at - 1].t < entry.t {
+            entries[at] = entries[at - 1];
+            at -= 1;
+        }
+        entries[at] = entry;
+    }
+}
+
+/// The nearest of the triangles found that is accepted.
+#[inline(always)]
+fn nearest(
+    block: &Block,
+    instance: u32,
+    mut hits: TriangleHits,
+    accept: &impl Fn(&Hit) -> bool,
+) -> Option<Hit> {
+    while hits.mask != 0 {
+        let mut lane = hits.mask.trailing_zeros() as usize & 7;
+        let mut rest = hits.mask & (hits.mask - 1);
+        while rest != 0 {
+            let other = rest.trailing_zeros() as usize & 7;
+            rest &= rest - 1;
+            if hits.t[other] < hits.t[lane] {
+                lane = other;
+            }
+        }
+        let hit = Hit {
+            t: hits.t[lane],
+            u: hits.u[lane],
+            v: hits.v[lane],
+            instance,
+            primitive: block.primitive[lane],
+            triangle: block.triangle[lane],
+        };
+        if accept(&hit) {
+            return Some(hit);
+        }
+        hits.mask &= !(1 << lane);
+    }
+    None
+}
+
+#[inline(always)]
+fn boxes_portable(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
+    let mut hits = BoxHits { mask: 0, t: [0.0; 8] };
+    for lane in 0..8 {
+        let mut enter = 0.0f32;
+        let mut leave = t_max;
+        for axis in 0..3 {
+            let near = ray.near[axis];
+            let far = if near < 3 { near + 3 } else { near - 3 };
+            let (o, i) = (ray.origin[axis], ray.inverse[axis]);
+            enter = enter.max((node.planes[near][lane] - o) * i);
+            leave = leave.min((node.planes[far][lane] - o) * i * WIDEN);
+        }
+        hits.t[lane] = enter;
+        hits.mask |= u32::from(enter <= leave) << lane;
+    }
+    hits
+}
+
+fn triangles_portable(block: &Block, ray: &Setup, t_max: f32) -> TriangleHits {
+    let mut hits = TriangleHits { mask: 0, t: [0.0; 8], u: [0.0; 8], v: [0.0; 8] };
+    let origin = Vec3::from_array(ray.origin);
+    let direction = Vec3::from_array(ray.direction);
+    let corner = |vertex: usize, lane: usize| {
+        let c = &block.corners[vertex];
+        Vec3::new(c[0][lane], c[1][lane], c[2][lane]) - origin
+    };
+    for lane in 0..LANES {
+        let [v0, v1, v2] = [corner(0, lane), corner(1, lane), corner(2, lane)];
+        let (e0, e1, e2) = (v2 - v0, v0 - v1, v1 - v2);
+        let u = e0.cross(v2 + v0).dot(direction);
+        let v = e1.cross(v0 + v1).dot(direction);
+        let w = e2.cross(v1 + v2).dot(direction);
+        let sum = u + v + w;
+        let slack = f32::EPSILON * sum.abs();
+        if !(u.min(v).min(w) >= -slack || u.max(v).max(w) <= slack) {
+            continue;
+        }
+        let normal = e1.cross(e0);
+        let across = normal.dot(direction);
+        let t = normal.dot(v0) / across;
+        if across != 0.0 && sum != 0.0 && t > 0.0 && t <= t_max {
+            hits.mask |= 1 << lane;
+            (hits.t[lane], hits.u[lane], hits.v[lane]) = (t, u / sum, v / sum);
+        }
+    }
+    hits
+}

@@ -1,0 +1,143 @@
+//! The hierarchy over the triangles of one mesh, in object space.
+
+use glam::Vec3A;
+use lumencast_scene::{Mesh, Vertices};
+
+use super::Aabb;
+use super::build::{Item, tree};
+use super::wide::{LEAF, Node, collapse};
+
+/// Triangles a leaf.
+pub(super) const LANES: usize = 8;
+/// When refitting has made the tree this much dearer than it was when built, it is built anew.
+const REBUILD_COST: f32 = 1.8;
+const UNUSED: u32 = u32::MAX;
+
+/// Up to eight triangles, laid out so that one instruction tests all.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Block {
+    /// Vertex, axis, lane. Unused lanes hold a triangle without area, which no ray meets.
+    pub(super) corners: [[[f32; LANES]; 3]; 3],
+    pub(super) primitive: [u32; LANES],
+    pub(super) triangle: [u32; LANES],
+}
+
+impl Block {
+    const EMPTY: Self =
+        Self { corners: [[[0.0; LANES]; 3]; 3], primitive: [0; LANES], triangle: [UNUSED; LANES] };
+
+    fn set(&mut self, lane: usize, corners: [Vec3A; 3]) {
+        for (vertex, corner) in corners.iter().enumerate() {
+            for axis in 0..3 {
+                self.corners[vertex][axis][lane] = corner[axis];
+            }
+        }
+    }
+}
+
+/// A bounding-volume hierarchy over a mesh's triangles.
+#[derive(Clone, Debug)]
+pub(crate) struct MeshBvh {
+    pub(super) nodes: Vec<Node>,
+    pub(super) blocks: Vec<Block>,
+    bounds: Aabb,
+    /// SAH cost when built.
+    cost: f32,
+}
+
+impl MeshBvh {
+    /// Builds over the mesh at rest, or over `deformed` vertices (one entry a primitive).
+    pub(crate) fn build(mesh: &Mesh, deformed: Option<&[Vertices]>) -> Self {
+        let source = Source { mesh, deformed };
+        let mut ids = Vec::with_capacity(mesh.triangle_count());
+        let mut items = Vec::with_capacity(mesh.triangle_count());
+        for (p, primitive) in (0..).zip(&mesh.primitives) {
+            for t in 0..primitive.triangles.len() as u32 {
+                let bounds = around(source.corners(p, t));
+                if bounds.min.is_finite() && bounds.max.is_finite() {
+                    items.push(Item { bounds, index: ids.len() as u32 });
+                }
+                ids.push((p, t));
+            }
+        }
+        let root = tree(&mut items, LANES);
+        let mut blocks = Vec::new();
+        let nodes = collapse(&root, &mut |items| {
+            let mut block = Block::EMPTY;
+            for (lane, item) in items.iter().enumerate() {
+                let (p, t) = ids[item.index as usize];
+                block.primitive[lane] = p;
+                block.triangle[lane] = t;
+                block.set(lane, source.corners(p, t));
+            }
+            blocks.push(block);
+            blocks.len() as u32 - 1
+        });
+        let cost = cost(&nodes);
+        Self { nodes, blocks, bounds: root.bounds(), cost }
+    }
+
+    /// Object-space bounds.
+    pub(crate) fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Brings the hierarchy to new vertices of the same mesh: its boxes are fitted anew, and where
+    /// that leaves too poor a tree it is rebuilt. Costs about a twentieth of building.
+    pub(crate) fn refit(&mut self, mesh: &Mesh, deformed: &[Vertices]) {
+        let source = Source { mesh, deformed: Some(deformed) };
+        let mut boxes = Vec::with_capacity(self.blocks.len());
+        for block in &mut self.blocks {
+            let mut bounds = Aabb::EMPTY;
+            for lane in 0..LANES {
+                if block.triangle[lane] == UNUSED {
+                    continue;
+                }
+                let corners = source.corners(block.primitive[lane], block.triangle[lane]);
+                block.set(lane, corners);
+                bounds = bounds.union(around(corners));
+            }
+            boxes.push(bounds);
+        }
+        for n in (0..self.nodes.len()).rev() {
+            let mut node = self.nodes[n];
+            for (lane, child) in self.nodes[n].lanes() {
+                let bounds = match child & LEAF {
+                    0 => self.nodes[child as usize].bounds(),
+                    _ => boxes[(child & !LEAF) as usize],
+                };
+                node.set_bounds(lane, bounds);
+            }
+            self.nodes[n] = node;
+        }
+        self.bounds = self.nodes[0].bounds();
+        if !self.bounds.min.is_finite() || cost(&self.nodes) > REBUILD_COST * self.cost {
+            *self = Self::build(mesh, Some(deformed));
+        }
+    }
+}
+
+/// Expected number of nodes and leaves that a random ray through the root's box visits.
+fn cost(nodes: &[Node]) -> f32 {
+    let area: f32 =
+        nodes.iter().flat_map(|n| n.lanes().map(|(lane, _)| n.lane_bounds(lane).half_area())).sum();
+    area / nodes[0].bounds().half_area().max(f32::MIN_POSITIVE)
+}
+
+fn around(corners: [Vec3A; 3]) -> Aabb {
+    corners.into_iter().fold(Aabb::EMPTY, Aabb::with)
+}
+
+struct Source<'a> {
+    mesh: &'a Mesh,
+    deformed: Option<&'a [Vertices]>,
+}
+
+impl Source<'_> {
+    fn corners(&self, primitive: u32, triangle: u32) -> [Vec3A; 3] {
+        let p = &self.mesh.primitives[primitive as usize];
+        let vertices = self.deformed.map_or(&p.vertices, |d| &d[primitive as usize]);
+        p.triangles[triangle as usize].map(|i| vertices.positions[i as usize].into())
+    }
+}

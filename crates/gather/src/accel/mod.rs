@@ -1,0 +1,176 @@
+//! Which surface does a ray meet?
+//!
+//! Two levels: one bounding-volume hierarchy a mesh in object space ([`mesh_bvh`]), kept from
+//! snapshot to snapshot by [`cache`], and a small one over the placed instances, rebuilt whenever
+//! the scene has changed. Both are built as binary trees by binned SAH ([`build`]), collapsed to
+//! eight children a node ([`wide`]) and walked by the code in [`kernel`], with AVX2 where the
+//! processor has it.
+//!
+//! What holds at edges: triangles of one mesh that share an edge (bit-equal positions) leave no gap,
+//! since the edge functions of both are exact negatives of each other and box tests err outwards.
+//! Between different instances rays are transformed separately, so no such promise is made.
+
+mod build;
+mod cache;
+mod kernel;
+#[cfg(target_arch = "x86_64")]
+mod kernel_avx2;
+mod mesh_bvh;
+#[cfg(test)]
+mod tests;
+mod wide;
+
+use std::sync::Arc;
+
+use glam::{Affine3A, Mat3A, Vec3, Vec3A};
+
+pub(crate) use cache::AccelCache;
+pub(crate) use kernel::{Kernel, Stack};
+pub(crate) use mesh_bvh::MeshBvh;
+
+use wide::Node;
+
+/// A ray from t = 0 (exclusive) to `t_max` (inclusive).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ray {
+    /// Metres.
+    pub(crate) origin: Vec3,
+    /// Any length above zero; t counts in its lengths.
+    pub(crate) direction: Vec3,
+    /// Where it ends; may be infinite.
+    pub(crate) t_max: f32,
+}
+
+/// Where a ray meets a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Hit {
+    /// Distance in lengths of the ray's direction.
+    pub(crate) t: f32,
+    /// Barycentric weight of the triangle's second vertex.
+    pub(crate) u: f32,
+    /// Barycentric weight of the triangle's third vertex.
+    pub(crate) v: f32,
+    /// Index into the snapshot's instances.
+    pub(crate) instance: u32,
+    /// Index into the mesh's primitives.
+    pub(crate) primitive: u32,
+    /// Index into the primitive's triangles.
+    pub(crate) triangle: u32,
+}
+
+/// An instance at its place, ready to be traced.
+#[derive(Debug)]
+struct Placed {
+    /// Index into the snapshot's instances.
+    instance: u32,
+    object_from_world: Affine3A,
+    bvh: Arc<MeshBvh>,
+}
+
+/// The acceleration structure of one snapshot.
+#[derive(Debug)]
+pub(crate) struct Accel {
+    nodes: Vec<Node>,
+    placed: Vec<Placed>,
+    bounds: Aabb,
+    kernel: Kernel,
+}
+
+impl Accel {
+    /// Builds the top level over instances given as (index, transform, hierarchy). Those without
+    /// triangles are left out.
+    pub(crate) fn new(
+        instances: impl IntoIterator<Item = (u32, Affine3A, Arc<MeshBvh>)>,
+        kernel: Kernel,
+    ) -> Self {
+        let mut placed = Vec::new();
+        let mut boxes = Vec::new();
+        for (instance, world_from_object, bvh) in instances {
+            if bvh.bounds().is_empty() {
+                continue;
+            }
+            boxes.push(bvh.bounds().transformed(&world_from_object));
+            let object_from_world = world_from_object.inverse();
+            placed.push(Placed { instance, object_from_world, bvh });
+        }
+        let (nodes, bounds) = wide::over_boxes(&boxes);
+        Self { nodes, placed, bounds, kernel }
+    }
+
+    /// World bounds of everything; empty for an empty scene.
+    pub(crate) fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// The nearest surface that `accept` lets count.
+    #[inline]
+    pub(crate) fn closest(
+        &self,
+        ray: &Ray,
+        stack: &mut Stack,
+        accept: impl Fn(&Hit) -> bool,
+    ) -> Option<Hit> {
+        kernel::trace::<false>(self, ray, stack, accept)
+    }
+
+    /// Whether any surface that `accept` lets count lies on the ray.
+    #[inline]
+    pub(crate) fn occluded(
+        &self,
+        ray: &Ray,
+        stack: &mut Stack,
+        accept: impl Fn(&Hit) -> bool,
+    ) -> bool {
+        kernel::trace::<true>(self, ray, stack, accept).is_some()
+    }
+}
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Aabb {
+    pub(crate) min: Vec3A,
+    pub(crate) max: Vec3A,
+}
+
+impl Aabb {
+    pub(crate) const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
+
+    pub(crate) fn is_empty(&self) -> bool {
+        !self.min.cmple(self.max).all()
+    }
+
+    #[must_use]
+    pub(crate) fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    #[must_use]
+    pub(crate) fn with(self, point: Vec3A) -> Self {
+        Self { min: self.min.min(point), max: self.max.max(point) }
+    }
+
+    /// Half the surface area, 0 when empty.
+    pub(crate) fn half_area(&self) -> f32 {
+        let d = (self.max - self.min).max(Vec3A::ZERO);
+        d.x * d.y + d.y * d.z + d.z * d.x
+    }
+
+    pub(crate) fn center(&self) -> Vec3A {
+        0.5 * (self.min + self.max)
+    }
+
+    /// The box around the transformed box, widened by the rounding of the transform.
+    fn transformed(&self, to: &Affine3A) -> Self {
+        let center = to.transform_point3a(self.center());
+        let half = 0.5 * (self.max - self.min);
+        let extent = abs(&to.matrix3) * half;
+        let rounding =
+            8.0 * f32::EPSILON * (center.abs() + extent + abs(&to.matrix3) * self.center().abs());
+        Self { min: center - extent - rounding, max: center + extent + rounding }
+    }
+}
+
+/// The matrix of absolute values.
+pub(crate) fn abs(m: &Mat3A) -> Mat3A {
+    Mat3A::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs())
+}

@@ -1,0 +1,151 @@
+//! Emissive triangles as sources.
+
+use glam::{Vec2, Vec3};
+use lumencast_scene::{Instance, Material};
+
+use crate::sampling::{Table, luminance, triangle};
+use crate::surface::{Frames, MaterialModel, Triangle, scaled_cross};
+
+/// A triangle that shines.
+#[derive(Clone, Copy, Debug)]
+struct Emitter {
+    instance: u32,
+    primitive: u32,
+    triangle: u32,
+    /// World.
+    corners: [Vec3; 3],
+    /// Unit, of the front.
+    normal: Vec3,
+    /// m².
+    area: f32,
+    /// Both faces shine.
+    double_sided: bool,
+    /// Bound of a point's error along the normal, metres.
+    offset: f32,
+}
+
+/// The emissive triangles of a snapshot.
+#[derive(Debug, Default)]
+pub(crate) struct Emitters {
+    emitters: Vec<Emitter>,
+    by_power: Table,
+}
+
+/// A point of an emissive triangle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EmitterSample {
+    pub(crate) instance: u32,
+    pub(crate) primitive: u32,
+    pub(crate) triangle: u32,
+    /// Weights of the triangle's vertices.
+    pub(crate) weights: Vec3,
+    /// World, a little before the surface, so that it does not shade itself.
+    pub(crate) position: Vec3,
+    /// Density per steradian as seen from where it was asked for.
+    pub(crate) pdf: f32,
+}
+
+impl Emitters {
+    /// Adds a primitive's triangles; returns the number of its first.
+    pub(crate) fn add(
+        &mut self,
+        (index, instance): (u32, &Instance),
+        frames: &Frames,
+        primitive: u32,
+        double_sided: bool,
+    ) -> u32 {
+        let first = self.emitters.len() as u32;
+        let triangles = instance.mesh.primitives[primitive as usize].triangles.len() as u32;
+        self.emitters.extend((0..triangles).map(|triangle| {
+            let local = Triangle::new(instance, primitive, triangle).positions();
+            let corners = local.map(|p| frames.position(p));
+            let [a, b, c] = corners;
+            let normal = frames.normal(scaled_cross(local[1] - local[0], local[2] - local[0]));
+            let area = 0.5 * (b - a).cross(c - a).length();
+            let far = corners.map(Vec3::abs);
+            let offset = frames.error(local, far[0].max(far[1]).max(far[2])).dot(normal.abs());
+            Emitter {
+                instance: index,
+                primitive,
+                triangle,
+                corners,
+                normal,
+                area,
+                double_sided,
+                offset,
+            }
+        }));
+        first
+    }
+
+    /// To be called once all are there: weighs them by power.
+    pub(crate) fn finish<'a>(
+        &mut self,
+        instances: &'a [Instance],
+        material: impl Fn(u32, u32) -> &'a Material,
+    ) {
+        self.by_power = Table::new(self.emitters.iter().map(|e| {
+            let local = Triangle::new(&instances[e.instance as usize], e.primitive, e.triangle);
+            let material = material(e.instance, e.primitive);
+            let power = |weights: Vec3| luminance(local.emission(material, weights));
+            // Textures: at the middle and near the corners.
+            let near = |k: usize| {
+                let mut w = Vec3::splat(0.15);
+                w[k] = 0.7;
+                power(w)
+            };
+            let mean = match material.emissive_texture {
+                None => power(Vec3::splat(1.0 / 3.0)),
+                Some(_) => 0.25 * (power(Vec3::splat(1.0 / 3.0)) + near(0) + near(1) + near(2)),
+            };
+            let sides = if e.double_sided { 2.0 } else { 1.0 };
+            e.area * mean * sides * f32::from(e.normal != Vec3::ZERO)
+        }));
+    }
+
+    /// Whether nothing shines.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.by_power.is_empty()
+    }
+
+    /// A point, uniform on a triangle chosen by power; `None` where `from` sees its dark side.
+    pub(crate) fn sample(&self, from: Vec3, choice: f32, u: Vec2) -> Option<EmitterSample> {
+        if self.is_empty() {
+            return None;
+        }
+        let (index, _, _) = self.by_power.choose(choice);
+        let e = &self.emitters[index];
+        let uv = triangle(u);
+        let weights = Vec3::new(1.0 - uv.x - uv.y, uv.x, uv.y);
+        let [a, b, c] = e.corners;
+        let on_surface = weights.x * a + weights.y * b + weights.z * c;
+        let pdf = self.pdf(index as u32, from, on_surface);
+        let side = 1.0f32.copysign((from - on_surface).dot(e.normal));
+        (pdf > 0.0).then_some(EmitterSample {
+            instance: e.instance,
+            primitive: e.primitive,
+            triangle: e.triangle,
+            weights,
+            position: on_surface + side * e.offset * e.normal,
+            pdf,
+        })
+    }
+
+    /// Density per steradian with which a point would be chosen from `from`; 0 on the dark side.
+    pub(crate) fn pdf(&self, index: u32, from: Vec3, position: Vec3) -> f32 {
+        let e = &self.emitters[index as usize];
+        let to = from - position;
+        let distance = to.length();
+        let cos = to.dot(e.normal) / distance;
+        let cos = if e.double_sided { cos.abs() } else { cos };
+        let chance = self.by_power.probability(index as usize);
+        let pdf = chance / e.area * distance * distance / cos;
+        if cos > 0.0 && pdf.is_finite() { pdf } else { 0.0 }
+    }
+}
+
+/// Whether a material makes its triangles emitters, and if so whether on both faces.
+pub(crate) fn shines(material: &Material, model: MaterialModel) -> Option<bool> {
+    let dark = material.unlit || material.emissive.max_element() <= 0.0;
+    (!dark).then_some(material.double_sided && model == MaterialModel::Full)
+}

@@ -1,0 +1,70 @@
+//! Sources of light, and where on them to look for it (next-event estimation).
+//!
+//! Every vertex of a path asks two sources: one punctual light ([`punctual`]), and one point of an
+//! emissive triangle ([`emitters`]) or of an environment picture ([`environment`]). The latter two
+//! are also met by rays that the BSDF chose, and weighed against that by the power heuristic.
+//! Constant and gradient environments are left to those rays, which suit them as well.
+
+pub(crate) mod emitters;
+pub(crate) mod environment;
+pub(crate) mod punctual;
+#[cfg(test)]
+mod tests;
+
+use glam::{Vec2, Vec3};
+
+use emitters::Emitters;
+use environment::Sky;
+use punctual::Punctual;
+
+/// All sources of a snapshot.
+#[derive(Debug)]
+pub(crate) struct Lights {
+    pub(crate) punctual: Punctual,
+    pub(crate) emitters: Emitters,
+    pub(crate) sky: Sky,
+}
+
+/// A direction in which a source may be seen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum AreaSample {
+    /// A point of an emissive triangle.
+    Emitter(emitters::EmitterSample),
+    /// A direction of the environment; radiance and density per steradian.
+    Sky { direction: Vec3, radiance: Vec3, pdf: f32 },
+}
+
+impl Lights {
+    /// Chance that an area sample is of the environment.
+    fn sky_chance(&self) -> f32 {
+        match (self.sky.is_sampled(), self.emitters.is_empty()) {
+            (true, true) => 1.0,
+            (true, false) => 0.5,
+            (false, _) => 0.0,
+        }
+    }
+
+    /// A point of an emissive triangle or a direction of the environment; densities include the
+    /// choice between them.
+    pub(crate) fn sample_area(&self, from: Vec3, choice: f32, u: Vec2) -> Option<AreaSample> {
+        let sky = self.sky_chance();
+        if choice < sky {
+            let (direction, radiance, pdf) = self.sky.sample(u)?;
+            return Some(AreaSample::Sky { direction, radiance, pdf: pdf * sky });
+        }
+        let choice = (choice - sky) / (1.0 - sky);
+        let mut sample = self.emitters.sample(from, choice, u)?;
+        sample.pdf *= 1.0 - sky;
+        Some(AreaSample::Emitter(sample))
+    }
+
+    /// Density with which [`Lights::sample_area`] looks in a direction of the environment.
+    pub(crate) fn sky_pdf(&self, direction: Vec3) -> f32 {
+        self.sky.pdf(direction) * self.sky_chance()
+    }
+
+    /// Density with which it looks at a point of an emissive triangle, seen from `from`.
+    pub(crate) fn emitter_pdf(&self, emitter: u32, from: Vec3, position: Vec3) -> f32 {
+        self.emitters.pdf(emitter, from, position) * (1.0 - self.sky_chance())
+    }
+}

@@ -1,0 +1,134 @@
+//! One job: many paths a receiver, spread over all cores, summed in a fixed order.
+
+use std::f32::consts::PI;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use glam::{DVec3, Vec3};
+use lumencast_light::sh;
+use rayon::prelude::*;
+
+use super::integrator::Integrator;
+use crate::accel::Stack;
+use crate::sampling::{Sampler, lattice};
+use crate::world::World;
+use crate::{Job, Sums};
+
+/// Samples of one receiver that a thread takes at a time. Sums are grouped by it, so results do not
+/// depend on how many threads there are.
+const TILE: u32 = 64;
+
+/// How far a job is.
+#[derive(Debug, Default)]
+pub(super) struct Watch {
+    pub(super) samples_done: AtomicU64,
+    pub(super) cancelled: AtomicBool,
+}
+
+/// Sums over the samples `first..end` of a receiver.
+#[derive(Clone, Copy, Debug)]
+struct Tile {
+    receiver: u32,
+    first: u32,
+    end: u32,
+}
+
+/// What a tile found.
+#[derive(Clone, Debug)]
+struct TileSums {
+    sum: [Vec3; sh::MAX_COEFFICIENTS],
+    squares: [Vec3; sh::MAX_COEFFICIENTS],
+    distance: f32,
+    hits: u32,
+    backs: u32,
+    rays: u64,
+}
+
+/// Gathers; `None` when cancelled. Returns the sums and the number of rays.
+pub(super) fn gather(job: &Job, world: &World, watch: &Watch) -> Option<(Vec<Sums>, u64)> {
+    let tiles = tiles(job);
+    let found: Option<Vec<TileSums>> = tiles
+        .par_iter()
+        .map_init(Stack::default, |stack, tile| {
+            if watch.cancelled.load(Ordering::Relaxed) {
+                return None;
+            }
+            let sums = trace(job, world, tile, stack);
+            watch.samples_done.fetch_add(u64::from(tile.end - tile.first), Ordering::Relaxed);
+            Some(sums)
+        })
+        .collect();
+    let found = found?;
+    let rays = found.iter().map(|t| t.rays).sum();
+    let mut rest = tiles.iter().zip(&found).peekable();
+    let mut sums = Vec::with_capacity(job.receivers.len());
+    for receiver in 0..job.receivers.len() as u32 {
+        let mut of_receiver = Vec::new();
+        while let Some((tile, t)) = rest.next_if(|(tile, _)| tile.receiver == receiver) {
+            of_receiver.push((tile.end - tile.first, t));
+        }
+        sums.push(reduce(job.order.coefficients(), &of_receiver));
+    }
+    Some((sums, rays))
+}
+
+fn tiles(job: &Job) -> Vec<Tile> {
+    let mut tiles = Vec::new();
+    for (receiver, r) in (0..).zip(job.receivers.iter()) {
+        for first in (0..r.samples).step_by(TILE as usize) {
+            tiles.push(Tile { receiver, first, end: r.samples.min(first.saturating_add(TILE)) });
+        }
+    }
+    tiles
+}
+
+fn trace(job: &Job, world: &World, tile: &Tile, stack: &mut Stack) -> TileSums {
+    let receiver = &job.receivers[tile.receiver as usize];
+    let turn = lattice::turn(job.seed, tile.receiver);
+    let stack = std::mem::take(stack);
+    let mut integrator =
+        Integrator { world, bounces: job.bounces, clamp: job.clamp, stack, rays: 0 };
+    let mut t = TileSums {
+        sum: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
+        squares: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
+        distance: 0.0,
+        hits: 0,
+        backs: 0,
+        rays: 0,
+    };
+    for sample in tile.first..tile.end {
+        let direction = (turn * lattice::direction(sample, receiver.samples)).normalize();
+        let mut sampler = Sampler::new(job.seed, tile.receiver, sample);
+        let seen = integrator.radiance(receiver.position, direction, &mut sampler);
+        let basis = sh::basis(job.order, direction);
+        for (k, y) in basis.iter().enumerate().take(job.order.coefficients()) {
+            let term = 4.0 * PI * y * seen.radiance;
+            t.sum[k] += term;
+            t.squares[k] += term * term;
+        }
+        if seen.distance.is_finite() {
+            t.distance += seen.distance;
+            t.hits += 1;
+            t.backs += u32::from(seen.back);
+        }
+    }
+    t.rays = integrator.rays;
+    t
+}
+
+/// Adds a receiver's tiles up, in order.
+fn reduce(coefficients: usize, tiles: &[(u32, &TileSums)]) -> Sums {
+    let add = |of: &dyn Fn(&TileSums) -> Vec3| {
+        tiles.iter().map(|(_, t)| of(t).as_dvec3()).sum::<DVec3>().as_vec3()
+    };
+    let count: u32 = tiles.iter().map(|(n, _)| n).sum();
+    let total = |of: fn(&TileSums) -> u32| tiles.iter().map(|(_, t)| of(t)).sum::<u32>();
+    let hits = total(|t| t.hits);
+    let distance: f64 = tiles.iter().map(|(_, t)| f64::from(t.distance)).sum();
+    Sums {
+        sum: (0..coefficients).map(|k| add(&|t| t.sum[k])).collect(),
+        sum_of_squares: (0..coefficients).map(|k| add(&|t| t.squares[k])).collect(),
+        count,
+        back_face_fraction: total(|t| t.backs) as f32 / count.max(1) as f32,
+        mean_distance: if hits > 0 { (distance / f64::from(hits)) as f32 } else { f32::INFINITY },
+    }
+}

@@ -1,0 +1,135 @@
+//! Looking up textures. Level 0 only: a probe's samples average over the texture as well as a
+//! smaller level would.
+
+use std::sync::LazyLock;
+
+use glam::{IVec2, Vec2, Vec3, Vec4};
+use lumencast_scene::{Filter, Image, TextureRef, Vertices, Wrap};
+
+/// sRGB codes to linear, IEC 61966-2-1.
+static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
+    std::array::from_fn(|code| {
+        let c = code as f32 / 255.0;
+        if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+    })
+});
+
+/// How the RGB of a texture is coded; alpha is always linear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Coding {
+    /// Colours.
+    Srgb,
+    /// Everything else.
+    Linear,
+}
+
+/// The texture at mesh coordinates `uv` (before KHR_texture_transform).
+pub(crate) fn sample(texture: &TextureRef, uv: Vec2, coding: Coding) -> Vec4 {
+    let image = &*texture.image;
+    let size = Vec2::new(image.width as f32, image.height as f32);
+    let at = texture.texture_from_mesh.transform_point2(uv) * size;
+    if !at.is_finite() {
+        return Vec4::ONE;
+    }
+    let fetch = |p: IVec2| fetch(image, p, texture.wrap, coding);
+    match texture.filter {
+        Filter::Nearest => fetch(at.floor().as_ivec2()),
+        Filter::Linear => {
+            let at = at - 0.5;
+            let corner = at.floor();
+            let f = at - corner;
+            let p = corner.as_ivec2();
+            let top = fetch(p).lerp(fetch(p.wrapping_add(IVec2::X)), f.x);
+            let bottom =
+                fetch(p.wrapping_add(IVec2::Y)).lerp(fetch(p.wrapping_add(IVec2::ONE)), f.x);
+            top.lerp(bottom, f.y)
+        }
+    }
+}
+
+fn fetch(image: &Image, p: IVec2, wrap: [Wrap; 2], coding: Coding) -> Vec4 {
+    let x = wrapped(p.x, image.width, wrap[0]);
+    let y = wrapped(p.y, image.height, wrap[1]);
+    let Some(&[r, g, b, a]) = image.texels.get(y * image.width as usize + x) else {
+        return Vec4::ONE;
+    };
+    let rgb = match coding {
+        Coding::Srgb => {
+            let table = &*LINEAR_FROM_SRGB;
+            Vec3::new(table[r as usize], table[g as usize], table[b as usize])
+        }
+        Coding::Linear => Vec3::new(r.into(), g.into(), b.into()) / 255.0,
+    };
+    rgb.extend(f32::from(a) / 255.0)
+}
+
+fn wrapped(i: i32, size: u32, wrap: Wrap) -> usize {
+    let (i, n) = (i64::from(i), i64::from(size));
+    let j = match wrap {
+        Wrap::Repeat => i.rem_euclid(n),
+        Wrap::Clamp => i.clamp(0, n - 1),
+        Wrap::Mirror => {
+            let k = i.rem_euclid(2 * n);
+            if k < n { k } else { 2 * n - 1 - k }
+        }
+    };
+    j as usize
+}
+
+/// Texture coordinates at weights of a triangle's vertices.
+pub(crate) fn interpolate_uv(uv: &[Vec2], corners: [u32; 3], weights: Vec3) -> Vec2 {
+    if uv.is_empty() {
+        return Vec2::ZERO;
+    }
+    let [a, b, c] = corners.map(|i| uv[i as usize]);
+    weights.x * a + weights.y * b + weights.z * c
+}
+
+/// Normals at weights of a triangle's vertices, not normalised.
+pub(crate) fn interpolate_normal(vertices: &Vertices, corners: [u32; 3], weights: Vec3) -> Vec3 {
+    let [a, b, c] = corners.map(|i| vertices.normals[i as usize]);
+    weights.x * a + weights.y * b + weights.z * c
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::{Affine2, Vec2};
+
+    use super::*;
+
+    fn texture(wrap: Wrap, filter: Filter) -> TextureRef {
+        let texels =
+            vec![[0, 0, 0, 255], [255, 255, 255, 0], [188, 188, 188, 255], [0, 255, 0, 255]];
+        TextureRef {
+            image: Arc::new(Image { name: String::new(), width: 2, height: 2, texels }),
+            tex_coord: 0,
+            texture_from_mesh: Affine2::IDENTITY,
+            wrap: [wrap; 2],
+            filter,
+        }
+    }
+
+    #[test]
+    fn texel_centres_are_exact_and_between_them_is_linear() {
+        let t = texture(Wrap::Repeat, Filter::Linear);
+        assert_eq!(sample(&t, Vec2::new(0.75, 0.25), Coding::Srgb), Vec4::new(1.0, 1.0, 1.0, 0.0));
+        let middle = sample(&t, Vec2::new(0.5, 0.25), Coding::Srgb);
+        assert!((middle - Vec4::splat(0.5)).abs().max_element() < 1e-6, "{middle}");
+        // sRGB 188 is half of the light.
+        let half = sample(&t, Vec2::new(0.25, 0.75), Coding::Srgb);
+        assert!((half.x - 0.503).abs() < 1e-3, "{half}");
+    }
+
+    #[test]
+    fn wraps() {
+        let at =
+            |wrap, x| sample(&texture(wrap, Filter::Nearest), Vec2::new(x, 0.25), Coding::Linear).x;
+        assert_eq!([at(Wrap::Repeat, 1.25), at(Wrap::Repeat, -0.25)], [0.0, 1.0]);
+        assert_eq!([at(Wrap::Clamp, 7.0), at(Wrap::Clamp, -7.0)], [1.0, 0.0]);
+        assert_eq!([at(Wrap::Mirror, 1.25), at(Wrap::Mirror, 1.75)], [1.0, 0.0]);
+        assert_eq!(at(Wrap::Repeat, f32::NAN), 1.0);
+        assert!(at(Wrap::Repeat, 1e30).is_finite());
+    }
+}

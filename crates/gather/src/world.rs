@@ -1,0 +1,191 @@
+//! A snapshot made ready for tracing.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use lumencast_scene::{AlphaMode, Instance, Material, Snapshot};
+
+use crate::accel::{Accel, AccelCache, Hit, Kernel, Ray, Stack};
+use crate::lights::environment::{Sky, SkyCache};
+use crate::lights::punctual::Punctual;
+use crate::lights::{Lights, emitters};
+use crate::sampling::{mix2, unit};
+use crate::surface::{Frames, MaterialModel, Point, Triangle};
+
+/// What is kept from one snapshot to the next.
+#[derive(Debug, Default)]
+pub(crate) struct WorldCache {
+    accel: AccelCache,
+    sky: SkyCache,
+}
+
+/// A snapshot with its acceleration structure and tables of lights.
+#[derive(Debug)]
+pub(crate) struct World {
+    snapshot: Arc<Snapshot>,
+    accel: Accel,
+    pub(crate) lights: Lights,
+    pub(crate) model: MaterialModel,
+    frames: Vec<Frames>,
+    /// Index into `parts` of each instance's first primitive.
+    first_part: Vec<u32>,
+    parts: Vec<Part>,
+    fallback: Material,
+}
+
+/// A primitive of an instance.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    material: u32,
+    opaque: bool,
+    /// Number of its first triangle among the emitters.
+    emitters: Option<u32>,
+}
+
+/// A triangle that a ray starts at or is aimed at, which therefore does not count.
+pub(crate) type Itself = (u32, u32, u32);
+
+impl World {
+    pub(crate) fn new(
+        snapshot: Arc<Snapshot>,
+        model: MaterialModel,
+        kernel: Kernel,
+        cache: &mut WorldCache,
+    ) -> Self {
+        let accel = cache.accel.update(&snapshot, kernel);
+        let bounds = accel.bounds();
+        let radius = if bounds.is_empty() { 0.0 } else { 0.5 * (bounds.max - bounds.min).length() };
+        let lights = Lights {
+            punctual: Punctual::new(&snapshot.lights, radius),
+            emitters: emitters::Emitters::default(),
+            sky: Sky::new(&snapshot.environment, &mut cache.sky),
+        };
+        let frames = snapshot.instances.iter().map(|i| Frames::new(i.world_from_object)).collect();
+        let fallback = Material::default();
+        let mut world = Self {
+            snapshot,
+            accel,
+            lights,
+            model,
+            frames,
+            first_part: Vec::new(),
+            parts: Vec::new(),
+            fallback,
+        };
+        world.find_emitters();
+        world
+    }
+
+    fn find_emitters(&mut self) {
+        let mut emitters = emitters::Emitters::default();
+        for (index, instance) in (0..).zip(&self.snapshot.instances) {
+            self.first_part.push(self.parts.len() as u32);
+            for (p, primitive) in (0..).zip(&instance.mesh.primitives) {
+                let id = primitive.material.0;
+                let material = self.snapshot.materials.get(id as usize).unwrap_or(&self.fallback);
+                let frames = &self.frames[index as usize];
+                self.parts.push(Part {
+                    material: id,
+                    opaque: material.alpha_mode == AlphaMode::Opaque
+                        || self.model == MaterialModel::Lambert,
+                    emitters: emitters::shines(material, self.model)
+                        .map(|both| emitters.add((index, instance), frames, p, both)),
+                });
+            }
+        }
+        emitters.finish(&self.snapshot.instances, |i, p| self.material(i, p));
+        self.lights.emitters = emitters;
+    }
+
+    /// World bounds of the geometry.
+    pub(crate) fn version(&self) -> u64 {
+        self.snapshot.version
+    }
+
+    fn part(&self, instance: u32, primitive: u32) -> &Part {
+        &self.parts[(self.first_part[instance as usize] + primitive) as usize]
+    }
+
+    fn material(&self, instance: u32, primitive: u32) -> &Material {
+        let id = self.part(instance, primitive).material as usize;
+        self.snapshot.materials.get(id).unwrap_or(&self.fallback)
+    }
+
+    fn instance(&self, index: u32) -> &Instance {
+        &self.snapshot.instances[index as usize]
+    }
+
+    pub(crate) fn frames(&self, instance: u32) -> &Frames {
+        &self.frames[instance as usize]
+    }
+
+    /// The surface that a ray of unit direction meets first. `key` decides about surfaces that
+    /// cover only in part.
+    pub(crate) fn closest(
+        &self,
+        ray: &Ray,
+        from: Option<Itself>,
+        key: u64,
+        stack: &mut Stack,
+    ) -> Option<Hit> {
+        self.accel.closest(ray, stack, |hit| Some(itself(hit)) != from && self.covers(hit, key))
+    }
+
+    /// Whether something lies on the ray, its two ends not counted.
+    pub(crate) fn occluded(
+        &self,
+        ray: &Ray,
+        ends: [Option<Itself>; 2],
+        key: u64,
+        stack: &mut Stack,
+    ) -> bool {
+        self.accel
+            .occluded(ray, stack, |hit| !ends.contains(&Some(itself(hit))) && self.covers(hit, key))
+    }
+
+    /// Whether the surface is there at all, for this ray.
+    #[inline]
+    fn covers(&self, hit: &Hit, key: u64) -> bool {
+        let part = self.part(hit.instance, hit.primitive);
+        part.opaque || self.covers_in_part(hit, key)
+    }
+
+    #[cold]
+    fn covers_in_part(&self, hit: &Hit, key: u64) -> bool {
+        let triangle = Triangle::new(self.instance(hit.instance), hit.primitive, hit.triangle);
+        let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
+        let coverage = triangle.coverage(self.material(hit.instance, hit.primitive), weights);
+        let place = u64::from(hit.instance) << 40
+            ^ u64::from(hit.primitive) << 32
+            ^ u64::from(hit.triangle);
+        coverage >= 1.0 || unit(mix2(key, place) as u32) < coverage
+    }
+
+    /// The point of a hit.
+    pub(crate) fn point(&self, hit: Hit, direction: Vec3) -> Option<Point<'_>> {
+        let material = self.material(hit.instance, hit.primitive);
+        Point::new(hit, self.instance(hit.instance), self.frames(hit.instance), material, direction)
+    }
+
+    /// The number of a hit's triangle among the emitters.
+    pub(crate) fn emitter(&self, hit: &Hit) -> Option<u32> {
+        Some(self.part(hit.instance, hit.primitive).emitters? + hit.triangle)
+    }
+
+    /// Radiance that a point of an emitter sends out, holes counted.
+    pub(crate) fn emitted(&self, sample: &emitters::EmitterSample) -> Vec3 {
+        let triangle =
+            Triangle::new(self.instance(sample.instance), sample.primitive, sample.triangle);
+        let material = self.material(sample.instance, sample.primitive);
+        let coverage = match self.model {
+            MaterialModel::Full => triangle.coverage(material, sample.weights),
+            MaterialModel::Lambert => 1.0,
+        };
+        coverage * triangle.emission(material, sample.weights)
+    }
+}
+
+/// Names a hit's triangle.
+pub(crate) fn itself(hit: &Hit) -> Itself {
+    (hit.instance, hit.primitive, hit.triangle)
+}
