@@ -18,12 +18,15 @@ export interface FieldLight {
   readonly scale: number;
   /** Grows whenever the coefficients changed: equal revisions need no new upload. */
   readonly revision: number;
-  /** Seconds since this light was computed, of its oldest region. */
-  readonly age: number;
+  /**
+   * Seconds since this light was computed, of its oldest region. This and the next two are `undefined`
+   * for what is left from the time before a restart of the server.
+   */
+  readonly age: number | undefined;
   /** Version of the scene that the light was computed from, of its oldest region. */
-  readonly sceneVersion: number;
+  readonly sceneVersion: number | undefined;
   /** Server tick in which it was computed, of its oldest region. */
-  readonly tick: number;
+  readonly tick: number | undefined;
   /** Regions that hold light, of all that the field has. */
   readonly regions: { readonly lit: number; readonly all: number };
 }
@@ -143,6 +146,8 @@ export interface Session {
   /** This client's name in edits. */
   readonly client: string;
   readonly status: Status;
+  /** Resolves once the server has said what it offers; rejects when the session is closed before. */
+  readonly ready: Promise<void>;
   /** What the server offers; `undefined` before it has said so. */
   readonly catalog: Catalog | undefined;
   readonly stats: SessionStats;
@@ -151,7 +156,8 @@ export interface Session {
   on<K extends keyof SessionEvents>(event: K, listener: (value: SessionEvents[K]) => void): () => void;
   /**
    * Sends an edit. Resolves once the server has accepted it; rejects with an {@link EditError} when
-   * it refuses, has restarted, or the session is closed before. Without a connection it waits for one.
+   * it refuses, gives no answer, has restarted, or the session is closed before. Without a connection
+   * the edit waits for one.
    */
   edit(edit: Edit): Promise<void>;
   /** Edits that the server has not dealt with yet, oldest first. */
@@ -175,8 +181,11 @@ export interface Session {
 export class EditError extends Error {
   override readonly name = 'EditError';
   constructor(
-    /** `refused` by the server, `restarted` server, `closed` session, or `full` list of pending edits. */
-    readonly kind: 'refused' | 'restarted' | 'closed' | 'full',
+    /**
+     * `refused` by the server, `unanswered` though it is connected, `restarted` server, `closed`
+     * session, or `full` list of pending edits.
+     */
+    readonly kind: 'refused' | 'unanswered' | 'restarted' | 'closed' | 'full',
     reason: string,
   ) {
     super(reason);

@@ -1,5 +1,17 @@
+/**
+ * Receives the indirect light of a Lumencast server and blends it in time.
+ *
+ * ```ts
+ * const session = connect('https://localhost:4443/sponza');
+ * session.on('edit', ({ edit }) => apply(edit));
+ * await session.edit({ edit: 'set_light', node: 7, intensity: 800 });
+ * const { fields, age } = session.light();
+ * ```
+ */
 export * from './api.js';
 export { type AtlasLayout, atlasLayout, halfBits, packAtlas } from './atlas.js';
+export { Cache, type CacheEvent } from './cache.js';
+export { capabilities, type Capabilities } from './capabilities.js';
 export {
   type Catalog,
   type Field,
@@ -9,5 +21,10 @@ export {
   valuesPerProbe,
   WIRE_VERSION,
 } from './codec/catalog.js';
+export { type LightFile, readLightFile } from './codec/file.js';
+export { ProbeDecoder, type RegionLight } from './codec/probes.js';
+export { parseState, type StateFrame } from './codec/state.js';
 export type * from './edit.js';
+export { connect, type ConnectOptions } from './session.js';
+export type { Connector, Link, ReadOptions, Target, TrackReader } from './transport.js';
 export { WireError, type WireErrorKind } from './wire-error.js';

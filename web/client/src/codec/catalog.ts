@@ -91,6 +91,8 @@ export function parseCatalog(bytes: Uint8Array): Catalog {
   if (new Set(fields.map((field) => field.id)).size !== fields.length) {
     throw new WireError('malformed', 'two fields have the same id');
   }
+  const probes = fields.reduce((sum, field) => sum + cellCount(field.grid.resolution), 0);
+  if (probes > LIMITS.probesPerCatalog) throw new WireError('limit', `a catalog of ${probes} probes`);
   return {
     epoch,
     scene: { name: text(scene.name, 'scene.name'), root: text(scene.root, 'scene.root') },

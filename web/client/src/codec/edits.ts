@@ -66,7 +66,11 @@ const environment: Read<Environment> = (value, what) => {
         ground: vector(json.ground, 'ground'),
       };
     case 'image':
-      return { type: 'image', uri: text(json.uri, 'uri'), ...some(json, { intensity: real, rotation: real }) };
+      return {
+        type: 'image',
+        uri: text(json.uri, 'uri'),
+        ...some(json, { intensity: real, rotation: real }),
+      };
     default:
       throw new WireError('malformed', `an environment of type ${JSON.stringify(json.type)}`);
   }
@@ -85,7 +89,11 @@ const EDITS: { readonly [name: string]: (json: Json) => Edit } = {
   }),
   remove_node: (json) => ({ edit: 'remove_node', node: node(json) }),
   add_light: (json) => ({ edit: 'add_light', light: light(json.light, 'light'), ...some(json, created) }),
-  set_light: (json) => ({ edit: 'set_light', node: node(json), ...some(json, { ...lightParts, ...coneParts }) }),
+  set_light: (json) => ({
+    edit: 'set_light',
+    node: node(json),
+    ...some(json, { ...lightParts, ...coneParts }),
+  }),
   remove_light: (json) => ({ edit: 'remove_light', node: node(json) }),
   set_material: (json) => ({
     edit: 'set_material',
@@ -105,7 +113,8 @@ const EDITS: { readonly [name: string]: (json: Json) => Edit } = {
 
 /** Reads an edit; `undefined` when it is none that this client knows, which is to be skipped. */
 export function parseEdit(value: unknown): Edit | undefined {
-  if (!isObject(value) || typeof value.edit !== 'string' || !Object.hasOwn(EDITS, value.edit)) return undefined;
+  if (!isObject(value) || typeof value.edit !== 'string' || !Object.hasOwn(EDITS, value.edit))
+    return undefined;
   try {
     return EDITS[value.edit](value);
   } catch (error) {

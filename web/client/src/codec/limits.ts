@@ -4,6 +4,7 @@ export const LIMITS = {
   fields: 256,
   regionsPerField: 4096,
   probesPerField: 262_144,
+  probesPerCatalog: 524_288,
   regionCells: 16,
   snapshotEdits: 65_536,
   deltaEdits: 4096,

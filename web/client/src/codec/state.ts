@@ -1,7 +1,7 @@
 import type { Edit } from '../edit.js';
 import { WireError } from '../wire-error.js';
 import { parseEdit } from './edits.js';
-import { isObject, type Json, list, number, object, parseObject, text, whole } from './json.js';
+import { isObject, list, number, object, parseObject, text, whole } from './json.js';
 import { LIMITS } from './limits.js';
 
 /** What every frame of the state track tells. */
@@ -20,22 +20,19 @@ export interface TickState {
   readonly samples: number;
 }
 
-/** A frame of the state track. */
-export type StateFrame = TickState & (SnapshotPart | DeltaPart);
+/** A frame of the state track: what happened in a tick, and, in a snapshot, what it all comes to. */
+export type StateFrame = TickState & {
+  /** What was accepted this tick, in the server's order. */
+  readonly accepted: readonly StateEdit[];
+  readonly refused: readonly Refusal[];
+} & ({ readonly kind: 'delta' } | Snapshot);
 
-export interface SnapshotPart {
+export interface Snapshot {
   readonly kind: 'snapshot';
   /** Edits that turn the scene as it stands in its file into the scene as it is now. */
   readonly edits: readonly Edit[];
   /** The last sequence number dealt with, by client. */
   readonly acks: ReadonlyMap<string, number>;
-}
-
-export interface DeltaPart {
-  readonly kind: 'delta';
-  /** What was accepted this tick, in the server's order. */
-  readonly edits: readonly StateEdit[];
-  readonly refused: readonly Refusal[];
 }
 
 /** An accepted edit; without client it is the server's own. */
@@ -63,40 +60,43 @@ export function parseState(bytes: Uint8Array): StateFrame {
     tickMs: number(json.tick_ms, 'tick_ms', 0),
     samples: number(json.samples, 'samples', 0),
   };
-  return { ...tick, ...(json.snapshot === undefined ? parseDelta(json) : parseSnapshot(json)) };
+  const happened = { ...tick, accepted: parseAccepted(json.edits), refused: parseRefused(json.refused) };
+  if (json.snapshot === undefined) return { ...happened, kind: 'delta' };
+  return { ...happened, kind: 'snapshot', edits: parseSnapshot(json.snapshot), acks: parseAcks(json.acks) };
 }
 
-function parseSnapshot(json: Json): SnapshotPart {
-  const acks = object(json.acks ?? {}, 'acks');
-  return {
-    kind: 'snapshot',
-    edits: list(json.snapshot, 'snapshot', LIMITS.snapshotEdits)
-      .map(parseEdit)
-      .filter((edit) => edit !== undefined),
-    acks: new Map(Object.entries(acks).map(([client, seq]) => [client, whole(seq, 'acks')])),
-  };
+function parseSnapshot(json: unknown): Edit[] {
+  return list(json, 'snapshot', LIMITS.snapshotEdits)
+    .map(parseEdit)
+    .filter((edit) => edit !== undefined);
 }
 
-function parseDelta(json: Json): DeltaPart {
-  return {
-    kind: 'delta',
-    edits: list(json.edits ?? [], 'edits', LIMITS.deltaEdits).map((value) => {
-      const entry = object(value, 'an entry of edits');
-      return {
-        client: absent(entry.client) ? undefined : text(entry.client, 'client'),
-        seq: absent(entry.seq) ? undefined : whole(entry.seq, 'seq'),
-        edit: parseEdit(entry.edit),
-      };
-    }),
-    refused: list(json.refused ?? [], 'refused', LIMITS.deltaEdits).map((value) => {
-      const entry = object(value, 'an entry of refused');
-      return {
-        client: text(entry.client, 'client'),
-        seq: whole(entry.seq, 'seq'),
-        reason: text(entry.reason, 'reason'),
-      };
-    }),
-  };
+function parseAcks(json: unknown): Map<string, number> {
+  return new Map(
+    Object.entries(object(json ?? {}, 'acks')).map(([client, seq]) => [client, whole(seq, 'acks')]),
+  );
+}
+
+function parseAccepted(json: unknown): StateEdit[] {
+  return list(json ?? [], 'edits', LIMITS.deltaEdits).map((value) => {
+    const entry = object(value, 'an entry of edits');
+    return {
+      client: absent(entry.client) ? undefined : text(entry.client, 'client'),
+      seq: absent(entry.seq) ? undefined : whole(entry.seq, 'seq'),
+      edit: parseEdit(entry.edit),
+    };
+  });
+}
+
+function parseRefused(json: unknown): Refusal[] {
+  return list(json ?? [], 'refused', LIMITS.deltaEdits).map((value) => {
+    const entry = object(value, 'an entry of refused');
+    return {
+      client: text(entry.client, 'client'),
+      seq: whole(entry.seq, 'seq'),
+      reason: text(entry.reason, 'reason'),
+    };
+  });
 }
 
 function absent(value: unknown): boolean {

@@ -1,0 +1,392 @@
+import {
+  EditError,
+  type LightState,
+  type Session,
+  type SessionEvents,
+  type SessionStats,
+  type Status,
+  type Timing,
+} from './api.js';
+import { Cache } from './cache.js';
+import type { Catalog } from './codec/catalog.js';
+import { checkEdit } from './codec/state.js';
+import type { Edit, Vec3 } from './edit.js';
+import { Emitter } from './session/emitter.js';
+import { Meter } from './session/meter.js';
+import { Outbox } from './session/outbox.js';
+import { CATALOG_PRIORITY, type TrackPlan } from './session/plan.js';
+import { Reading, type Sink } from './session/reading.js';
+import type { Connector, Link, Target } from './transport.js';
+import { moqConnector } from './transport/moq.js';
+import { WireError } from './wire-error.js';
+
+/** How to connect; all of it may be left out. */
+export interface ConnectOptions {
+  /** Name of the scene; the path of the address unless given. */
+  scene?: string;
+  /** A token that allows edits; the address's `jwt` parameter unless given. */
+  token?: string;
+  /** Which transport to use; WebTransport, and a WebSocket where that fails, unless given. */
+  transport?: 'auto' | 'webtransport' | 'websocket';
+  /**
+   * SHA-256 of the server's certificate in hexadecimal, where no authority vouches for it. Asked from
+   * the server itself on this machine's own addresses.
+   */
+  certificateHash?: string;
+  /** A saved light field (the bytes of a `.light` file) to show until the server's light comes. */
+  saved?: Uint8Array;
+  /** Makes connections; tests bring their own. */
+  connector?: Connector;
+}
+
+/** Milliseconds between two looks at link, camera and pending edits. */
+const BEAT = 250;
+/** Milliseconds that an attempt to connect may take. */
+const ATTEMPT = 10_000;
+/** Seconds before the next attempt, at first and at most. */
+const BACKOFF = { first: 0.25, most: 2 } as const;
+/** Seconds of silence, and ticks, after which a connection counts as dead. */
+const SILENCE = { seconds: 3, ticks: 10 } as const;
+/** Seconds for which the catalog is waited for. */
+const CATALOG_WAIT = 5;
+/** Seconds by which animations are played late unless said otherwise. */
+const ANIMATION_DELAY = 0.1;
+
+/**
+ * Connects to a scene's light, `https://host:port/scene`. Returns at once; the session connects, and
+ * connects again after a loss, by itself.
+ * @throws TypeError when the address is none, or names no scene.
+ */
+export function connect(url: string | URL, options: ConnectOptions = {}): Session {
+  return new LiveSession(target(new URL(url), options), options);
+}
+
+function target(url: URL, options: ConnectOptions): Target {
+  if (url.protocol !== 'https:' && url.protocol !== 'http:') {
+    throw new TypeError(`${url.href} does not begin with https:// or http://`);
+  }
+  const scene = options.scene ?? decodeURIComponent(url.pathname.replace(/^\/+|\/+$/g, ''));
+  if (scene === '') throw new TypeError(`${url.href} names no scene; it should end in /scene`);
+  return {
+    url,
+    scene,
+    client: randomName(),
+    token: options.token ?? url.searchParams.get('jwt') ?? undefined,
+    transport: options.transport ?? 'auto',
+    certificateHash: options.certificateHash,
+  };
+}
+
+/** 128 random bits in hexadecimal. */
+function randomName(): string {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, '0')).join('');
+}
+
+/** Seconds of the clock that all times of a session are told by. */
+function seconds(): number {
+  return performance.now() / 1000;
+}
+
+class LiveSession implements Session, Sink {
+  readonly origin: string;
+  readonly scene: string;
+  readonly client: string;
+  readonly ready: Promise<void>;
+  private settleReady: { resolve: () => void; reject: (error: Error) => void } | undefined;
+  private readonly cache: Cache;
+  private readonly outbox: Outbox;
+  private readonly meter = new Meter();
+  private readonly emitter = new Emitter<SessionEvents>();
+  private readonly ending = new AbortController();
+  private readonly connector: Connector;
+  private current: Status = { state: 'connecting', attempt: 1 };
+  private link: Link | undefined;
+  /** What is read over the link, once it has given a catalog. */
+  private reading: Reading | undefined;
+  private catalogBytes: Uint8Array = new Uint8Array();
+  private camera: Vec3 | undefined;
+  /** When the link was made, or last gave a frame. */
+  private heard = 0;
+
+  constructor(
+    private readonly target: Target,
+    options: ConnectOptions,
+  ) {
+    this.origin = target.url.origin;
+    this.scene = target.scene;
+    this.client = target.client;
+    this.connector = options.connector ?? moqConnector;
+    this.cache = new Cache(target.client);
+    this.outbox = new Outbox(this.cache);
+    this.ready = new Promise((resolve, reject) => (this.settleReady = { resolve, reject }));
+    // Who does not wait for it need not hear that it failed.
+    this.ready.catch(() => {});
+    if (options.saved) this.cache.load(options.saved, seconds());
+    void this.run();
+  }
+
+  // The connection's life
+
+  private async run(): Promise<void> {
+    let backoff: number = BACKOFF.first;
+    for (let attempt = 1; !this.ending.signal.aborted; attempt++) {
+      this.setStatus({ state: 'connecting', attempt });
+      const reason = await this.attempt();
+      if (this.ending.signal.aborted) return;
+      if (this.current.state === 'connected') {
+        attempt = 0;
+        backoff = BACKOFF.first;
+      }
+      this.setStatus({ state: 'lost', reason, retryIn: backoff });
+      await pause(backoff, this.ending.signal);
+      backoff = Math.min(2 * backoff, BACKOFF.most);
+    }
+  }
+
+  /** Connects once and stays until the connection ends; returns why it did. */
+  private async attempt(): Promise<string> {
+    let link: Link;
+    try {
+      const limit = AbortSignal.any([this.ending.signal, AbortSignal.timeout(ATTEMPT)]);
+      link = await this.connector(this.target, limit);
+    } catch (error) {
+      return `no connection to ${this.origin}: ${describe(error)}`;
+    }
+    if (this.ending.signal.aborted) {
+      link.close();
+      return 'closed';
+    }
+    let die = (_reason: string): void => {};
+    const dead = new Promise<string>((resolve) => (die = resolve));
+    this.link = link;
+    this.heard = seconds();
+    const catalog = link.subscribe('catalog', { priority: CATALOG_PRIORITY, maxAge: 0 }, (frame) =>
+      this.catalogFrame(frame, link),
+    );
+    const beat = setInterval(() => this.beat(die), BEAT);
+    const aborted = () => die('closed');
+    this.ending.signal.addEventListener('abort', aborted, { once: true });
+    const reason = await Promise.race([link.ended, dead]);
+    this.ending.signal.removeEventListener('abort', aborted);
+    clearInterval(beat);
+    catalog.close();
+    this.reading?.close();
+    this.reading = undefined;
+    this.outbox.disconnected();
+    this.link = undefined;
+    link.close();
+    return reason;
+  }
+
+  private beat(die: (reason: string) => void): void {
+    const now = seconds();
+    const silent = now - this.heard;
+    if (!this.reading) {
+      if (silent > CATALOG_WAIT) die(`${this.origin} has no scene named ${this.scene}`);
+      return;
+    }
+    const tick = this.cache.catalog?.tickSeconds ?? 0;
+    const limit = Math.max(SILENCE.seconds, SILENCE.ticks * tick);
+    if (silent > limit) return die(`nothing has come for ${limit} s`);
+    this.reading.adapt(now);
+    this.outbox.check(now);
+  }
+
+  private setStatus(status: Status): void {
+    this.current = status;
+    this.emitter.emit('status', status);
+  }
+
+  // What arrives
+
+  private catalogFrame(frame: Uint8Array, link: Link): void {
+    const now = this.hear('catalog', frame);
+    // A subscription that had to be made again repeats what is known.
+    if (this.reading && equal(frame, this.catalogBytes)) return;
+    try {
+      this.cache.addCatalog(frame);
+    } catch (error) {
+      if (error instanceof WireError && error.kind === 'version') return this.end(error.message);
+      return this.drop(error);
+    }
+    this.catalogBytes = frame;
+    this.dispatch();
+    if (!this.cache.catalog) return;
+    // Tracks of a former epoch or set of fields are read no more.
+    this.reading?.close();
+    this.meter.restart();
+    this.reading = new Reading(link, this.cache.catalog, this);
+    this.reading.setCamera(this.camera);
+    this.reading.adapt(now);
+    this.outbox.connected((bytes) => link.sendEdit(bytes), now);
+    if (this.current.state !== 'connected') this.setStatus({ state: 'connected', transport: link.kind });
+    this.settleReady?.resolve();
+  }
+
+  state(frame: Uint8Array): void {
+    const now = this.hear('state', frame);
+    try {
+      this.cache.addState(frame, now);
+    } catch (error) {
+      return this.drop(error);
+    }
+    this.meter.ticks.add(1, now);
+    this.dispatch();
+  }
+
+  probes({ name, field, region, layer }: TrackPlan, frame: Uint8Array): void {
+    const now = this.hear(name, frame);
+    let added: ReturnType<Cache['addProbes']>;
+    try {
+      added = this.cache.addProbes(field, region, frame, now);
+    } catch (error) {
+      return this.drop(error);
+    }
+    if (!added) return;
+    const { update, tick } = added.header;
+    const arrived = performance.timeOrigin + 1000 * now;
+    const decoded = performance.timeOrigin + performance.now();
+    const bytes = frame.length;
+    this.meter.update(update, { field, region, layer, tick, arrived, decoded, bytes }, now);
+    const delay = this.cache.delayOf(tick, now);
+    if (delay !== undefined) this.reading?.layers.arrived(update, delay, bytes, now);
+    if (added.news) this.emitter.emit('light', { field, region, tick });
+  }
+
+  /** Notes that a frame came; returns when. */
+  private hear(track: string, frame: Uint8Array): number {
+    const now = seconds();
+    this.heard = now;
+    this.meter.frame(track, frame.length, now);
+    return now;
+  }
+
+  private drop(error: unknown): void {
+    if (!(error instanceof WireError)) throw error;
+    this.meter.dropped++;
+  }
+
+  /** Passes on what the cache has learnt. */
+  private dispatch(): void {
+    for (const event of this.cache.events()) {
+      switch (event.kind) {
+        case 'catalog':
+          this.emitter.emit('catalog', event.catalog);
+          break;
+        case 'snapshot':
+          this.emitter.emit('snapshot', event.edits);
+          break;
+        case 'edit':
+          this.emitter.emit('edit', event.accepted);
+          break;
+        case 'refused':
+          this.emitter.emit('refused', event.refused);
+          this.outbox.settled(event);
+          break;
+        default:
+          this.outbox.settled(event);
+      }
+    }
+  }
+
+  // What a program asks
+
+  get status(): Status {
+    return this.current;
+  }
+
+  get catalog(): Catalog | undefined {
+    return this.cache.catalog;
+  }
+
+  get pending(): readonly Edit[] {
+    return this.cache.pending.map(({ edit }) => edit);
+  }
+
+  get stats(): SessionStats {
+    const now = seconds();
+    const state = this.cache.state;
+    return {
+      tickRate: state && this.meter.ticks.at(now),
+      updateRate: this.meter.updates.at(now),
+      age: this.cache.age(now),
+      bandwidth: this.meter.bytes.at(now),
+      bandwidthByTrack: this.meter.bandwidthByTrack(now),
+      tickMs: state?.tickMs,
+      samples: state?.samples,
+      delay: this.reading?.layers.delay,
+      layers: this.reading?.layers.layers ?? 0,
+      pending: this.cache.pending.length,
+      dropped: this.meter.dropped,
+    };
+  }
+
+  on<K extends keyof SessionEvents>(event: K, listener: (value: SessionEvents[K]) => void): () => void {
+    return this.emitter.on(event, listener);
+  }
+
+  async edit(edit: Edit): Promise<void> {
+    checkEdit(edit);
+    if (this.current.state === 'closed') throw new EditError('closed', this.current.reason);
+    return this.outbox.edit(edit, seconds());
+  }
+
+  light(now: number = performance.now()): LightState {
+    return this.cache.light(now / 1000);
+  }
+
+  sceneTime(now: number = performance.now(), delay: number = ANIMATION_DELAY): number | undefined {
+    const time = this.cache.sceneTime(now / 1000);
+    return time === undefined ? undefined : time - delay;
+  }
+
+  setCamera(position: Vec3): void {
+    if (this.camera?.every((c, axis) => c === position[axis])) return;
+    this.camera = [...position];
+    this.reading?.setCamera(this.camera);
+  }
+
+  timings(): readonly Timing[] {
+    return this.meter.timings((tick) => this.cache.clockOfTick(tick));
+  }
+
+  close(): void {
+    this.end('the session was closed');
+  }
+
+  /** Ends the session for good. */
+  private end(reason: string): void {
+    if (this.ending.signal.aborted) return;
+    this.ending.abort();
+    this.link?.close();
+    this.outbox.close(reason);
+    this.settleReady?.reject(new Error(reason));
+    this.setStatus({ state: 'closed', reason });
+  }
+}
+
+function equal(a: Uint8Array, b: Uint8Array): boolean {
+  return a.length === b.length && a.every((byte, i) => byte === b[i]);
+}
+
+function describe(error: unknown): string {
+  if (error instanceof AggregateError) return error.errors.map(describe).join('; ');
+  const message = error instanceof Error ? error.message : String(error);
+  return message || 'no reason given';
+}
+
+/** Waits for some seconds, or less when `signal` is aborted. */
+function pause(time: number, signal: AbortSignal): Promise<void> {
+  return new Promise((resolve) => {
+    const timer = setTimeout(resolve, 1000 * time);
+    signal.addEventListener(
+      'abort',
+      () => {
+        clearTimeout(timer);
+        resolve();
+      },
+      { once: true },
+    );
+  });
+}

@@ -1,0 +1,48 @@
+import type { Timing } from '../api.js';
+import { Rate } from './rates.js';
+
+/** Arrivals that are remembered. */
+const TIMINGS = 1000;
+
+/** Counts what arrives, for stats and measurements. Times in seconds unless said otherwise. */
+export class Meter {
+  readonly ticks = new Rate();
+  readonly updates = new Rate();
+  readonly bytes = new Rate();
+  private readonly byTrack = new Map<string, Rate>();
+  private readonly arrivals: Omit<Timing, 'clock'>[] = [];
+  private newestUpdate = -1;
+  dropped = 0;
+
+  /** Any frame of any track. */
+  frame(track: string, bytes: number, now: number): void {
+    this.bytes.add(bytes, now);
+    let rate = this.byTrack.get(track);
+    if (!rate) this.byTrack.set(track, (rate = new Rate()));
+    rate.add(bytes, now);
+  }
+
+  /** A probe frame that was of use. */
+  update(update: number, timing: Omit<Timing, 'clock'>, now: number): void {
+    if (update > this.newestUpdate) {
+      this.newestUpdate = update;
+      this.updates.add(1, now);
+    }
+    this.arrivals.push(timing);
+    if (this.arrivals.length > TIMINGS) this.arrivals.shift();
+  }
+
+  /** Updates are numbered anew. */
+  restart(): void {
+    this.newestUpdate = -1;
+  }
+
+  bandwidthByTrack(now: number): Map<string, number> {
+    return new Map([...this.byTrack].map(([track, rate]) => [track, rate.at(now)]));
+  }
+
+  /** The last arrivals, with the server's clock at the end of their ticks. */
+  timings(clockOfTick: (tick: number) => number | undefined): Timing[] {
+    return this.arrivals.map((arrival) => ({ ...arrival, clock: clockOfTick(arrival.tick) }));
+  }
+}

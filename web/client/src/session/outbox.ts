@@ -1,0 +1,100 @@
+import { EditError } from '../api.js';
+import type { Cache, CacheEvent } from '../cache.js';
+import type { Edit } from '../edit.js';
+
+/** Seconds without an answer after which pending edits are sent again. */
+const RESEND = 3;
+/** Seconds without an answer after which an edit is given up. */
+const GIVE_UP = 10;
+
+interface Waiting {
+  readonly resolve: () => void;
+  readonly reject: (error: Error) => void;
+  /** When it was first sent on a connection; `undefined` before. */
+  sent: number | undefined;
+}
+
+/** The promises of edits, and their sending: in order, again after a loss, until answered. */
+export class Outbox {
+  private readonly waiting = new Map<number, Waiting>();
+  private send: ((frame: Uint8Array) => void) | undefined;
+  private lastSent = -Infinity;
+
+  constructor(private readonly cache: Cache) {}
+
+  edit(edit: Edit, now: number): Promise<void> {
+    return new Promise((resolve, reject) => {
+      const { seq, bytes } = this.cache.edit(edit);
+      const waiting: Waiting = { resolve, reject, sent: undefined };
+      this.waiting.set(seq, waiting);
+      if (!this.send) return;
+      waiting.sent = now;
+      this.lastSent = now;
+      this.send(bytes);
+    });
+  }
+
+  /** A connection is there: sends all that waits. The server passes over what it has had. */
+  connected(send: (frame: Uint8Array) => void, now: number): void {
+    this.send = send;
+    this.sendAll(now);
+  }
+
+  /** The connection is gone: what waits goes on waiting. */
+  disconnected(): void {
+    this.send = undefined;
+    for (const waiting of this.waiting.values()) waiting.sent = undefined;
+  }
+
+  /** To be called now and then while the server's ticks arrive. */
+  check(now: number): void {
+    if (!this.send || this.waiting.size === 0) return;
+    for (const [seq, { sent }] of this.waiting) {
+      if (sent === undefined || now - sent < GIVE_UP) continue;
+      this.cache.abandon(seq);
+      const reason = `the server gave no answer for ${GIVE_UP} s; it may need a token for edits`;
+      this.settle(seq, (waiting) => waiting.reject(new EditError('unanswered', reason)));
+    }
+    if (now - this.lastSent >= RESEND) this.sendAll(now);
+  }
+
+  private sendAll(now: number): void {
+    this.lastSent = now;
+    for (const { seq, bytes } of this.cache.pending) {
+      const waiting = this.waiting.get(seq);
+      if (waiting) waiting.sent ??= now;
+      this.send?.(bytes);
+    }
+  }
+
+  /** Takes in what the cache has learnt of an edit. */
+  settled(event: CacheEvent): void {
+    switch (event.kind) {
+      case 'acknowledged':
+        return this.settle(event.seq, (waiting) => waiting.resolve());
+      case 'refused':
+        return this.settle(event.refused.seq, (waiting) =>
+          waiting.reject(new EditError('refused', event.refused.reason)),
+        );
+      case 'lost':
+        return this.settle(event.seq, (waiting) =>
+          waiting.reject(new EditError('restarted', 'the server has restarted since')),
+        );
+    }
+  }
+
+  /** The session is over. */
+  close(reason: string): void {
+    this.send = undefined;
+    for (const seq of [...this.waiting.keys()]) {
+      this.settle(seq, (waiting) => waiting.reject(new EditError('closed', reason)));
+    }
+  }
+
+  private settle(seq: number, how: (waiting: Waiting) => void): void {
+    const waiting = this.waiting.get(seq);
+    if (!waiting) return;
+    this.waiting.delete(seq);
+    how(waiting);
+  }
+}

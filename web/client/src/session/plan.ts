@@ -1,0 +1,77 @@
+import type { Catalog, Grid, Region } from '../codec/catalog.js';
+import type { Vec3, Vec4 } from '../edit.js';
+
+/** Priorities of the tracks that are always read. */
+export const CATALOG_PRIORITY = 255;
+export const STATE_PRIORITY = 254;
+/** Regions of different priority in each layer; those farther away share the last. */
+const RANKS = 80;
+/**
+ * Tracks read at once. Each takes a stream, and a peer allows about 100: past this, far regions lose
+ * their upper layers, then all.
+ */
+const MOST_TRACKS = 80;
+
+/** A track to read. */
+export interface TrackPlan {
+  readonly name: string;
+  readonly field: number;
+  readonly region: number;
+  readonly layer: number;
+  readonly priority: number;
+}
+
+/**
+ * The tracks to read, most important first: layer 0 of all regions before layer 1 of any, since light
+ * that is seldom renewed beats light that is not; within a layer near regions before far ones.
+ */
+export function planTracks(catalog: Catalog, layers: number, camera: Vec3 | undefined): TrackPlan[] {
+  const regions = catalog.fields
+    .flatMap((field) =>
+      field.regions.map((region) => ({
+        field,
+        region,
+        distance: camera ? distanceToRegion(field.grid, region, camera) : 0,
+      })),
+    )
+    .sort((a, b) => a.distance - b.distance);
+  const plan: TrackPlan[] = [];
+  for (let layer = 0; layer < layers; layer++) {
+    regions.forEach(({ field, region }, rank) => {
+      if (layer >= field.layers) return;
+      plan.push({
+        name: `f${field.id}/r${region.id}/l${layer}`,
+        field: field.id,
+        region: region.id,
+        layer,
+        priority: STATE_PRIORITY - 4 - RANKS * layer - Math.min(rank, RANKS - 1),
+      });
+    });
+  }
+  return plan.slice(0, MOST_TRACKS);
+}
+
+/** Metres from a point in the world to a region's box. */
+export function distanceToRegion(grid: Grid, region: Region, point: Vec3): number {
+  const local = rotateBack(grid.rotation, [0, 1, 2].map((i) => point[i] - grid.center[i]) as Vec3);
+  let squared = 0;
+  for (let axis = 0; axis < 3; axis++) {
+    const cell = grid.size[axis] / grid.resolution[axis];
+    const min = region.min[axis] * cell - grid.size[axis] / 2;
+    const max = min + region.size[axis] * cell;
+    squared += Math.max(min - local[axis], 0, local[axis] - max) ** 2;
+  }
+  return Math.sqrt(squared);
+}
+
+/** A vector turned by the inverse of a unit quaternion: v + 2w(u×v) + 2u×(u×v) with u = −xyz. */
+function rotateBack([x, y, z, w]: Vec4, v: Vec3): Vec3 {
+  const u: Vec3 = [-x, -y, -z];
+  const t = cross(u, v).map((c) => 2 * c) as Vec3;
+  const s = cross(u, t);
+  return [v[0] + w * t[0] + s[0], v[1] + w * t[1] + s[1], v[2] + w * t[2] + s[2]];
+}
+
+function cross(a: Vec3, b: Vec3): Vec3 {
+  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+}

@@ -1,0 +1,73 @@
+import type { Catalog } from '../codec/catalog.js';
+import type { Vec3 } from '../edit.js';
+import type { Link, TrackReader } from '../transport.js';
+import { LayerControl } from './layers.js';
+import { planTracks, STATE_PRIORITY, type TrackPlan } from './plan.js';
+
+/** Milliseconds for which state frames are waited for: every one of them counts. */
+const STATE_AGE = 5000;
+
+/** Who takes what is read. */
+export interface Sink {
+  state(frame: Uint8Array): void;
+  probes(track: TrackPlan, frame: Uint8Array): void;
+}
+
+/** The tracks read of one server's epoch over one connection: which, and with what priority. */
+export class Reading {
+  readonly layers: LayerControl;
+  private readonly stateReader: TrackReader;
+  private readonly readers = new Map<string, TrackReader>();
+  private camera: Vec3 | undefined;
+  private stale = true;
+
+  constructor(
+    private readonly link: Link,
+    private readonly catalog: Catalog,
+    private readonly sink: Sink,
+  ) {
+    const most = Math.max(1, ...catalog.fields.map((field) => field.layers));
+    const regions = catalog.fields.reduce((sum, field) => sum + field.regions.length, 0);
+    this.layers = new LayerControl(most, catalog.tickSeconds, regions);
+    this.stateReader = link.subscribe('state', { priority: STATE_PRIORITY, maxAge: STATE_AGE }, (frame) =>
+      sink.state(frame),
+    );
+  }
+
+  setCamera(camera: Vec3 | undefined): void {
+    this.camera = camera;
+    this.stale = true;
+  }
+
+  /** Adapts to the link and the camera. To be called some times a second. */
+  adapt(now: number): void {
+    if (this.layers.judge(now, this.link.bandwidth())) this.stale = true;
+    if (!this.stale) return;
+    this.stale = false;
+    const plan = planTracks(this.catalog, this.layers.layers, this.camera);
+    const wanted = new Set(plan.map((track) => track.name));
+    for (const [name, reader] of this.readers) {
+      if (wanted.has(name)) continue;
+      reader.close();
+      this.readers.delete(name);
+    }
+    for (const track of plan) this.read(track);
+  }
+
+  private read(track: TrackPlan): void {
+    const { name, priority } = track;
+    const reader = this.readers.get(name);
+    if (reader) return reader.setPriority(priority);
+    const options = { priority, maxAge: 0 };
+    this.readers.set(
+      name,
+      this.link.subscribe(name, options, (frame) => this.sink.probes(track, frame)),
+    );
+  }
+
+  close(): void {
+    this.stateReader.close();
+    for (const reader of this.readers.values()) reader.close();
+    this.readers.clear();
+  }
+}

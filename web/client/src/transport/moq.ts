@@ -1,0 +1,167 @@
+import { Broadcast, Connection, Group, Path, Time, type Track } from '@moq/net';
+
+import { LIMITS } from '../codec/limits.js';
+import type { Connector, Link, ReadOptions, Target, TrackReader } from '../transport.js';
+import { offeredCertificateHash } from './certificate.js';
+
+/** Milliseconds before a track that could not be had is asked for again. */
+const RETRY = 250;
+/** Frames of a group of edits: a reader that falls behind by more loses some. */
+const GROUP_FRAMES = 512;
+
+/** Connects by Media over QUIC, over WebTransport or, where that fails, a WebSocket. */
+export const moqConnector: Connector = async (target, signal) => {
+  const connection = await Connection.connect(address(target), {
+    signal,
+    webtransport: await webTransportOptions(target, signal),
+    websocket: {
+      enabled: target.transport !== 'webtransport',
+      ...(target.transport === 'websocket' ? { delay: 0 } : {}),
+    },
+  });
+  return new MoqLink(connection, target);
+};
+
+/** The root is dialled, so that names mean the same through any relay. */
+function address(target: Target): URL {
+  const url = new URL('/', target.url);
+  if (target.token) url.searchParams.set('jwt', target.token);
+  // WebTransport refuses these schemes, which leaves the WebSocket.
+  if (target.transport === 'websocket') url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+  return url;
+}
+
+async function webTransportOptions(
+  target: Target,
+  signal: AbortSignal,
+): Promise<Connection.WebTransportProps> {
+  // With an http address the library asks for the hash itself.
+  const asked = target.url.protocol === 'https:' && target.transport !== 'websocket';
+  const hash =
+    target.certificateHash ?? (asked ? await offeredCertificateHash(target.url, signal) : undefined);
+  return hash ? { serverCertificateHashes: [{ value: hash }] } : {};
+}
+
+class MoqLink implements Link {
+  readonly kind: 'webtransport' | 'websocket';
+  readonly ended: Promise<string>;
+  private readonly scene: Broadcast.Consumer;
+  private readonly edits: EditTrack;
+
+  constructor(
+    private readonly connection: Connection.Established,
+    target: Target,
+  ) {
+    this.kind = connection.transport;
+    this.scene = connection.consume(Path.from(target.scene));
+    this.edits = new EditTrack();
+    connection.publish(Path.from(target.scene, 'edits', target.client), this.edits.broadcast);
+    this.ended = connection.closed.then(
+      () => 'the server closed the connection',
+      (error: unknown) => `the connection broke: ${(error as Error)?.message || 'no reason given'}`,
+    );
+  }
+
+  subscribe(track: string, options: ReadOptions, onFrame: (frame: Uint8Array) => void): TrackReader {
+    return new MoqReader(this.scene, track, options, onFrame);
+  }
+
+  sendEdit(frame: Uint8Array): void {
+    this.edits.send(frame);
+  }
+
+  bandwidth(): number | undefined {
+    return this.connection.probe.peek().estimatedRecvRate;
+  }
+
+  close(): void {
+    this.edits.broadcast.close();
+    this.connection.close();
+  }
+}
+
+/** Reads one track for as long as it is wanted, through stale groups and failed subscriptions. */
+class MoqReader implements TrackReader {
+  private subscriber: Track.Subscriber | undefined;
+  private closed = false;
+
+  constructor(
+    private readonly scene: Broadcast.Consumer,
+    private readonly track: string,
+    private options: ReadOptions,
+    private readonly onFrame: (frame: Uint8Array) => void,
+  ) {
+    void this.run();
+  }
+
+  private async run(): Promise<void> {
+    while (!this.closed && this.scene.closed.peek() === undefined) {
+      try {
+        this.subscriber = this.scene.subscribe(this.track, this.subscription());
+        await this.read(this.subscriber);
+      } catch {
+        // Not there (yet), or its origin died: ask again.
+      }
+      this.subscriber?.close();
+      if (!this.closed) await new Promise((resolve) => setTimeout(resolve, RETRY));
+    }
+  }
+
+  private async read(subscriber: Track.Subscriber): Promise<void> {
+    for (;;) {
+      const group = await subscriber.nextGroup();
+      if (!group) return;
+      await this.readGroup(group);
+    }
+  }
+
+  private async readGroup(group: Group.Consumer): Promise<void> {
+    for (;;) {
+      let frame: Group.Frame | undefined;
+      try {
+        frame = await group.readFrame();
+      } catch {
+        // The group went stale before it was all sent (52, `Old`): the next one has what is newer.
+        return;
+      }
+      if (!frame || this.closed) return;
+      if (frame.payload.length <= LIMITS.frameBytes) this.onFrame(frame.payload);
+    }
+  }
+
+  setPriority(priority: number): void {
+    if (priority === this.options.priority) return;
+    this.options = { ...this.options, priority };
+    this.subscriber?.update(this.subscription());
+  }
+
+  private subscription(): Track.Subscription {
+    return { priority: this.options.priority, latencyMax: this.options.maxAge };
+  }
+
+  close(): void {
+    this.closed = true;
+    this.subscriber?.close();
+  }
+}
+
+/** The broadcast by which a client sends its edits. */
+class EditTrack {
+  readonly broadcast = new Broadcast.Producer();
+  private readonly track = this.broadcast.createTrack('edits');
+  private group: Group.Producer | undefined;
+  private frames = 0;
+  /** Groups are numbered on from the clock, so that none of a former connection is newer. */
+  private sequence = Date.now();
+
+  send(frame: Uint8Array): void {
+    if (!this.group || this.frames === GROUP_FRAMES) {
+      this.group?.close();
+      this.group = new Group.Producer(this.sequence++);
+      this.frames = 0;
+      this.track.writeGroup(this.group);
+    }
+    this.group.writeFrame({ payload: frame, timestamp: Time.Timestamp.now() });
+    this.frames++;
+  }
+}
