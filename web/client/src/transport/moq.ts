@@ -45,7 +45,7 @@ async function webTransportOptions(
 class MoqLink implements Link {
   readonly kind: 'webtransport' | 'websocket';
   readonly ended: Promise<string>;
-  private readonly scene: Broadcast.Consumer;
+  private readonly scene: Path.Valid;
   private readonly edits: EditTrack;
 
   constructor(
@@ -53,7 +53,7 @@ class MoqLink implements Link {
     target: Target,
   ) {
     this.kind = connection.transport;
-    this.scene = connection.consume(Path.from(target.scene));
+    this.scene = Path.from(target.scene);
     this.edits = new EditTrack();
     connection.publish(Path.from(target.scene, 'edits', target.client), this.edits.broadcast);
     this.ended = connection.closed.then(
@@ -63,7 +63,7 @@ class MoqLink implements Link {
   }
 
   subscribe(track: string, options: ReadOptions, onFrame: (frame: Uint8Array) => void): TrackReader {
-    return new MoqReader(this.scene, track, options, onFrame);
+    return new MoqReader(() => this.connection.consume(this.scene), track, options, onFrame);
   }
 
   sendEdit(frame: Uint8Array): void {
@@ -86,7 +86,7 @@ class MoqReader implements TrackReader {
   private closed = false;
 
   constructor(
-    private readonly scene: Broadcast.Consumer,
+    private readonly consume: () => Broadcast.Consumer,
     private readonly track: string,
     private options: ReadOptions,
     private readonly onFrame: (frame: Uint8Array) => void,
@@ -95,14 +95,16 @@ class MoqReader implements TrackReader {
   }
 
   private async run(): Promise<void> {
-    while (!this.closed && this.scene.closed.peek() === undefined) {
+    while (!this.closed) {
+      const scene = this.consume();
       try {
-        this.subscriber = this.scene.subscribe(this.track, this.subscription());
+        this.subscriber = scene.subscribe(this.track, this.subscription());
         await this.read(this.subscriber);
       } catch {
         // Not there (yet), or its origin died: ask again.
       }
       this.subscriber?.close();
+      scene.close();
       if (!this.closed) await new Promise((resolve) => setTimeout(resolve, RETRY));
     }
   }
