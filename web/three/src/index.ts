@@ -1,1 +1,45 @@
-export { WIRE_VERSION } from '@lumencast/client';
+/**
+ * Lights a three.js scene, drawn by WebGLRenderer, with the indirect light of a Lumencast server. For
+ * WebGPURenderer import the same names from `@lumencast/three/webgpu`.
+ *
+ * ```ts
+ * const light = await connect('https://localhost:4443/sponza', { scene, renderer });
+ * light.follow(lamp); // this page moves it; the server and everyone else follow
+ * renderer.setAnimationLoop(() => { light.update(camera); renderer.render(scene, camera); });
+ * ```
+ */
+import type { WebGLRenderer } from 'three';
+import { type ConnectOptions, connectWith } from './connect.js';
+import { type AttachOptions, type LightSession, LumencastLight } from './light.js';
+import { webglPlatform } from './webgl.js';
+
+export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
+export type { ConnectOptions } from './connect.js';
+export { Content, loadGltf } from './content.js';
+export type { ProbeGrid } from './platform.js';
+export { createLight, isPunctualLight, lightSpec, type PunctualLight } from './lights.js';
+export type { ShadowOptions } from './shadows.js';
+
+/**
+ * Connects to the light of a scene. Without `gltf`, and when the scene shows nothing yet, the server's
+ * scene file is loaded and added to it.
+ * @param url the server's address with the scene's name as path
+ * @throws Error when the server cannot be reached at first; a connection lost later is taken up again
+ */
+export function connect(
+  url: string,
+  options: ConnectOptions & { renderer: WebGLRenderer },
+): Promise<LumencastLight> {
+  return connectWith(webglPlatform(options.renderer), url, options);
+}
+
+/**
+ * As {@link connect}, with a session that was made this moment: what it tells of the scene before is
+ * missed.
+ */
+export function attach(
+  session: LightSession,
+  options: AttachOptions & { renderer: WebGLRenderer },
+): LumencastLight {
+  return new LumencastLight(session, webglPlatform(options.renderer), options);
+}

@@ -1,3 +1,23 @@
-import { WIRE_VERSION } from '@lumencast/three';
+import { connect } from '@lumencast/client';
+import './style.css';
+import { openPage } from './page.js';
 
-document.title = `Lumencast, wire version ${WIRE_VERSION}`;
+/** What the server says of itself, under `/lumencast.json`. */
+interface Served {
+  /** Name of the scene's broadcast. */
+  readonly broadcast: string;
+  /** The scene's file under `/scene/`. */
+  readonly root: string;
+}
+
+void openPage(async () => {
+  const response = await fetch('/lumencast.json').catch(() => undefined);
+  if (!response?.ok) throw new Error(`The server does not answer${response ? ` (${response.status})` : ''}.`);
+  const { broadcast, root } = (await response.json()) as Served;
+  const address = new URL(`/${encodeURIComponent(broadcast)}${location.search}`, location.href);
+  return {
+    name: root,
+    file: new URL(`/scene/${root.split('/').map(encodeURIComponent).join('/')}`, location.href).href,
+    connect: () => connect(address, { scene: broadcast }),
+  };
+});

@@ -2,8 +2,6 @@
 
 mod integrator;
 mod job;
-#[cfg(test)]
-mod tests;
 
 use std::collections::HashMap;
 use std::num::NonZeroUsize;

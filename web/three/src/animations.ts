@@ -1,0 +1,88 @@
+import type { Playback } from '@lumencast/client';
+import { type AnimationAction, AnimationMixer } from 'three';
+import type { Animation, Content } from './content.js';
+
+/**
+ * How an animation stands: at `time` (seconds of its own) when the scene's time was `since`. All play
+ * in a loop from the scene's beginning, until edits say otherwise.
+ */
+interface Clock extends Required<Playback> {
+  since: number;
+}
+
+interface Playing {
+  readonly mixer: AnimationMixer;
+  readonly action: AnimationAction;
+  readonly duration: number;
+  clock: Clock;
+  /** Where the scene shows it. */
+  shown: number;
+}
+
+const FROM_START: Clock = { playing: true, time: 0, speed: 1, since: 0 };
+
+/** The animations of a scene, driven by the server's scene time. */
+export class Animations {
+  readonly #playing = new Map<number, Playing>();
+
+  constructor(private readonly content: Content) {}
+
+  /** As the file says, from scene time 0. */
+  restart(): void {
+    for (const playing of this.#playing.values()) playing.clock = { ...FROM_START };
+  }
+
+  playback(animation: number): Required<Playback> | undefined {
+    const clock = this.#get(animation)?.clock;
+    return clock && { playing: clock.playing, time: clock.time, speed: clock.speed };
+  }
+
+  /** Plays, pauses, seeks; `now` is the server's scene time at which this holds. */
+  set(animation: number, change: Playback, now: number): void {
+    const playing = this.#get(animation);
+    if (playing)
+      playing.clock = { ...playing.clock, time: timeAt(playing.clock, now), since: now, ...change };
+  }
+
+  /** Moves the scene to a time; true when something moved. */
+  update(now: number): boolean {
+    let moved = false;
+    for (const animation of this.content.animations.keys()) {
+      const playing = this.#get(animation);
+      if (!playing) continue;
+      const time = wrap(timeAt(playing.clock, now), playing.duration);
+      if (time === playing.shown) continue;
+      playing.shown = playing.action.time = time;
+      playing.mixer.update(0);
+      moved = true;
+    }
+    return moved;
+  }
+
+  #get(animation: number): Playing | undefined {
+    const known = this.#playing.get(animation);
+    const source = this.content.animations.get(animation);
+    if (known || !source) return known;
+    const playing = start(source);
+    this.#playing.set(animation, playing);
+    return playing;
+  }
+}
+
+/** An animation's own time, not wrapped, at a scene time. */
+export function timeAt({ playing, time, speed, since }: Clock, now: number): number {
+  return playing ? time + speed * (now - since) : time;
+}
+
+/** Into [0, duration), also for times before 0; 0 for an animation without length. */
+export function wrap(time: number, duration: number): number {
+  return duration > 0 ? time - Math.floor(time / duration) * duration : 0;
+}
+
+function start({ clip, root }: Animation): Playing {
+  // A mixer each: their order says which one wins where two move the same node, as on the server.
+  const mixer = new AnimationMixer(root);
+  const action = mixer.clipAction(clip);
+  action.play();
+  return { mixer, action, duration: clip.duration, clock: { ...FROM_START }, shown: Number.NaN };
+}

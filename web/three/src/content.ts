@@ -1,0 +1,118 @@
+import type { AnimationClip, Camera, Material, Mesh, Object3D } from 'three';
+import { type GLTF, GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+import { isPunctualLight, type PunctualLight } from './lights.js';
+
+/** An animation and the object whose descendants it moves. */
+export interface Animation {
+  readonly clip: AnimationClip;
+  readonly root: Object3D;
+}
+
+/**
+ * What a scene holds, by the numbers that edits know it by: indices of the glTF file; nodes, meshes,
+ * materials and animations of files that are added later follow on.
+ */
+export class Content {
+  readonly #object = new Map<number, Object3D>();
+  readonly #node = new WeakMap<Object3D, number>();
+  readonly #materials = new Map<number, Material[]>();
+  readonly #animations = new Map<number, Animation>();
+  readonly cameras: Camera[] = [];
+
+  /** Takes in a file whose first node, material and animation have these numbers. */
+  add(gltf: GLTF, first: { node: number; material: number; animation: number }): void {
+    for (const [thing, { nodes, materials }] of gltf.parser.associations) {
+      if (nodes !== undefined && 'isObject3D' in thing) this.setNode(first.node + nodes, thing);
+      if (materials !== undefined && 'isMaterial' in thing)
+        this.#addMaterial(first.material + materials, thing);
+    }
+    gltf.animations.forEach((clip, i) =>
+      this.#animations.set(first.animation + i, { clip, root: gltf.scene }),
+    );
+    this.cameras.push(...gltf.cameras);
+  }
+
+  /** GLTFLoader makes variants of a material, say for meshes with vertex colours. */
+  #addMaterial(number: number, material: Material): void {
+    const variants = this.#materials.get(number) ?? [];
+    if (!variants.includes(material)) this.#materials.set(number, [...variants, material]);
+  }
+
+  setNode(number: number, object: Object3D): void {
+    this.#object.set(number, object);
+    this.#node.set(object, number);
+  }
+
+  deleteNode(number: number): void {
+    const object = this.#object.get(number);
+    if (object) this.#node.delete(object);
+    this.#object.delete(number);
+  }
+
+  object(node: number): Object3D | undefined {
+    return this.#object.get(node);
+  }
+
+  /** The node that an object is, or the nearest one above it. */
+  nodeOf(object: Object3D): number | undefined {
+    for (let at: Object3D | null = object; at; at = at.parent) {
+      const node = this.#node.get(at);
+      if (node !== undefined) return node;
+    }
+    return undefined;
+  }
+
+  /** The numbers of an object's node and of all nodes below it. */
+  nodesBelow(object: Object3D): number[] {
+    const nodes: number[] = [];
+    object.traverse((below) => {
+      const node = this.#node.get(below);
+      if (node !== undefined) nodes.push(node);
+    });
+    return nodes;
+  }
+
+  /** The light of a node: the node's object itself, or a part of it that is no node of its own. */
+  light(node: number): PunctualLight | undefined {
+    const object = this.#object.get(node);
+    if (object === undefined || isPunctualLight(object)) return object;
+    return object.children.find(
+      (child): child is PunctualLight => isPunctualLight(child) && !this.#node.has(child),
+    );
+  }
+
+  materials(number: number): readonly Material[] {
+    return this.#materials.get(number) ?? [];
+  }
+
+  get animations(): ReadonlyMap<number, Animation> {
+    return this.#animations;
+  }
+}
+
+/** Loads a glTF file; `progress` gets bytes so far and, where known, of all. */
+export async function loadGltf(
+  url: string,
+  progress?: (loaded: number, total: number | undefined) => void,
+): Promise<GLTF> {
+  const gltf = await new GLTFLoader().loadAsync(url, (event) =>
+    progress?.(event.loaded, event.lengthComputable ? event.total : undefined),
+  );
+  // Matrices decompose into what edits set.
+  gltf.scene.traverse((object) => void (object.matrixAutoUpdate = true));
+  return gltf;
+}
+
+/** A copy of a glTF mesh without the nodes that hang below it. */
+export async function instantiateMesh(gltf: GLTF, mesh: number): Promise<Object3D> {
+  const original = (await gltf.parser.getDependency('mesh', mesh)) as Object3D;
+  const copy = original.clone(false);
+  copy.position.set(0, 0, 0);
+  copy.quaternion.identity();
+  copy.scale.set(1, 1, 1);
+  const isPart = (child: Object3D) =>
+    (child as Mesh).isMesh && gltf.parser.associations.get(child)?.nodes === undefined;
+  if (!(original as Mesh).isMesh)
+    copy.add(...original.children.filter(isPart).map((part) => part.clone(false)));
+  return copy;
+}

@@ -1,0 +1,163 @@
+import { type Field, halfBits, type LightState, packAtlas, type Vec3 } from '@lumencast/client';
+import {
+  ClampToEdgeWrapping,
+  Data3DTexture,
+  HalfFloatType,
+  LinearFilter,
+  RGBAFormat,
+  type Scene,
+} from 'three';
+import type { Platform, ProbeGrid } from './platform.js';
+import { L2_VALUES, Resampler, toL2 } from './resample.js';
+import { type GridPlan, planVolumes } from './volumes.js';
+
+/**
+ * The probe grids of a scene: made from the catalog's fields, filled from the session's light. Each
+ * owns one half-float 3D texture, whose data is replaced when the light has changed.
+ */
+export class ProbeGrids {
+  #filled: FilledGrid[] = [];
+  #black = atlasTexture([1, 1, 1], new Uint16Array(4 * 7 * 3));
+  #visible = true;
+
+  constructor(
+    private readonly scene: Scene,
+    private readonly platform: Platform,
+  ) {}
+
+  /** Replaces the grids by those for these fields; returns what could not be shown as meant. */
+  setFields(fields: readonly Field[], shadowLights: number): readonly string[] {
+    const { platform } = this;
+    const plan = planVolumes(fields, {
+      grids: platform.freeGrids(shadowLights),
+      textureSize: platform.max3DTextureSize,
+    });
+    this.#clear();
+    this.#filled = plan.grids.map((grid, priority) => new FilledGrid(grid, priority, platform));
+    for (const { grid } of this.#filled) this.scene.add(grid);
+    this.visible = this.#visible;
+    return plan.warnings;
+  }
+
+  /** The grids, coarse before fine. */
+  get grids(): readonly ProbeGrid[] {
+    return this.#filled.map(({ grid }) => grid);
+  }
+
+  /** Whether indirect light is shown. The grids stay in the scene, as removing them recompiles every shader. */
+  get visible(): boolean {
+    return this.#visible;
+  }
+
+  set visible(visible: boolean) {
+    this.#visible = visible;
+    for (const filled of this.#filled) filled.show(visible, this.#black);
+  }
+
+  /** Takes over light that has changed; true when some had. */
+  update(light: LightState): boolean {
+    return this.#filled.map((filled) => filled.update(light)).includes(true);
+  }
+
+  dispose(): void {
+    this.#clear();
+    this.#black.dispose();
+  }
+
+  #clear(): void {
+    for (const filled of this.#filled) {
+      this.scene.remove(filled.grid);
+      filled.dispose();
+    }
+    this.#filled = [];
+  }
+}
+
+class FilledGrid {
+  readonly grid: ProbeGrid;
+  readonly #texture: Data3DTexture;
+  readonly #atlas: Uint16Array<ArrayBuffer>;
+  readonly #resampler: Resampler | undefined;
+  readonly #coefficients: Float32Array;
+  #revisions = '';
+  #scale = 1;
+  #visible = true;
+
+  constructor(
+    private readonly plan: GridPlan,
+    priority: number,
+    private readonly platform: Platform,
+  ) {
+    const [nx, ny, nz] = plan.resolution;
+    this.#atlas = new Uint16Array(nx * ny * 7 * (nz + 2) * 4);
+    this.#texture = atlasTexture(plan.resolution, this.#atlas);
+    this.#coefficients = new Float32Array(nx * ny * nz * L2_VALUES);
+    this.#resampler = plan.exact ? undefined : new Resampler(plan);
+    this.grid = platform.createGrid(plan.size, plan.resolution);
+    this.grid.name = `lumencast ${plan.fields.map((field) => field.id).join('+')}`;
+    this.grid.position.fromArray(plan.center);
+    this.grid.priority = priority;
+    this.grid.texture = this.#texture;
+    this.grid.updateBoundingBox();
+  }
+
+  update(light: LightState): boolean {
+    const sources = this.plan.fields.map((field) => light.fields.find((lit) => lit.field.id === field.id));
+    const revisions = sources.map((source) => source?.revision).join();
+    if (revisions === this.#revisions) return false;
+    this.#revisions = revisions;
+    this.#scale = Math.max(...sources.map((source) => source?.scale ?? 0)) || 1;
+    packAtlas(this.#gather(sources), this.plan.resolution, 2, this.#scale, this.#atlas);
+    if (this.platform.scaleIn === 'atlas') fillFreeChannel(this.#atlas, halfBits(Math.log2(this.#scale)));
+    this.#texture.needsUpdate = true;
+    this.#setIntensity();
+    return true;
+  }
+
+  /** L2 coefficients of the grid's own probes. */
+  #gather(sources: readonly (LightState['fields'][number] | undefined)[]): Float32Array {
+    if (this.#resampler) {
+      this.#resampler.fill(
+        sources.map((source) => source?.coefficients),
+        this.#coefficients,
+      );
+      return this.#coefficients;
+    }
+    const source = sources[0];
+    return source
+      ? toL2(source.coefficients, source.field.order, this.#coefficients)
+      : this.#coefficients.fill(0);
+  }
+
+  show(visible: boolean, black: Data3DTexture): void {
+    this.#visible = visible;
+    // WebGPU's node keeps the texture it was built with, WebGL's shader knows no intensity.
+    if (this.platform.scaleIn === 'atlas') this.grid.texture = visible ? this.#texture : black;
+    this.#setIntensity();
+  }
+
+  #setIntensity(): void {
+    this.grid.intensity = this.#visible ? (this.platform.scaleIn === 'intensity' ? this.#scale : 1) : 0;
+  }
+
+  dispose(): void {
+    this.grid.dispose();
+    this.#texture.dispose();
+  }
+}
+
+/** Sets the fourth channel of the last sub-volume, its padding included. */
+function fillFreeChannel(atlas: Uint16Array, half: number): void {
+  for (let i = (atlas.length / 7) * 6 + 3; i < atlas.length; i += 4) atlas[i] = half;
+}
+
+function atlasTexture([nx, ny, nz]: Vec3, atlas: Uint16Array<ArrayBuffer>): Data3DTexture {
+  const texture = new Data3DTexture(atlas, nx, ny, 7 * (nz + 2));
+  texture.format = RGBAFormat;
+  texture.type = HalfFloatType;
+  texture.minFilter = texture.magFilter = LinearFilter;
+  texture.wrapS = texture.wrapT = texture.wrapR = ClampToEdgeWrapping;
+  texture.generateMipmaps = false;
+  texture.needsUpdate = true;
+  return texture;
+}

@@ -1,0 +1,286 @@
+import type { AcceptedEdit, Edit, Field, Session } from '@lumencast/client';
+import { type Camera, type Object3D, type Scene, Vector3 } from 'three';
+import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
+import type { Content } from './content.js';
+import { changedParts, FOLLOW_INTERVAL, type Pose, poseOf } from './follow.js';
+import { ProbeGrids } from './grids.js';
+import { describeLight, isPunctualLight } from './lights.js';
+import type { Platform, ProbeGrid } from './platform.js';
+import { Replica } from './replica.js';
+import { type ShadowOptions, Shadows } from './shadows.js';
+
+/** What a session must offer; {@link Session} does. */
+export type LightSession = Pick<
+  Session,
+  'origin' | 'catalog' | 'status' | 'stats' | 'on' | 'edit' | 'light' | 'sceneTime' | 'setCamera' | 'close'
+>;
+
+export interface AttachOptions {
+  /** Where the light is shown. */
+  scene: Scene;
+  /** The server's scene file as GLTFLoader gave it: through it objects are known by their node. */
+  gltf?: GLTF | undefined;
+  /** Shadows of direct light, or `false` where the program has its own. */
+  shadows?: ShadowOptions | false;
+  /** Gets what is shown otherwise than the server means it. `console.warn` unless given. */
+  onWarning?: (message: string) => void;
+}
+
+/** Which part of the light is drawn; emission and background are in all of them. */
+export type Shown = 'both' | 'direct' | 'indirect';
+
+/** Edits of one object that may be under way at once: more would only queue on a slow link. */
+const MAX_UNDER_WAY = 4;
+
+/** What a session tells of the scene. */
+export type SceneEvent = { readonly snapshot: readonly Edit[] } | { readonly accepted: AcceptedEdit };
+
+interface Followed {
+  readonly object: Object3D;
+  node: number | undefined;
+  release: (() => void) | undefined;
+  sent: Pose | undefined;
+  sentAt: number;
+  /** Edits that the server has not dealt with yet. */
+  readonly underWay: Set<Promise<void>>;
+}
+
+/** A scene lit by a server: streamed indirect light, and the server's edits applied. */
+export class LumencastLight {
+  readonly #replica: Replica;
+  readonly #grids: ProbeGrids;
+  readonly #shadows: Shadows | undefined;
+  readonly #followed = new Map<Object3D, Followed>();
+  readonly #unsubscribe: (() => void)[];
+  readonly #camera = new Vector3();
+  readonly #warn: (message: string) => void;
+  readonly #restoreHooks: () => void;
+  #show: Shown = 'both';
+  #fittedRevision = -1;
+  #fittedAt = 0;
+  #lightRevision = 0;
+
+  constructor(
+    readonly session: LightSession,
+    private readonly platform: Platform,
+    private readonly options: AttachOptions,
+    missed: readonly SceneEvent[] = [],
+  ) {
+    const { scene, gltf, shadows = {} } = options;
+    this.#warn = options.onWarning ?? ((message) => console.warn(`Lumencast: ${message}`));
+    this.#grids = new ProbeGrids(scene, platform);
+    this.#shadows = shadows === false ? undefined : new Shadows(shadows);
+    this.#replica = new Replica(scene, gltf, session, (file) => this.urlOf(file), {
+      added: (object) => this.#added(object),
+      removed: (object) => this.#shadows?.remove(object),
+      warning: this.#warn,
+    });
+    this.#added(scene);
+    this.#restoreHooks = this.#hookRendering(scene);
+    this.#unsubscribe = [
+      session.on('catalog', ({ fields }) => this.#setFields(fields)),
+      session.on('snapshot', (snapshot) => this.#receive({ snapshot })),
+      session.on('edit', (accepted) => this.#receive({ accepted })),
+    ];
+    for (const event of missed) this.#receive(event);
+    if (session.catalog) this.#setFields(session.catalog.fields);
+  }
+
+  /** To be called each frame, before rendering. `now` is `performance.now()`. */
+  update(camera: Camera, now: number = performance.now()): void {
+    this.session.setCamera(this.#camera.setFromMatrixPosition(camera.matrixWorld).toArray());
+    if (this.#grids.update(this.session.light(now))) this.#lightRevision++;
+    for (const followed of this.#followed.values()) this.#send(followed, now);
+    this.#replica.update(this.session.sceneTime(now));
+    this.platform.patch(this.options.scene);
+    this.#fitShadows(now);
+  }
+
+  /**
+   * This page moves the object, and changes it when it is a light; the server and every other page
+   * follow, up to 30 times a second. Until the returned function is called, others' edits of it do
+   * not show here. A light that is not in the server's scene is added to it.
+   * @throws Error when the server cannot know the object.
+   */
+  follow(object: Object3D): () => void {
+    if (this.#followed.has(object)) return () => this.#unfollow(object);
+    const node = this.#replica.content.nodeOf(object);
+    if (node === undefined && !isPunctualLight(object)) {
+      throw new Error(`${object.name || object.type} is not part of the server's scene, and not a light`);
+    }
+    const followed: Followed = {
+      object,
+      node,
+      release: undefined,
+      sent: undefined,
+      sentAt: 0,
+      underWay: new Set(),
+    };
+    if (node !== undefined) {
+      followed.release = this.#replica.hold(node);
+      followed.sent = poseOf(this.#replica.content.object(node) ?? object);
+    }
+    this.#followed.set(object, followed);
+    return () => this.#unfollow(object);
+  }
+
+  /** Shows an edit at once and sends it. Rejects, with the scene as before, when it is refused. */
+  edit(edit: Edit): Promise<void> {
+    return this.#replica.edit(edit);
+  }
+
+  /** Which part of the light is drawn. */
+  get show(): Shown {
+    return this.#show;
+  }
+
+  set show(show: Shown) {
+    this.#show = show;
+    this.#grids.visible = show !== 'direct';
+  }
+
+  /** Nodes, materials, animations and cameras by glTF number. */
+  get content(): Content {
+    return this.#replica.content;
+  }
+
+  get playback(): Replica['playback'] {
+    return (animation) => this.#replica.playback(animation);
+  }
+
+  /** The probe grids that the scene is lit by. */
+  get grids(): readonly ProbeGrid[] {
+    return this.#grids.grids;
+  }
+
+  /** Grows when objects, lights or materials have changed: shadow maps are to be drawn anew. */
+  get sceneRevision(): number {
+    return this.#replica.revision;
+  }
+
+  /** Grows when indirect light has changed. */
+  get lightRevision(): number {
+    return this.#lightRevision;
+  }
+
+  /** The address of a file of the scene. */
+  urlOf(file: string): string {
+    return new URL(`/scene/${file.split('/').map(encodeURIComponent).join('/')}`, this.session.origin).href;
+  }
+
+  /** Ends the session and gives the scene back without its indirect light. */
+  dispose(): void {
+    for (const object of [...this.#followed.keys()]) this.#unfollow(object);
+    for (const unsubscribe of this.#unsubscribe) unsubscribe();
+    this.#restoreHooks();
+    this.#grids.dispose();
+    this.platform.unpatch(this.options.scene);
+    this.session.close();
+  }
+
+  #added(object: Object3D): void {
+    this.#shadows?.add(object);
+    this.platform.patch(object);
+  }
+
+  #setFields(fields: readonly Field[]): void {
+    for (const warning of this.#grids.setFields(fields, this.#shadows?.lightCount ?? 0)) this.#warn(warning);
+  }
+
+  #receive(event: SceneEvent): void {
+    if ('snapshot' in event) this.#joined(event.snapshot);
+    else this.#replica.applyAccepted(event.accepted.edit, event.accepted.own);
+  }
+
+  /** The file's state and a snapshot on it; what this page follows stays as it is and is sent anew. */
+  #joined(edits: readonly Edit[]): void {
+    this.#replica.applySnapshot(edits);
+    for (const followed of this.#followed.values()) {
+      followed.sent = undefined;
+      if (followed.node !== undefined && this.content.object(followed.node) === undefined)
+        followed.node = undefined;
+    }
+  }
+
+  #fitShadows(now: number): void {
+    const revision = this.#replica.revision;
+    if (revision !== this.#fittedRevision && now - this.#fittedAt > 500) {
+      this.#fittedRevision = revision;
+      this.#fittedAt = now;
+      this.#shadows?.fit(this.options.gltf?.scene ?? this.options.scene);
+    }
+    this.#shadows?.update();
+  }
+
+  #send(followed: Followed, now: number): void {
+    if (now - followed.sentAt < FOLLOW_INTERVAL || followed.underWay.size >= MAX_UNDER_WAY) return;
+    this.#sendNow(followed, now);
+  }
+
+  #sendNow(followed: Followed, now: number): void {
+    if (followed.node === undefined) return this.#adopt(followed, now);
+    const { node, object, sent } = followed;
+    const pose = poseOf(this.content.light(node) === object ? object : (this.content.object(node) ?? object));
+    const transform = changedParts(sent?.transform, pose.transform);
+    const light = pose.light && changedParts(sent?.light, pose.light);
+    if (!transform && !light) return;
+    followed.sent = pose;
+    followed.sentAt = now;
+    this.#replica.revision++;
+    if (transform) this.#track(followed, this.session.edit({ edit: 'move_node', node, ...transform }));
+    if (light) this.#track(followed, this.session.edit({ edit: 'set_light', node, ...light }));
+  }
+
+  #adopt(followed: Followed, now: number): void {
+    const { object } = followed;
+    if (!isPunctualLight(object) || followed.underWay.size > 0) return;
+    const pose = poseOf(object);
+    followed.sent = pose;
+    followed.sentAt = now;
+    const adopted = this.#replica.adoptLight(object, describeLight(object), pose.transform).then((node) => {
+      followed.node = node;
+      followed.release = this.#replica.hold(node);
+    });
+    this.#track(followed, adopted);
+  }
+
+  #track(followed: Followed, edit: Promise<void>): void {
+    const settled = edit
+      .catch((error: unknown) => {
+        const { name, type } = followed.object;
+        if (this.#followed.has(followed.object)) this.#warn(`${name || type}: ${(error as Error).message}`);
+      })
+      .finally(() => followed.underWay.delete(settled));
+    followed.underWay.add(settled);
+  }
+
+  #unfollow(object: Object3D): void {
+    const followed = this.#followed.get(object);
+    if (!followed) return;
+    this.#sendNow(followed, performance.now());
+    this.#followed.delete(object);
+    // The last of our edits must be in the server's order before others' show again.
+    void Promise.all(followed.underWay).then(() => followed.release?.());
+  }
+
+  /** Lights go dark for the time of rendering only, so that the program's own values stay. */
+  #hookRendering(scene: Scene): () => void {
+    const { onBeforeRender, onAfterRender } = scene;
+    const intensities = new Map<Object3D & { intensity: number }, number>();
+    scene.onBeforeRender = (...parameters) => {
+      onBeforeRender.apply(scene, parameters);
+      if (this.#show !== 'indirect') return;
+      scene.traverse((object) => {
+        if (!isPunctualLight(object)) return;
+        intensities.set(object, object.intensity);
+        object.intensity = 0;
+      });
+    };
+    scene.onAfterRender = (...parameters) => {
+      for (const [light, intensity] of intensities) light.intensity = intensity;
+      intensities.clear();
+      onAfterRender.apply(scene, parameters);
+    };
+    return () => Object.assign(scene, { onBeforeRender, onAfterRender });
+  }
+}

@@ -1,0 +1,310 @@
+import type { Edit, Environment, Light, Playback, Session, Transform, Vec4 } from '@lumencast/client';
+import { Group, Material, MeshStandardMaterial, Object3D, type Scene } from 'three';
+import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
+import { Animations } from './animations.js';
+import { Content, instantiateMesh, loadGltf } from './content.js';
+import { showEnvironment } from './environment.js';
+import { createLight, lightSpec, setColor, setLight } from './lights.js';
+import { Reconciler, type Values } from './reconcile.js';
+
+/** What a replica tells those who draw the scene. */
+export interface ReplicaEvents {
+  /** An object came into the scene (shadows, shaders). */
+  added(object: Object3D): void;
+  removed(object: Object3D): void;
+  warning(message: string): void;
+}
+
+/**
+ * A three.js scene that follows a server's: applies snapshots and accepted edits in the server's
+ * order, shows own edits at once, and plays animations at the server's time.
+ */
+export class Replica implements Values {
+  readonly content = new Content();
+  /** Grows with every change of the scene that was made here. */
+  revision = 0;
+
+  readonly #root: Object3D;
+  readonly #animations: Animations;
+  readonly #reconciler = new Reconciler(this);
+  /** Nodes that edits added, with their objects; forgotten when a snapshot starts anew. */
+  readonly #added = new Map<number, Object3D>();
+  /** Objects of the file that edits removed, and where they were. */
+  readonly #removed = new Map<Object3D, Object3D>();
+  /** The program's own objects that became nodes; they stay in its scene whatever the server says. */
+  readonly #adopted = new Map<number, Object3D>();
+  /** Own objects that wait for the number of their node, in the order of their edits. */
+  readonly #adopting: { object: Object3D; resolve: (node: number) => void }[] = [];
+  #environment: Environment | undefined;
+  #environmentTurn = 0;
+
+  constructor(
+    private readonly scene: Scene,
+    private readonly gltf: GLTF | undefined,
+    private readonly session: Pick<Session, 'edit' | 'sceneTime'>,
+    private readonly urlOf: (file: string) => string,
+    private readonly events: ReplicaEvents,
+  ) {
+    this.#root = gltf?.scene ?? scene;
+    if (gltf) this.content.add(gltf, { node: 0, material: 0, animation: 0 });
+    this.#animations = new Animations(this.content);
+    const environment = (gltf?.scene.userData as Extras | undefined)?.lumencast?.environment;
+    if (environment) this.set('environment', environment);
+  }
+
+  /** Starts again from the file's state. */
+  applySnapshot(edits: readonly Edit[]): void {
+    for (const [node, object] of this.#added) this.#take(node, object);
+    this.#added.clear();
+    for (const [object, parent] of this.#removed) {
+      parent.add(object);
+      this.events.added(object);
+    }
+    this.#removed.clear();
+    for (const node of this.#adopted.keys()) {
+      if (edits.some((edit) => edit.edit === 'add_light' && edit.node === node)) continue;
+      this.#adopted.delete(node);
+      this.content.deleteNode(node);
+    }
+    this.#animations.restart();
+    // What the edits add must be there before values are set on it.
+    for (const edit of edits) this.#applyStructure(edit, undefined);
+    this.#reconciler.restart(edits);
+    this.revision++;
+  }
+
+  /** Applies an edit that the server has accepted. */
+  applyAccepted(edit: Edit, own: boolean): void {
+    const adopted = own && edit.edit === 'add_light' ? this.#adopting.shift() : undefined;
+    this.#applyStructure(edit, adopted?.object);
+    if (adopted && edit.edit === 'add_light' && edit.node !== undefined) adopted.resolve(edit.node);
+    this.#reconciler.accept(edit);
+    this.revision++;
+  }
+
+  /** Shows an edit at once and sends it; rejects, with the scene as before, when it is refused. */
+  async edit(edit: Edit): Promise<void> {
+    const pending = this.#reconciler.begin(edit);
+    this.revision++;
+    try {
+      await this.session.edit(edit);
+    } finally {
+      pending.done();
+      this.revision++;
+    }
+  }
+
+  /** Makes an object that the server does not know a light of its scene; resolves with its node. */
+  adoptLight(object: Object3D, light: Light, transform: Transform): Promise<number> {
+    return new Promise((resolve, reject) => {
+      const entry = { object, resolve };
+      this.#adopting.push(entry);
+      this.session.edit({ edit: 'add_light', light, transform }).catch((error: unknown) => {
+        this.#adopting.splice(this.#adopting.indexOf(entry), 1);
+        reject(error as Error);
+      });
+    });
+  }
+
+  /** Lets this page own a node's transform and light until the returned function is called. */
+  hold(node: number): () => void {
+    return this.#reconciler.hold([
+      ...['translation', 'rotation', 'scale'].map((part) => `node/${node}/${part}`),
+      ...['color', 'intensity', 'range', 'inner', 'outer'].map((part) => `light/${node}/${part}`),
+    ]);
+  }
+
+  /** Plays animations; `time` is the server's scene time in seconds. */
+  update(time: number | undefined): void {
+    if (time !== undefined && this.#animations.update(time)) this.revision++;
+  }
+
+  playback(animation: number): Required<Playback> | undefined {
+    return this.#animations.playback(animation);
+  }
+
+  get environment(): Environment | undefined {
+    return this.#environment;
+  }
+
+  // Values: how keys of the reconciler reach the three.js scene.
+
+  get(key: string): unknown {
+    const [kind, id, part] = key.split('/');
+    const number = Number(id);
+    switch (kind) {
+      case 'node':
+        return nodePart(this.content.object(number), part);
+      case 'light': {
+        const light = this.content.light(number);
+        return light && lightSpec(light)[part as keyof ReturnType<typeof lightSpec>];
+      }
+      case 'material':
+        return materialPart(this.content.materials(number)[0], part);
+      case 'animation':
+        // Its time runs by itself: there is no value to go back to.
+        return part === 'time' ? undefined : this.#animations.playback(number)?.[part as keyof Playback];
+      default:
+        return this.#environment ?? { type: 'constant', radiance: [0, 0, 0] };
+    }
+  }
+
+  set(key: string, value: unknown): void {
+    const [kind, id, part] = key.split('/');
+    const number = Number(id);
+    switch (kind) {
+      case 'node':
+        return setNodePart(this.content.object(number), part, value as number[]);
+      case 'light': {
+        const light = this.content.light(number);
+        if (light) setLight(light, { [part as string]: value });
+        return;
+      }
+      case 'material':
+        return this.content.materials(number).forEach((material) => setMaterialPart(material, part, value));
+      case 'animation':
+        return this.#animations.set(
+          number,
+          { [part as string]: value },
+          this.session.sceneTime(undefined, 0) ?? 0,
+        );
+      default:
+        this.#showEnvironment(value as Environment);
+    }
+  }
+
+  #showEnvironment(environment: Environment): void {
+    this.#environment = environment;
+    const turn = ++this.#environmentTurn;
+    showEnvironment(this.scene, environment, this.urlOf, () => turn === this.#environmentTurn)
+      .then(() => this.revision++)
+      .catch((error: unknown) => this.events.warning(`the environment cannot be shown: ${String(error)}`));
+  }
+
+  // Edits that add and remove.
+
+  #applyStructure(edit: Edit, adopted: Object3D | undefined): void {
+    switch (edit.edit) {
+      case 'add_instance': {
+        const group = new Group();
+        this.#insert(group, edit.node, edit.parent, edit.transform);
+        void this.#fillInstance(group, edit);
+        return;
+      }
+      case 'add_light': {
+        const own = adopted ?? (edit.node === undefined ? undefined : this.#adopted.get(edit.node));
+        if (own === undefined) this.#insert(createLight(edit.light), edit.node, edit.parent, edit.transform);
+        else if (edit.node !== undefined) this.#adopt(edit.node, own);
+        return;
+      }
+      case 'remove_node':
+        return this.#removeNode(edit.node);
+    }
+  }
+
+  #adopt(node: number, object: Object3D): void {
+    this.#adopted.set(node, object);
+    this.content.setNode(node, object);
+    this.events.added(object);
+  }
+
+  #insert(
+    object: Object3D,
+    node: number | undefined,
+    parent: number | undefined,
+    transform: Transform = {},
+  ): void {
+    for (const [part, value] of Object.entries(transform)) setNodePart(object, part, value as number[]);
+    const above = parent === undefined ? this.#root : this.content.object(parent);
+    if (node === undefined || above === undefined) return;
+    above.add(object);
+    this.content.setNode(node, object);
+    this.#added.set(node, object);
+    this.events.added(object);
+  }
+
+  async #fillInstance(group: Group, { source, node = 0 }: Edit & { edit: 'add_instance' }): Promise<void> {
+    try {
+      if ('mesh' in source) {
+        if (this.gltf) group.add(await instantiateMesh(this.gltf, source.mesh));
+      } else {
+        const gltf = await loadGltf(this.urlOf(source.file));
+        for (const [thing, { nodes }] of gltf.parser.associations) {
+          if (nodes !== undefined && 'isObject3D' in thing) this.content.setNode(node + 1 + nodes, thing);
+        }
+        group.add(gltf.scene);
+      }
+      this.events.added(group);
+      this.revision++;
+    } catch (error) {
+      this.events.warning(`an added instance cannot be shown: ${String(error)}`);
+    }
+  }
+
+  #removeNode(node: number): void {
+    const object = this.content.object(node);
+    const parent = object?.parent;
+    if (!object || !parent) return;
+    if (this.#added.delete(node)) return this.#take(node, object);
+    this.#removed.set(object, parent);
+    parent.remove(object);
+    this.events.removed(object);
+  }
+
+  /** Takes an added object out for good: its numbers are never used again. */
+  #take(node: number, object: Object3D): void {
+    for (const below of [node, ...this.content.nodesBelow(object)]) {
+      this.content.deleteNode(below);
+      this.#reconciler.forget(`node/${below}/`);
+      this.#reconciler.forget(`light/${below}/`);
+    }
+    object.removeFromParent();
+    this.events.removed(object);
+  }
+}
+
+/** glTF `extras` of the scene that Lumencast reads. */
+interface Extras {
+  lumencast?: { environment?: Environment };
+}
+
+function nodePart(object: Object3D | undefined, part: string | undefined): unknown {
+  if (part === 'translation') return object?.position.toArray();
+  if (part === 'rotation') return object?.quaternion.toArray();
+  return object?.scale.toArray();
+}
+
+function setNodePart(object: Object3D | undefined, part: string | undefined, value: readonly number[]): void {
+  if (part === 'translation') object?.position.fromArray(value);
+  else if (part === 'rotation') object?.quaternion.fromArray(value).normalize();
+  else object?.scale.fromArray(value);
+}
+
+function materialPart(material: Material | undefined, part: string | undefined): unknown {
+  if (!(material instanceof MeshStandardMaterial)) return undefined;
+  switch (part) {
+    case 'base_color':
+      return [...material.color.toArray(), material.opacity];
+    case 'metallic':
+      return material.metalness;
+    case 'roughness':
+      return material.roughness;
+    default:
+      return material.emissive.clone().multiplyScalar(material.emissiveIntensity).toArray();
+  }
+}
+
+function setMaterialPart(material: Material, part: string | undefined, value: unknown): void {
+  if (part === 'base_color' && 'color' in material) {
+    const [r, g, b, opacity] = value as Vec4;
+    setColor((material as MeshStandardMaterial).color, [r, g, b]);
+    material.opacity = opacity;
+  }
+  if (!(material instanceof MeshStandardMaterial)) return;
+  if (part === 'metallic') material.metalness = value as number;
+  else if (part === 'roughness') material.roughness = value as number;
+  else if (part === 'emissive') {
+    setColor(material.emissive, value as [number, number, number]);
+    material.emissiveIntensity = 1;
+  }
+}

@@ -1,0 +1,137 @@
+/**
+ * Lights a three.js scene, drawn by WebGPURenderer, with the indirect light of a Lumencast server.
+ * The names and their meaning are those of `@lumencast/three`.
+ */
+import { LightProbeGrid } from 'three/addons/lighting/LightProbeGrid.js';
+import type { Object3D } from 'three';
+import { lightTargetDirection } from 'three/tsl';
+import {
+  type Node,
+  type NodeBuilder,
+  PointLight,
+  PointLightNode,
+  SpotLight,
+  SpotLightNode,
+  type WebGPURenderer,
+} from 'three/webgpu';
+import { type ConnectOptions, connectWith } from './connect.js';
+import { MIN_CONE, MIN_DISTANCE } from './falloff.js';
+import { type AttachOptions, type LightSession, LumencastLight } from './light.js';
+import type { Platform } from './platform.js';
+
+export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
+export type { ConnectOptions } from './connect.js';
+
+/** See `connect` of `@lumencast/three`; the renderer must be initialised (`await renderer.init()`). */
+export function connect(
+  url: string,
+  options: ConnectOptions & { renderer: WebGPURenderer },
+): Promise<LumencastLight> {
+  return connectWith(webgpuPlatform(), url, options);
+}
+
+/** See `attach` of `@lumencast/three`. */
+export function attach(
+  session: LightSession,
+  options: AttachOptions & { renderer: WebGPURenderer },
+): LumencastLight {
+  return new LumencastLight(session, webgpuPlatform(), options);
+}
+
+/** WebGPU guarantees 16 sampled textures a shader stage; a lit material takes up to seven. */
+const FREE_TEXTURES = 16 - 7;
+
+function webgpuPlatform(): Platform {
+  return {
+    createGrid(size, resolution) {
+      const grid = new LightProbeGrid(...size, ...resolution);
+      // The target that it would bake into is not needed.
+      grid.dispose();
+      return grid as LightProbeGrid & { dispose(): void };
+    },
+    scaleIn: 'intensity',
+    freeGrids: (shadowLights) => FREE_TEXTURES - shadowLights,
+    // The least that WebGPU allows.
+    max3DTextureSize: 2048,
+    patch: (root) => eachLight(root, (light, Falloff) => (light._lightNode = Falloff)),
+    unpatch: (root) => eachLight(root, (light) => delete light._lightNode),
+  };
+}
+
+/** Where WebGPURenderer looks up how a light is shaded: the light itself, then its class. */
+type Shaded = Object3D & { _lightNode?: typeof GltfSpotLightNode | typeof GltfPointLightNode };
+
+function eachLight(
+  root: Object3D,
+  visit: (light: Shaded, Falloff: NonNullable<Shaded['_lightNode']>) => void,
+): void {
+  root.traverse((object) => {
+    if (object instanceof SpotLight) visit(object, GltfSpotLightNode);
+    else if (object instanceof PointLight) visit(object, GltfPointLightNode);
+  });
+}
+
+/** Twin of `distanceAttenuation` in falloff.ts. */
+function distanceAttenuation(
+  distance: Node<'float'>,
+  range: Node<'float'>,
+  decay: Node<'float'>,
+): Node<'float'> {
+  const falloff = distance.max(MIN_DISTANCE).pow(decay).reciprocal();
+  const window = distance.div(range).pow4().oneMinus().clamp();
+  return range.greaterThan(0).select(falloff.mul(window), falloff);
+}
+
+/** Twin of `spotAttenuation` in falloff.ts. */
+function spotAttenuation(
+  cosOuter: Node<'float'>,
+  cosInner: Node<'float'>,
+  cos: Node<'float'>,
+): Node<'float'> {
+  return cos.sub(cosOuter).div(cosInner.sub(cosOuter).max(MIN_CONE)).clamp().pow2();
+}
+
+type Float = Node<'float'>;
+type Vector = Node<'vec3'>;
+
+class GltfPointLightNode extends PointLightNode {
+  static get type(): string {
+    return 'GltfPointLightNode';
+  }
+
+  override setupDirect(builder: NodeBuilder) {
+    const towards = this.getLightVector(builder) as Vector;
+    const attenuation = distanceAttenuation(
+      towards.length(),
+      this.cutoffDistanceNode as Float,
+      this.decayExponentNode as Float,
+    );
+    return {
+      lightDirection: towards.normalize(),
+      lightColor: (this as unknown as { colorNode: Vector }).colorNode.mul(attenuation),
+    };
+  }
+}
+
+class GltfSpotLightNode extends SpotLightNode {
+  static get type(): string {
+    return 'GltfSpotLightNode';
+  }
+
+  override setupDirect(builder: NodeBuilder) {
+    const towards = this.getLightVector(builder) as Vector;
+    const lightDirection = towards.normalize();
+    const axis = lightTargetDirection(this.light!) as Vector;
+    const attenuation = distanceAttenuation(
+      towards.length(),
+      this.cutoffDistanceNode as Float,
+      this.decayExponentNode as Float,
+    ).mul(
+      spotAttenuation(this.coneCosNode as Float, this.penumbraCosNode as Float, lightDirection.dot(axis)),
+    );
+    return {
+      lightDirection,
+      lightColor: (this as unknown as { colorNode: Vector }).colorNode.mul(attenuation),
+    };
+  }
+}

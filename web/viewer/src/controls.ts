@@ -1,0 +1,188 @@
+import { capabilities, type Status } from '@lumencast/client';
+import type { Shown } from '@lumencast/three';
+import { Dock, type Toggle } from './ui/dock.js';
+import { h } from './ui/dom.js';
+import { helpPanel } from './ui/help.js';
+import { Inspector, nameOf } from './ui/inspector.js';
+import { Notices } from './ui/notices.js';
+import { StatsPanel } from './ui/stats.js';
+import { isTyping } from './view/camera-rig.js';
+import { TONE_MAPPINGS } from './view/renderer.js';
+import type { Gizmo } from './view/selection.js';
+import type { Viewer } from './viewer.js';
+
+/** The panels over the picture, and the keys. */
+export class Controls {
+  readonly element: HTMLElement;
+  readonly notices = new Notices();
+  readonly #dock: Dock;
+  readonly #inspector: Inspector;
+  readonly #stats = new StatsPanel();
+  readonly #help = helpPanel();
+  readonly #brand: HTMLElement;
+  #statsAt = 0;
+
+  constructor(private readonly viewer: Viewer) {
+    const { session, selection, gltf } = viewer;
+    this.#brand = h(
+      'div',
+      { class: 'panel brand' },
+      h('i', { class: 'dot' }),
+      h('strong', {}, 'Lumencast'),
+      h('span', {}, session.scene),
+    );
+    this.#dock = this.#createDock(gltf.cameras.map((camera, i) => camera.name || `Camera ${i + 1}`));
+    this.#inspector = new Inspector({
+      touched: (object) => viewer.touch.touch(object),
+      gizmo: (mode) => this.#setGizmo(mode),
+      close: () => selection.select(undefined),
+    });
+    selection.onChange = (object) => this.#inspector.show(object, selection.gizmo);
+    this.#stats.element.hidden = innerWidth < 720;
+    this.element = h(
+      'div',
+      { class: 'controls' },
+      this.#brand,
+      this.notices.element,
+      this.#inspector.element,
+      this.#stats.element,
+      this.#help,
+      this.#dock.element,
+    );
+    addEventListener('keydown', (event) => this.#key(event));
+    session.on('status', (status) => this.#say(status));
+    this.#say(session.status);
+    for (const notice of capabilities().notices) this.notices.passing(notice, 14);
+  }
+
+  /** Shows how things are; to be called each frame. */
+  update(): void {
+    const { viewer } = this;
+    const dock = this.#dock;
+    dock.shown = viewer.light.show;
+    dock.exposure = Math.log2(viewer.renderer.toneMappingExposure);
+    dock.lights = viewer.lights.map(nameOf);
+    dock.set('fly', viewer.rig.mode === 'fly');
+    dock.set('probes', viewer.probes.group.visible);
+    dock.set('flashlight', viewer.flashlight.on);
+    dock.set('playing', !viewer.playing);
+    dock.hide('playing', viewer.light.content.animations.size === 0);
+    dock.set('stats', !this.#stats.element.hidden);
+    dock.set('help', !this.#help.hidden);
+    this.#inspector.update();
+    if (performance.now() - this.#statsAt < 250) return;
+    this.#statsAt = performance.now();
+    if (!this.#stats.element.hidden) this.#stats.update(viewer.stats());
+  }
+
+  #createDock(cameras: readonly string[]): Dock {
+    const { viewer } = this;
+    const tones = Object.keys(TONE_MAPPINGS);
+    return new Dock(
+      {
+        show: (shown) => viewer.setMode(shown),
+        exposure: (stops) => {
+          viewer.autoExposure = false;
+          viewer.renderer.toneMappingExposure = 2 ** stops;
+        },
+        autoExposure: () => void viewer.meter(),
+        tone: (name) => (viewer.renderer.toneMapping = TONE_MAPPINGS[name]),
+        camera: (index) => {
+          const camera = viewer.gltf.cameras[index];
+          if (camera) viewer.rig.goTo(camera);
+          else viewer.rig.overview();
+        },
+        toggle: (what) => this.#toggle(what),
+        select: (index) => viewer.selection.select(viewer.lights[index]),
+      },
+      tones,
+      cameras,
+    );
+  }
+
+  #toggle(what: Toggle): void {
+    const { viewer } = this;
+    switch (what) {
+      case 'fly':
+        viewer.rig.mode = viewer.rig.mode === 'fly' ? 'orbit' : 'fly';
+        if (viewer.rig.mode === 'fly')
+          this.notices.passing('Fly with W A S D, Q and E; drag to look around', 4);
+        return;
+      case 'probes':
+        viewer.probes.group.visible = !viewer.probes.group.visible;
+        return;
+      case 'flashlight':
+        return this.#takeFlashlight();
+      case 'playing':
+        return viewer.togglePlaying();
+      case 'stats':
+        this.#stats.element.hidden = !this.#stats.element.hidden;
+        return;
+      case 'help':
+        this.#help.hidden = !this.#help.hidden;
+    }
+  }
+
+  #takeFlashlight(): void {
+    const { flashlight, spot } = this.viewer;
+    flashlight.on = !flashlight.on;
+    if (!flashlight.on) return;
+    this.viewer.selection.select(undefined);
+    if (spot) return;
+    flashlight.add().catch((error: Error) => {
+      flashlight.on = false;
+      this.notices.passing(`No flashlight: ${error.message}`);
+    });
+  }
+
+  #setGizmo(mode: Gizmo): void {
+    const { selection } = this.viewer;
+    selection.gizmo = mode;
+    this.#inspector.show(selection.selected, mode);
+  }
+
+  #key(event: KeyboardEvent): void {
+    if (isTyping(event) || event.ctrlKey || event.metaKey || event.altKey) return;
+    const shown: Record<string, Shown> = { Digit1: 'direct', Digit2: 'indirect', Digit3: 'both' };
+    const toggles: Record<string, Toggle> = {
+      KeyC: 'fly',
+      KeyP: 'probes',
+      KeyF: 'flashlight',
+      KeyI: 'stats',
+      Space: 'playing',
+    };
+    const { code } = event;
+    if (event.key === '?') this.#toggle('help');
+    else if (shown[code]) this.viewer.setMode(shown[code]);
+    else if (toggles[code]) this.#toggle(toggles[code]);
+    else if (code === 'KeyX') void this.viewer.meter();
+    else if (code === 'KeyG') this.#setGizmo('translate');
+    else if (code === 'KeyR') this.#setGizmo('rotate');
+    else if (code === 'Escape') this.#letGo();
+    else return;
+    event.preventDefault();
+  }
+
+  #letGo(): void {
+    this.viewer.flashlight.on = false;
+    this.viewer.selection.select(undefined);
+    this.#help.hidden = true;
+  }
+
+  #say(status: Status): void {
+    this.#brand.dataset.state = status.state;
+    switch (status.state) {
+      case 'connecting':
+        // The first attempt shows as the dim dot; after a loss the message stays.
+        return;
+      case 'connected':
+        return this.notices.standing(undefined);
+      case 'lost':
+        return this.notices.standing(
+          `Connection lost: ${status.reason}. The light stays as it was; trying again…`,
+        );
+      case 'closed':
+        return this.notices.standing(`Not connected: ${status.reason}`);
+    }
+  }
+}

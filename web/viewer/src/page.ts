@@ -1,0 +1,100 @@
+import type { Session } from '@lumencast/client';
+import { Curtain } from './ui/curtain.js';
+import { h } from './ui/dom.js';
+import { openViewer, type Viewer } from './viewer.js';
+
+/** Where the scene and its light come from. */
+export interface Source {
+  /** The scene, for messages. */
+  readonly name: string;
+  /** Address of its glTF file. */
+  readonly file: string;
+  readonly connect: () => Session;
+}
+
+declare global {
+  interface Window {
+    /** For tests and for those who like to look inside. */
+    lumencast?: Inside;
+  }
+}
+
+/** What `window.lumencast` holds. */
+export interface Inside extends Pick<Viewer, 'light' | 'scene' | 'renderer' | 'session'> {
+  /** Resolves when the first light has been drawn. */
+  readonly ready: Promise<void>;
+  readonly camera: Viewer['rig']['camera'];
+  readonly viewer: Viewer;
+  stats(): ReturnType<Viewer['stats']>;
+  setMode: Viewer['setMode'];
+  pixel: Viewer['pixel'];
+}
+
+/** Builds the page: a curtain with progress, then the picture, or why there is none. */
+export async function openPage(find: () => Promise<Source>): Promise<void> {
+  const canvas = h('canvas', { class: 'view', tabindex: '0' });
+  const curtain = new Curtain();
+  document.body.replaceChildren(canvas, curtain.element);
+  try {
+    const { name, file, connect } = await find();
+    document.title = `${name} · Lumencast`;
+    const query = new URLSearchParams(location.search);
+    const pixelRatio = Number(query.get('scale')) || undefined;
+    const early: string[] = [];
+    let warn = (message: string): void => void early.push(message);
+    const viewer = await openViewer({
+      canvas,
+      renderer: query.get('renderer') === 'webgpu' ? 'webgpu' : 'webgl',
+      file,
+      connect,
+      pixelRatio,
+      onProgress: (loaded, total) => curtain.progress(name, loaded, total),
+      onWarning: (message) => warn(message),
+    });
+    warn = (message) => viewer.controls.notices.passing(message);
+    early.forEach(warn);
+    curtain.say('Preparing the picture…');
+    document.body.insertBefore(viewer.controls.element, curtain.element);
+    viewer.start();
+    window.lumencast = inside(viewer);
+    await Promise.race([viewer.session.ready, afterSeconds(4)]);
+    curtain.lift();
+  } catch (error) {
+    console.error(error);
+    curtain.fail(
+      error instanceof Error ? error.message : String(error),
+      'Is the server still running? Its terminal says more: lumencast serve prints what goes wrong.',
+    );
+  }
+}
+
+function inside(viewer: Viewer): Inside {
+  const { light, scene, renderer, session, rig } = viewer;
+  return {
+    light,
+    scene,
+    renderer,
+    session,
+    camera: rig.camera,
+    viewer,
+    ready: firstLight(viewer),
+    stats: () => viewer.stats(),
+    setMode: (shown) => viewer.setMode(shown),
+    pixel: (x, y) => viewer.pixel(x, y),
+  };
+}
+
+/** Resolves two pictures after the first light. */
+function firstLight({ light }: Viewer): Promise<void> {
+  return new Promise((resolve) => {
+    const look = (): void => {
+      if (light.lightRevision === 0) requestAnimationFrame(look);
+      else requestAnimationFrame(() => requestAnimationFrame(() => resolve()));
+    };
+    look();
+  });
+}
+
+function afterSeconds(seconds: number): Promise<void> {
+  return new Promise((resolve) => setTimeout(resolve, seconds * 1000));
+}

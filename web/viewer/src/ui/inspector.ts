@@ -1,0 +1,136 @@
+import { isPunctualLight } from '@lumencast/three';
+import { DirectionalLight, type Object3D, PointLight, SpotLight, SRGBColorSpace } from 'three';
+import { setSunAngles, sunAngles } from '../view/sun.js';
+import type { Gizmo } from '../view/selection.js';
+import { h, iconButton, setPressed, slider } from './dom.js';
+
+export interface InspectorActions {
+  /** The object has been changed by hand. */
+  touched(object: Object3D): void;
+  gizmo(mode: Gizmo): void;
+  close(): void;
+}
+
+const DEGREES = 180 / Math.PI;
+
+/** The panel of the selected light or object. Its sliders change the object itself. */
+export class Inspector {
+  readonly element = h('aside', { class: 'panel inspector', 'aria-label': 'Selection', hidden: true });
+  #object: Object3D | undefined;
+  #refresh: (() => void)[] = [];
+
+  constructor(private readonly actions: InspectorActions) {}
+
+  show(object: Object3D | undefined, gizmo: Gizmo): void {
+    this.#object = object;
+    this.element.hidden = object === undefined;
+    this.#refresh = [];
+    if (!object) return this.element.replaceChildren();
+    this.element.replaceChildren(this.#head(object), ...this.#rows(object), ...this.#gizmo(object, gizmo));
+    this.update();
+  }
+
+  /** Shows the object as it now is. */
+  update(): void {
+    for (const refresh of this.#refresh) refresh();
+  }
+
+  #head(object: Object3D): HTMLElement {
+    return h(
+      'header',
+      {},
+      h('div', {}, h('strong', {}, nameOf(object)), h('small', {}, kindOf(object))),
+      iconButton('close', 'Close (Esc)', () => this.actions.close()),
+    );
+  }
+
+  #rows(object: Object3D): HTMLElement[] {
+    if (!isPunctualLight(object)) return [];
+    const rows = [
+      this.#slider('Intensity', { min: -3, max: 5, step: 0.01 }, intensityText(object), {
+        get: () => Math.log10(Math.max(object.intensity, 1e-3)),
+        set: (value) => (object.intensity = value <= -3 ? 0 : 10 ** value),
+      }),
+      this.#color(object),
+    ];
+    if (object instanceof DirectionalLight) {
+      const degrees = (value: number) => `${value.toFixed(0)}°`;
+      rows.push(
+        this.#slider('Height', { min: 1, max: 90, step: 0.2 }, degrees, {
+          get: () => sunAngles(object).elevation * DEGREES,
+          set: (value) => setSunAngles(object, { ...sunAngles(object), elevation: value / DEGREES }),
+        }),
+        this.#slider('Direction', { min: -180, max: 180, step: 0.5 }, degrees, {
+          get: () => sunAngles(object).azimuth * DEGREES,
+          set: (value) => setSunAngles(object, { ...sunAngles(object), azimuth: value / DEGREES }),
+        }),
+      );
+    }
+    if (object instanceof SpotLight) {
+      rows.push(
+        this.#slider('Cone', { min: 2, max: 85, step: 0.5 }, (value) => `${value.toFixed(0)}°`, {
+          get: () => object.angle * DEGREES,
+          set: (value) => (object.angle = value / DEGREES),
+        }),
+      );
+    }
+    return rows;
+  }
+
+  #slider(
+    label: string,
+    range: { min: number; max: number; step: number },
+    format: (value: number) => string,
+    value: { get: () => number; set: (value: number) => void },
+  ): HTMLElement {
+    const { element, set } = slider(label, range, format, (input) => {
+      value.set(input);
+      if (this.#object) this.actions.touched(this.#object);
+    });
+    this.#refresh.push(() => set(value.get()));
+    return element;
+  }
+
+  #color(light: PointLight | SpotLight | DirectionalLight): HTMLElement {
+    const input = h('input', {
+      type: 'color',
+      'aria-label': 'Colour',
+      oninput: () => {
+        light.color.setStyle(input.value, SRGBColorSpace);
+        this.actions.touched(light);
+      },
+    });
+    this.#refresh.push(() => {
+      if (document.activeElement !== input) input.value = `#${light.color.getHexString(SRGBColorSpace)}`;
+    });
+    return h('label', { class: 'slider' }, h('span', {}, 'Colour'), input);
+  }
+
+  #gizmo(object: Object3D, gizmo: Gizmo): HTMLElement[] {
+    if (object instanceof DirectionalLight) return [];
+    const modes: [Gizmo, 'move' | 'rotate', string][] = [['translate', 'move', 'Move (G)']];
+    if (!(object instanceof PointLight)) modes.push(['rotate', 'rotate', 'Turn (R)']);
+    const buttons = modes.map(([mode, name, title]) => {
+      const button = iconButton(name, title, () => this.actions.gizmo(mode));
+      setPressed(button, mode === gizmo);
+      return button;
+    });
+    return [h('div', { class: 'group' }, ...buttons)];
+  }
+}
+
+export function nameOf(object: Object3D): string {
+  return object.name || object.parent?.name || kindOf(object);
+}
+
+function kindOf(object: Object3D): string {
+  if (object instanceof DirectionalLight) return 'directional light';
+  if (object instanceof SpotLight) return 'spot light';
+  if (object instanceof PointLight) return 'point light';
+  return 'object';
+}
+
+function intensityText(light: Object3D): (value: number) => string {
+  const unit = light instanceof DirectionalLight ? 'lx' : 'cd';
+  return (value) => `${value <= -3 ? 0 : Number((10 ** value).toPrecision(2))} ${unit}`;
+}

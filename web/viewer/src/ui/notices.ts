@@ -1,0 +1,30 @@
+import { h } from './dom.js';
+
+/** Short messages over the picture: one that stays as long as its cause, others that go by themselves. */
+export class Notices {
+  readonly element = h('div', { class: 'notices', role: 'status', 'aria-live': 'polite' });
+  #standing: HTMLElement | undefined;
+
+  /** A message that stays until it is replaced or, by `undefined`, taken away. */
+  standing(message: string | undefined): void {
+    if (this.#standing?.textContent === message) return;
+    this.#standing?.remove();
+    this.#standing = undefined;
+    if (message === undefined) return;
+    this.#standing = h(
+      'div',
+      { class: 'notice standing' },
+      h('i', { class: 'pulse' }),
+      h('span', {}, message),
+    );
+    this.element.prepend(this.#standing);
+  }
+
+  /** A message that goes after a while, or when clicked. */
+  passing(message: string, seconds = 7): void {
+    if ([...this.element.children].some((shown) => shown.textContent === message)) return;
+    const notice = h('div', { class: 'notice', onclick: () => notice.remove() }, h('span', {}, message));
+    this.element.append(notice);
+    setTimeout(() => notice.remove(), seconds * 1000);
+  }
+}

@@ -1,0 +1,56 @@
+import type { SessionStats } from '@lumencast/client';
+import { h } from './dom.js';
+
+/** What the panel shows: the session's figures and what the page measures itself. */
+export interface Figures extends SessionStats {
+  readonly framesPerSecond: number;
+  /** Pages and programs that watch; `undefined` where the server does not say. */
+  readonly clients: number | undefined;
+}
+
+const ROWS: readonly [label: string, title: string, text: (figures: Figures) => string][] = [
+  [
+    'ticks',
+    'Ticks of the server a second',
+    ({ tickRate }) => known(tickRate, (rate) => `${rate.toFixed(1)} Hz`),
+  ],
+  [
+    'tick',
+    'Time that the server needs for a tick',
+    ({ tickMs }) => known(tickMs, (ms) => `${ms.toFixed(1)} ms`),
+  ],
+  ['samples', 'Paths traced a probe and tick', ({ samples }) => known(samples, (n) => n.toFixed(0))],
+  ['age', 'Time since the light on the screen was computed', ({ age }) => known(age, seconds)],
+  ['delay', 'Time that light waits on the way', ({ delay }) => known(delay, seconds)],
+  ['network', 'Received from the server', ({ bandwidth }) => bytes(bandwidth)],
+  ['clients', 'Who watches this scene', ({ clients }) => known(clients, (n) => n.toFixed(0))],
+  ['frames', 'Pictures a second on this page', ({ framesPerSecond }) => `${framesPerSecond.toFixed(0)} fps`],
+];
+
+export class StatsPanel {
+  readonly #values = ROWS.map(() => h('dd'));
+  readonly element = h(
+    'dl',
+    { class: 'panel stats' },
+    ...ROWS.map(([label, title], i) => h('div', { title }, h('dt', {}, label), this.#values[i])),
+  );
+
+  update(figures: Figures): void {
+    ROWS.forEach(([, , text], i) => {
+      const value = text(figures);
+      if (this.#values[i].textContent !== value) this.#values[i].textContent = value;
+    });
+  }
+}
+
+function known(value: number | undefined, text: (value: number) => string): string {
+  return value === undefined ? '–' : text(value);
+}
+
+function seconds(value: number): string {
+  return value < 10 ? `${(value * 1000).toFixed(0)} ms` : `${value.toFixed(0)} s`;
+}
+
+function bytes(perSecond: number): string {
+  return perSecond < 1e6 ? `${(perSecond / 1e3).toFixed(1)} kB/s` : `${(perSecond / 1e6).toFixed(2)} MB/s`;
+}

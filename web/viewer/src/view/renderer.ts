@@ -1,0 +1,89 @@
+import {
+  ACESFilmicToneMapping,
+  AgXToneMapping,
+  NeutralToneMapping,
+  PCFShadowMap,
+  type ToneMapping,
+  WebGLRenderer,
+} from 'three';
+import type { WebGPURenderer } from 'three/webgpu';
+
+export type AnyRenderer = WebGLRenderer | WebGPURenderer;
+
+export const TONE_MAPPINGS: Readonly<Record<string, ToneMapping>> = {
+  AgX: AgXToneMapping,
+  ACES: ACESFilmicToneMapping,
+  Neutral: NeutralToneMapping,
+};
+
+/**
+ * Makes the renderer. WebGPU's half of three.js is loaded only where it is asked for.
+ * @throws Error in words when the browser has no such API
+ */
+export async function createRenderer(
+  kind: 'webgl' | 'webgpu',
+  canvas: HTMLCanvasElement,
+): Promise<AnyRenderer> {
+  const renderer = kind === 'webgpu' ? await createWebGPU(canvas) : createWebGL(canvas);
+  renderer.shadowMap.enabled = true;
+  renderer.shadowMap.type = PCFShadowMap;
+  renderer.toneMapping = AgXToneMapping;
+  return renderer;
+}
+
+function createWebGL(canvas: HTMLCanvasElement): WebGLRenderer {
+  try {
+    return new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
+  } catch {
+    throw new Error(
+      'This browser offers no WebGL 2, which the picture is drawn with. Is hardware acceleration off?',
+    );
+  }
+}
+
+async function createWebGPU(canvas: HTMLCanvasElement): Promise<WebGPURenderer> {
+  const { WebGPURenderer } = await import('three/webgpu');
+  const renderer = new WebGPURenderer({ canvas, antialias: true });
+  await renderer.init();
+  return renderer;
+}
+
+export function isWebGPU(renderer: AnyRenderer): renderer is WebGPURenderer {
+  return 'isWebGPURenderer' in renderer;
+}
+
+/** Keeps the picture fluent on slow devices: lowers the resolution while frames take long. */
+export class Resolution {
+  #scale = 1;
+  #slow = 0;
+  #fast = 0;
+
+  constructor(
+    private readonly renderer: AnyRenderer,
+    /** Pixels a CSS pixel that never change, or `undefined` to adapt. */
+    private readonly fixed: number | undefined,
+  ) {
+    this.apply();
+  }
+
+  apply(): void {
+    const ratio = this.fixed ?? Math.min(devicePixelRatio, 2) * this.#scale;
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(innerWidth, innerHeight, false);
+  }
+
+  /** To be called each frame with its length in milliseconds. */
+  frame(milliseconds: number): void {
+    if (this.fixed !== undefined || document.hidden) return;
+    this.#slow = milliseconds > 42 ? this.#slow + 1 : 0;
+    this.#fast = milliseconds < 14 ? this.#fast + 1 : 0;
+    if (this.#slow > 20 && this.#scale > 0.5) this.#set(Math.max(0.5, this.#scale * 0.8));
+    else if (this.#fast > 240 && this.#scale < 1) this.#set(Math.min(1, this.#scale * 1.25));
+  }
+
+  #set(scale: number): void {
+    this.#scale = scale;
+    this.#slow = this.#fast = 0;
+    this.apply();
+  }
+}

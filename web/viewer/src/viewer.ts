@@ -1,0 +1,213 @@
+import type { Session } from '@lumencast/client';
+import { attach, loadGltf, type LumencastLight, type PunctualLight, type Shown } from '@lumencast/three';
+import { Box3, type Object3D, Scene, Timer, Vector3 } from 'three';
+import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
+import { Controls } from './controls.js';
+import type { Figures } from './ui/stats.js';
+import { CameraRig } from './view/camera-rig.js';
+import { meter } from './view/exposure.js';
+import { findFlashlight, Flashlight } from './view/flashlight.js';
+import { ProbeSpheres } from './view/probes.js';
+import { type AnyRenderer, createRenderer, isWebGPU, Resolution } from './view/renderer.js';
+import { Selection } from './view/selection.js';
+import { Touch } from './view/touch.js';
+
+export interface ViewerOptions {
+  readonly canvas: HTMLCanvasElement;
+  readonly renderer: 'webgl' | 'webgpu';
+  /** Address of the scene's glTF file. */
+  readonly file: string;
+  /** Makes the session, once the scene is loaded. */
+  readonly connect: () => Session;
+  /** Pixels a CSS pixel; adapts to the device's speed unless given. */
+  readonly pixelRatio: number | undefined;
+  readonly onProgress: (loaded: number, total: number | undefined) => void;
+  readonly onWarning: (message: string) => void;
+}
+
+/** Frames after the first light that exposure is measured at again: the light settles meanwhile. */
+const METER_AT = [0, 40, 120];
+
+/** Loads everything that a viewer needs, in the order in which it can fail. */
+export async function openViewer(options: ViewerOptions): Promise<Viewer> {
+  const renderer = await createRenderer(options.renderer, options.canvas);
+  const gltf = await loadGltf(options.file, options.onProgress);
+  const scene = new Scene();
+  scene.add(gltf.scene);
+  const session = options.connect();
+  const attached = { scene, gltf, onWarning: options.onWarning };
+  const light = isWebGPU(renderer)
+    ? (await import('@lumencast/three/webgpu')).attach(session, { ...attached, renderer })
+    : attach(session, { ...attached, renderer });
+  return new Viewer(options, renderer, gltf, session, light, scene);
+}
+
+/** The picture and what one can do with it. The page's controls are in {@link Controls}. */
+export class Viewer {
+  readonly rig: CameraRig;
+  readonly selection: Selection;
+  readonly touch: Touch;
+  readonly flashlight: Flashlight;
+  readonly probes = new ProbeSpheres();
+  readonly controls: Controls;
+  /** Metering goes on by itself until somebody sets the exposure. */
+  autoExposure = true;
+
+  readonly #resolution: Resolution;
+  readonly #timer = new Timer();
+  #drawnRevision = -1;
+  #litFrames = 0;
+  #frameTime = 16;
+  #clients: number | undefined;
+  #metering: Promise<void> | undefined;
+
+  constructor(
+    readonly options: ViewerOptions,
+    readonly renderer: AnyRenderer,
+    readonly gltf: GLTF,
+    readonly session: Session,
+    readonly light: LumencastLight,
+    readonly scene: Scene,
+  ) {
+    const { canvas } = options;
+    const bounds = contentBounds(gltf.scene);
+    this.rig = new CameraRig(canvas, bounds);
+    if (gltf.cameras[0]) this.rig.goTo(gltf.cameras[0], true);
+    this.touch = new Touch(light);
+    this.selection = new Selection(light, gltf.scene, this.rig.camera, canvas, this.touch, (dragging) => {
+      this.rig.locked = dragging;
+    });
+    this.flashlight = new Flashlight(
+      light,
+      this.rig.camera,
+      this.touch,
+      bounds.getSize(new Vector3()).length() || 1,
+    );
+    this.probes.group.name = 'probes';
+    this.selection.overlay.add(this.probes.group);
+    scene.add(this.selection.overlay);
+    this.#resolution = new Resolution(renderer, options.pixelRatio);
+    addEventListener('resize', () => {
+      this.#resolution.apply();
+      this.rig.resize();
+    });
+    this.controls = new Controls(this);
+    this.#timer.connect(document);
+  }
+
+  /** Draws from now on. */
+  start(): void {
+    void this.renderer.setAnimationLoop((now: number) => this.#frame(now));
+    setInterval(() => void this.#askClients(), 3000);
+  }
+
+  #frame(now: number): void {
+    this.#timer.update(now);
+    const seconds = this.#timer.getDelta();
+    this.#frameTime += (seconds * 1000 - this.#frameTime) * 0.08;
+    this.#resolution.frame(seconds * 1000);
+    this.draw(performance.now(), seconds);
+    this.controls.update();
+    this.#meterWhenLit();
+  }
+
+  /** One picture, at a time as of `performance.now()`. */
+  draw(now: number = performance.now(), seconds = 0): void {
+    this.rig.update(seconds);
+    this.rig.camera.updateMatrixWorld();
+    this.flashlight.update(this.spot);
+    this.touch.update(now);
+    this.light.update(this.rig.camera, now);
+    this.selection.update();
+    this.probes.update(this.session.light(now), now);
+    this.#refreshShadows();
+    this.renderer.render(this.scene, this.rig.camera);
+  }
+
+  /** Shadow maps of a large scene cost more than the picture: only when something has moved. */
+  #refreshShadows(): void {
+    const moved = this.light.sceneRevision !== this.#drawnRevision;
+    this.#drawnRevision = this.light.sceneRevision;
+    for (const { shadow } of this.selection.lights) {
+      shadow.autoUpdate = false;
+      shadow.needsUpdate ||= moved;
+    }
+  }
+
+  /** The spot light that the hand takes. */
+  get spot(): ReturnType<typeof findFlashlight> {
+    return findFlashlight(this.selection.lights);
+  }
+
+  get lights(): PunctualLight[] {
+    return this.selection.lights;
+  }
+
+  setMode(shown: Shown): void {
+    this.light.show = shown;
+  }
+
+  get playing(): boolean {
+    return [...this.light.content.animations.keys()].some((number) => this.light.playback(number)?.playing);
+  }
+
+  /** Pauses all animations, or plays them on; everyone sees it. */
+  togglePlaying(): void {
+    const playing = !this.playing;
+    for (const animation of this.light.content.animations.keys()) {
+      this.light
+        .edit({ edit: 'set_animation', animation, playing })
+        .catch((error: Error) => this.options.onWarning(error.message));
+    }
+  }
+
+  /** Sets the exposure by the picture. */
+  meter(): Promise<void> {
+    return (this.#metering ??= meter(this.renderer, this.scene, this.rig.camera, this.selection.overlay)
+      .then((exposure) => {
+        if (exposure !== undefined) this.renderer.toneMappingExposure = exposure;
+      })
+      .finally(() => (this.#metering = undefined)));
+  }
+
+  #meterWhenLit(): void {
+    const { autoExposure, session } = this;
+    if (!autoExposure || session.light().fields.length === 0) return;
+    if (METER_AT.includes(this.#litFrames++)) void this.meter();
+  }
+
+  stats(): Figures {
+    return { ...this.session.stats, framesPerSecond: 1000 / this.#frameTime, clients: this.#clients };
+  }
+
+  /** Who else watches stands in the server's metrics. */
+  async #askClients(): Promise<void> {
+    if (document.hidden || this.session.status.state !== 'connected') return;
+    try {
+      const metrics = await (await fetch(new URL('/metrics', this.session.origin))).text();
+      const count = /^lumencast_clients(?:\{[^}]*\})? (\d+)/m.exec(metrics)?.[1];
+      this.#clients = count === undefined ? undefined : Number(count);
+    } catch {
+      this.#clients = undefined;
+    }
+  }
+
+  /** Red, green, blue, 0 to 255, of a point of a picture drawn now; from the upper left, in CSS pixels. */
+  pixel(x: number, y: number): [number, number, number] {
+    const { canvas } = this.options;
+    const copy = document.createElement('canvas');
+    copy.width = copy.height = 1;
+    const context = copy.getContext('2d', { willReadFrequently: true })!;
+    this.draw();
+    const { width, height } = canvas.getBoundingClientRect();
+    const [sx, sy] = [(x / width) * canvas.width, (y / height) * canvas.height];
+    context.drawImage(canvas, Math.floor(sx), Math.floor(sy), 1, 1, 0, 0, 1, 1);
+    const [r, g, b] = context.getImageData(0, 0, 1, 1).data;
+    return [r, g, b];
+  }
+}
+
+function contentBounds(content: Object3D): Box3 {
+  const bounds = new Box3().setFromObject(content);
+  return bounds.isEmpty() ? bounds.set(new Vector3(-1, -1, -1), new Vector3(1, 1, 1)) : bounds;
+}
