@@ -61,7 +61,7 @@ export function parseState(bytes: Uint8Array): StateFrame {
     samples: number(json.samples, 'samples', 0),
   };
   const happened = { ...tick, accepted: parseAccepted(json.edits), refused: parseRefused(json.refused) };
-  if (json.snapshot === undefined) return { ...happened, kind: 'delta' };
+  if (absent(json.snapshot)) return { ...happened, kind: 'delta' };
   return { ...happened, kind: 'snapshot', edits: parseSnapshot(json.snapshot), acks: parseAcks(json.acks) };
 }
 

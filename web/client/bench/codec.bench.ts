@@ -1,0 +1,60 @@
+import { bench, describe } from 'vitest';
+
+import { packAtlas } from '../src/atlas.js';
+import { Cache } from '../src/cache.js';
+import { ProbeDecoder } from '../src/codec/probes.js';
+import type { Vec3 } from '../src/edit.js';
+import { encodeProbes } from '../test/support/probe-encoder.js';
+import { random } from '../test/support/random.js';
+
+const SIZE: Vec3 = [16, 16, 16];
+const ORDER = 2;
+const VALUES = 27;
+
+/** Light that falls off from a corner, with a tenth of noise that differs by `seed`. */
+function light(seed: number): Float32Array {
+  const next = random(seed);
+  return Float32Array.from({ length: 4096 * VALUES }, (_, i) => {
+    const probe = Math.floor(i / VALUES);
+    const [x, y, z] = [probe % 16, (probe >> 4) % 16, probe >> 8];
+    return (100 / (1 + (i % VALUES)) / (4 + x + y + z)) * (1 + 0.1 * (next() - 0.5));
+  });
+}
+
+const key = encodeProbes(light(1), SIZE, ORDER, -22, { update: 0 });
+const delta = encodeProbes(light(2), SIZE, ORDER, -22, { update: 2, base: 0 }, key);
+const rgb = new ProbeDecoder(SIZE, ORDER).decode(key.frame).coefficients;
+const atlas = packAtlas(rgb, SIZE, ORDER, 32);
+const decoder = new ProbeDecoder(SIZE, ORDER);
+decoder.decode(key.frame);
+
+const cache = new Cache('me');
+const catalog = {
+  lumencast: 1,
+  epoch: '0123456789abcdef',
+  scene: { name: 'x', root: 'x.glb' },
+  tick_seconds: 0.04,
+  fields: [
+    {
+      id: 0,
+      kind: 'volume',
+      basis: 'sh',
+      order: ORDER,
+      use: 'all',
+      grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: [1, 1, 1], resolution: SIZE },
+      regions: [{ id: 0, min: [0, 0, 0], size: SIZE }],
+      layers: 3,
+    },
+  ],
+};
+cache.addCatalog(new TextEncoder().encode(JSON.stringify(catalog)));
+cache.addProbes(0, 0, key.frame, 0);
+cache.addProbes(0, 0, delta.frame, 0.1);
+let now = 0.1;
+
+describe('a volume of 16×16×16 probes, order 2', () => {
+  bench(`keyframe of ${key.frame.length} bytes`, () => void new ProbeDecoder(SIZE, ORDER).decode(key.frame));
+  bench(`delta of ${delta.frame.length} bytes`, () => void decoder.decode(delta.frame));
+  bench('blend', () => void cache.light((now += 1e-6)));
+  bench('pack into halves', () => void packAtlas(rgb, SIZE, ORDER, 32, atlas));
+});
