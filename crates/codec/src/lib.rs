@@ -7,16 +7,22 @@
 #![forbid(unsafe_code)]
 
 mod bytes;
+mod catalog;
 mod error;
+mod file;
 pub mod limits;
 mod probe;
 mod range_coder;
+mod state;
 
+pub use catalog::{Catalog, Epoch, Field, SceneInfo, Use};
 pub use error::DecodeError;
+pub use file::{LightFile, SavedFrame};
 pub use probe::{
     EncodedRegion, ProbeDecoder, ProbeEncoder, ProbeHeader, Region, RegionLight, UpdateInfo,
     regions,
 };
+pub use state::{AcceptedEdit, ClientEdit, RefusedEdit, SceneState, StateFrame};
 
 /// The version of the wire format and of files, `lumencast` in a catalog.
 pub const VERSION: u64 = 1;

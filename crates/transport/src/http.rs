@@ -40,7 +40,7 @@ pub(crate) fn router(
     Router::new().route("/", any(answer)).route("/{*path}", any(answer)).with_state(front)
 }
 
-async fn answer(State(front): State<Front>, request: Request) -> Response {
+async fn answer(State(front): State<Front>, mut request: Request) -> Response {
     if let Err(reason) = checked(&front.check, &request) {
         tracing::info!(path = request.uri().path(), %reason, "HTTP request refused");
         return (StatusCode::FORBIDDEN, format!("{reason}\n")).into_response();
@@ -59,6 +59,9 @@ async fn answer(State(front): State<Front>, request: Request) -> Response {
             _ => StatusCode::NOT_FOUND.into_response(),
         };
     }
+    // The path matched a parameter of this router, which the application's must not find among its
+    // own; there is nothing else in here for it.
+    request.extensions_mut().clear();
     front.application.oneshot(request).await.into_response()
 }
 

@@ -17,6 +17,9 @@ use crate::origin_check::OriginCheck;
 /// How long a client may take from its first packet to its session.
 const HANDSHAKE: Duration = Duration::from_secs(10);
 
+/// How long a refused client may take to hear so.
+const ANSWER: Duration = Duration::from_secs(1);
+
 /// What a session is served from.
 #[derive(Clone)]
 pub(crate) struct Backend {
@@ -56,7 +59,11 @@ async fn connection(incoming: noq::Incoming, backend: Backend) -> Result<(), Fai
         Ok(lease) => lease,
         Err((status, reason)) => {
             tracing::info!(%remote, %status, %reason, "WebTransport session refused");
-            return Ok(request.reject(status).await?);
+            let connection = request.conn().clone();
+            request.reject(status).await?;
+            // Dropping the connection at once would overtake the answer.
+            let _ = tokio::time::timeout(ANSWER, connection.closed()).await;
+            return Ok(());
         }
     };
     let token = lease.token();

@@ -1,6 +1,6 @@
 //! The server: an embedded relay on one port, QUIC on UDP and HTTP with WebSocket on TCP.
 
-use std::net::{SocketAddr, UdpSocket};
+use std::net::{Ipv6Addr, SocketAddr, UdpSocket};
 use std::sync::{Arc, RwLock};
 use std::time::Duration;
 
@@ -62,7 +62,7 @@ pub struct Server {
     origin: origin::Producer,
     sessions: Sessions,
     shutdown: shutdown::Trigger,
-    endpoint: noq::Endpoint,
+    endpoints: Vec<noq::Endpoint>,
     tasks: Vec<JoinHandle<()>>,
 }
 
@@ -91,7 +91,11 @@ impl Server {
             Ok(web.with_shutdown(observer.clone()).bind()?)
         })?;
         let address = udp.local_addr().map_err(setup_error)?;
-        let endpoint = endpoint(udp, tls::quic_config(&identified)?).map_err(setup_error)?;
+        let quic_config = tls::quic_config(&identified)?;
+        let mut endpoints = vec![endpoint(udp, &quic_config).map_err(setup_error)?];
+        if let Some(udp) = other_loopback(address) {
+            endpoints.push(endpoint(udp, &quic_config).map_err(setup_error)?);
+        }
 
         let sessions = Sessions::new(config.max_sessions);
         let check = OriginCheck::new(address, &config.allowed_hosts, &config.allowed_origins);
@@ -110,17 +114,19 @@ impl Server {
             sessions: sessions.clone(),
             shutdown: observer,
         };
-        let tasks = vec![
+        let mut tasks = vec![
             tokio::spawn(access::decide(admissions, config.access, sessions.clone())),
-            tokio::spawn(quic::serve(endpoint.clone(), backend)),
             tokio::spawn(async move {
                 if let Err(err) = web.serve(front).await {
                     tracing::error!(%err, "the HTTP server stopped");
                 }
             }),
-            tokio::spawn(renew(config.tls, identified, endpoint.clone(), fingerprint)),
+            tokio::spawn(renew(config.tls, identified, endpoints.clone(), fingerprint)),
         ];
-        Ok(Self { address, origin: cluster.origin, sessions, shutdown, endpoint, tasks })
+        for endpoint in &endpoints {
+            tasks.push(tokio::spawn(quic::serve(endpoint.clone(), backend.clone())));
+        }
+        Ok(Self { address, origin: cluster.origin, sessions, shutdown, endpoints, tasks })
     }
 
     /// The address, with the port that was chosen.
@@ -153,8 +159,10 @@ impl Server {
             while self.sessions.count() > 0 {
                 tokio::time::sleep(POLL).await;
             }
-            self.endpoint.close(noq::VarInt::from_u32(0), b"server shutdown");
-            self.endpoint.wait_idle().await;
+            for endpoint in &self.endpoints {
+                endpoint.close(noq::VarInt::from_u32(0), b"server shutdown");
+                endpoint.wait_idle().await;
+            }
             drop(self);
             // The endpoint's own task lets go of the socket when it next runs.
             while UdpSocket::bind(address).is_err() {
@@ -173,7 +181,9 @@ const POLL: Duration = Duration::from_millis(5);
 impl Drop for Server {
     fn drop(&mut self) {
         self.shutdown.start();
-        self.endpoint.close(noq::VarInt::from_u32(0), b"server stopped");
+        for endpoint in &self.endpoints {
+            endpoint.close(noq::VarInt::from_u32(0), b"server stopped");
+        }
         for task in &self.tasks {
             task.abort();
         }
@@ -239,16 +249,33 @@ fn listen_error(address: SocketAddr, protocol: &'static str, source: std::io::Er
     Error::Listen { address, protocol, source, advice }
 }
 
-fn endpoint(udp: UdpSocket, config: noq::ServerConfig) -> Result<noq::Endpoint, Failure> {
+fn endpoint(udp: UdpSocket, config: &noq::ServerConfig) -> Result<noq::Endpoint, Failure> {
     let runtime = noq::default_runtime().ok_or("no Tokio runtime")?;
-    Ok(noq::Endpoint::new(noq::EndpointConfig::default(), Some(config), udp, runtime)?)
+    Ok(noq::Endpoint::new(noq::EndpointConfig::default(), Some(config.clone()), udp, runtime)?)
+}
+
+/// `localhost` is `::1` before it is `127.0.0.1`. Over TCP clients try both, but browsers dial QUIC
+/// to the first only; so a server on IPv4 that `localhost` means listens there too, if it can.
+fn other_loopback(address: SocketAddr) -> Option<UdpSocket> {
+    let ip = address.ip();
+    if !ip.is_ipv4() || !(ip.is_loopback() || ip.is_unspecified()) {
+        return None;
+    }
+    let other = SocketAddr::from((Ipv6Addr::LOCALHOST, address.port()));
+    match moq_tokio::bind::udp(moq_tokio::bind::Udp::new(other)) {
+        Ok(udp) => Some(udp),
+        Err(err) => {
+            tracing::debug!(%other, %err, "not reachable over IPv6 loopback");
+            None
+        }
+    }
 }
 
 /// Replaces a development certificate before it expires; files are watched by `identified`.
 async fn renew(
     tls: Tls,
     mut identified: Identified,
-    endpoint: noq::Endpoint,
+    endpoints: Vec<noq::Endpoint>,
     fingerprint: Fingerprint,
 ) {
     while identified.fingerprint.is_some() {
@@ -256,7 +283,9 @@ async fn renew(
         let renewed = tls.for_quic().and_then(|new| Ok((tls::quic_config(&new)?, new)));
         match renewed {
             Ok((config, new)) => {
-                endpoint.set_server_config(Some(config));
+                for endpoint in &endpoints {
+                    endpoint.set_server_config(Some(config.clone()));
+                }
                 if let Ok(mut served) = fingerprint.write() {
                     served.clone_from(&new.fingerprint);
                 }

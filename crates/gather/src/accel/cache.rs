@@ -11,12 +11,12 @@ use super::{Accel, Kernel, MeshBvh};
 /// and drops those that the latest snapshot does not use.
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
-    rigid: HashMap<Address, Kept<()>>,
-    deforming: HashMap<(NodeId, Address), Kept<Arc<Vec<Vertices>>>>,
+    pub(super) rigid: HashMap<Address, Kept<()>>,
+    pub(super) deforming: HashMap<(NodeId, Address), Kept<Arc<Vec<Vertices>>>>,
 }
 
 #[derive(Debug)]
-struct Kept<V> {
+pub(super) struct Kept<V> {
     /// Keeps the address from being used again.
     mesh: Arc<Mesh>,
     /// What the hierarchy was last fitted to.
@@ -26,7 +26,7 @@ struct Kept<V> {
 }
 
 /// Where a mesh lies; only compared, while [`Kept`] keeps the place from being used again.
-type Address = usize;
+pub(super) type Address = usize;
 
 fn address(mesh: &Arc<Mesh>) -> Address {
     Arc::as_ptr(mesh).addr()

@@ -4,11 +4,14 @@
 //! passed in, so that it can be compiled with and without AVX2. `is_x86_feature_detected!` chooses.
 //!
 //! Boxes: the slab test with far distances widened by 1 + 2γ(3), so that rounding errs towards
-//! visiting (Ize 2013, "Robust BVH ray traversal"). Triangles: signs of the ray's Plücker product
-//! with each edge, as in Embree's robust mode. For an edge that two triangles share, both compute
-//! exact negatives, so a ray cannot slip between them.
+//! visiting (Ize 2013, "Robust BVH ray traversal"). Triangles: the vertices are sheared so that the
+//! ray becomes the z axis, and the signs of the edges' 2D cross products decide (Woop, Benthin and
+//! Wald 2013, "Watertight ray/triangle intersection"). A vertex's sheared place does not depend on
+//! the triangle, and for an edge that two triangles share both compute exact negatives (so no
+//! fused multiply-add there); zero counts as inside for both. So a ray cannot slip between them,
+//! neither at edges nor at vertices, and the paper's second try in f64 is not needed for that.
 
-use glam::{Vec3, Vec3A};
+use glam::Vec3A;
 
 use super::mesh_bvh::{Block, LANES};
 use super::wide::{LEAF, Node};
@@ -59,10 +62,13 @@ struct Entry {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setup {
     pub(super) origin: [f32; 3],
-    pub(super) direction: [f32; 3],
     pub(super) inverse: [f32; 3],
     /// Rows of [`Node::planes`] that the ray meets first.
     pub(super) near: [usize; 3],
+    /// The axes, the direction's longest last.
+    pub(super) axes: [usize; 3],
+    /// What to subtract of the last axis to shear the ray upright, and what scales t.
+    pub(super) shear: [f32; 3],
 }
 
 impl Setup {
@@ -78,7 +84,15 @@ impl Setup {
             inverse[axis] = 1.0 / safe;
             near[axis] = if safe < 0.0 { axis + 3 } else { axis };
         }
-        Self { origin, direction, inverse, near }
+        let [x, y, z] = direction.map(f32::abs);
+        let axes = match (x > y, x > z, y > z) {
+            (true, true, _) => [1, 2, 0],
+            (false, _, true) => [2, 0, 1],
+            _ => [0, 1, 2],
+        };
+        let scale = 1.0 / direction[axes[2]];
+        let shear = [direction[axes[0]] * scale, direction[axes[1]] * scale, scale];
+        Self { origin, inverse, near, axes, shear }
     }
 
     #[inline(always)]
@@ -275,29 +289,25 @@ fn boxes_portable(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
 
 fn triangles_portable(block: &Block, ray: &Setup, t_max: f32) -> TriangleHits {
     let mut hits = TriangleHits { mask: 0, t: [0.0; 8], u: [0.0; 8], v: [0.0; 8] };
-    let origin = Vec3::from_array(ray.origin);
-    let direction = Vec3::from_array(ray.direction);
+    // Sheared x and y, and z, of a corner.
     let corner = |vertex: usize, lane: usize| {
-        let c = &block.corners[vertex];
-        Vec3::new(c[0][lane], c[1][lane], c[2][lane]) - origin
+        let at = |k: usize| block.corners[vertex][ray.axes[k]][lane] - ray.origin[ray.axes[k]];
+        let z = at(2);
+        [at(0) - ray.shear[0] * z, at(1) - ray.shear[1] * z, z]
     };
     for lane in 0..LANES {
-        let [v0, v1, v2] = [corner(0, lane), corner(1, lane), corner(2, lane)];
-        let (e0, e1, e2) = (v2 - v0, v0 - v1, v1 - v2);
-        let u = e0.cross(v2 + v0).dot(direction);
-        let v = e1.cross(v0 + v1).dot(direction);
-        let w = e2.cross(v1 + v2).dot(direction);
+        let [a, b, c] = [corner(0, lane), corner(1, lane), corner(2, lane)];
+        let u = c[0] * b[1] - c[1] * b[0];
+        let v = a[0] * c[1] - a[1] * c[0];
+        let w = b[0] * a[1] - b[1] * a[0];
         let sum = u + v + w;
-        let slack = f32::EPSILON * sum.abs();
-        if !(u.min(v).min(w) >= -slack || u.max(v).max(w) <= slack) {
+        if !(u.min(v).min(w) >= 0.0 || u.max(v).max(w) <= 0.0) || sum == 0.0 {
             continue;
         }
-        let normal = e1.cross(e0);
-        let across = normal.dot(direction);
-        let t = normal.dot(v0) / across;
-        if across != 0.0 && sum != 0.0 && t > 0.0 && t <= t_max {
+        let t = (u * a[2] + v * b[2] + w * c[2]) * ray.shear[2] / sum;
+        if t > 0.0 && t <= t_max {
             hits.mask |= 1 << lane;
-            (hits.t[lane], hits.u[lane], hits.v[lane]) = (t, u / sum, v / sum);
+            (hits.t[lane], hits.u[lane], hits.v[lane]) = (t, v / sum, w / sum);
         }
     }
     hits

@@ -1,1 +1,387 @@
+use std::sync::Arc;
 
+use glam::{Affine3A, DVec3, Quat, Vec3};
+use lumencast_scene::{Instance, Mesh, MeshId, NodeId, Primitive, Snapshot, Vertices};
+
+use super::*;
+use crate::sampling::{Sampler, sphere};
+use crate::world::{World, WorldCache};
+
+fn kernels() -> Vec<Kernel> {
+    let mut kernels = vec![Kernel::Portable, Kernel::detect()];
+    kernels.dedup();
+    kernels
+}
+
+fn random(seed: u64, i: u32) -> Vec3 {
+    let mut s = Sampler::new(seed, 0, i);
+    s.square().extend(s.number())
+}
+
+fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Arc<Mesh> {
+    let vertices =
+        Vertices { normals: vec![Vec3::Y; positions.len()], positions, tangents: vec![] };
+    let primitive = Primitive { triangles, vertices, ..Primitive::default() };
+    Arc::new(Mesh { primitives: vec![primitive], ..Mesh::default() })
+}
+
+/// Small triangles strewn through the unit cube.
+fn soup(count: u32, size: f32) -> Arc<Mesh> {
+    let mut positions = Vec::new();
+    for i in 0..count {
+        let at = random(1, i);
+        positions.extend((2..5).map(|k| at + size * (random(k, i) - 0.5)));
+    }
+    let triangles = (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    mesh(positions, triangles)
+}
+
+/// A closed ball with bumps of so much of its radius; vertices are shared, so edges are bit-equal.
+fn ball(rings: u32, bumps: f32) -> Arc<Mesh> {
+    let around = 2 * rings;
+    let mut positions = vec![Vec3::Y, Vec3::NEG_Y];
+    for ring in 1..rings {
+        for k in 0..around {
+            let (p, a) = (
+                std::f32::consts::PI * ring as f32 / rings as f32,
+                std::f32::consts::TAU * k as f32 / around as f32,
+            );
+            let bump = 1.0 + bumps * (7.0 * p).sin() * (5.0 * a).cos();
+            positions.push(bump * Vec3::new(p.sin() * a.cos(), p.cos(), p.sin() * a.sin()));
+        }
+    }
+    let at = |ring: u32, k: u32| 2 + (ring - 1) * around + k % around;
+    let mut triangles = Vec::new();
+    for k in 0..around {
+        triangles.push([0, at(1, k + 1), at(1, k)]);
+        triangles.push([1, at(rings - 1, k), at(rings - 1, k + 1)]);
+        for ring in 1..rings - 1 {
+            let (a, b, c, d) = (at(ring, k), at(ring, k + 1), at(ring + 1, k), at(ring + 1, k + 1));
+            triangles.extend([[a, b, c], [b, d, c]]);
+        }
+    }
+    mesh(positions, triangles)
+}
+
+fn accel(meshes: &[(Affine3A, Arc<Mesh>)], kernel: Kernel) -> Accel {
+    let built =
+        (0..).zip(meshes).map(|(i, (m, mesh))| (i, *m, Arc::new(MeshBvh::build(mesh, None))));
+    Accel::new(built, kernel)
+}
+
+fn ray(origin: Vec3, direction: Vec3) -> Ray {
+    Ray { origin, direction, t_max: f32::INFINITY }
+}
+
+/// Distance along a ray by f64 Möller–Trumbore over every triangle.
+fn by_brute_force(meshes: &[(Affine3A, Arc<Mesh>)], ray: &Ray) -> Option<f64> {
+    let mut best: Option<f64> = None;
+    let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    for (to_world, mesh) in meshes {
+        let p = &mesh.primitives[0];
+        for t in &p.triangles {
+            let corner = |k: usize| -> DVec3 {
+                to_world.transform_point3(p.vertices.positions[t[k] as usize]).as_dvec3()
+            };
+            let (a, e1, e2) = (corner(0), corner(1) - corner(0), corner(2) - corner(0));
+            let h = d.cross(e2);
+            let det = e1.dot(h);
+            let s = (o - a) / det;
+            let (u, q) = (s.dot(h), s.cross(e1));
+            let (v, t) = (d.dot(q), e2.dot(q));
+            if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && best.is_none_or(|b| t < b) {
+                best = Some(t);
+            }
+        }
+    }
+    best
+}
+
+fn placed_soups() -> Vec<(Affine3A, Arc<Mesh>)> {
+    let soup = soup(300, 0.15);
+    let turned = Affine3A::from_scale_rotation_translation(
+        Vec3::new(1.0, -2.0, 0.5),
+        Quat::from_euler(glam::EulerRot::XYZ, 0.3, 1.0, -0.7),
+        Vec3::new(1.5, 0.2, -0.4),
+    );
+    vec![
+        (Affine3A::IDENTITY, soup.clone()),
+        (turned, soup),
+        (Affine3A::IDENTITY, mesh(vec![], vec![])),
+    ]
+}
+
+#[test]
+fn finds_what_brute_force_finds() {
+    let meshes = placed_soups();
+    for kernel in kernels() {
+        let accel = accel(&meshes, kernel);
+        let mut stack = Stack::default();
+        let (mut hits, mut differ) = (0, 0);
+        for i in 0..4000 {
+            let origin = 3.0 * random(7, i) - 1.0;
+            let ray = ray(origin, (0.1 + random(9, i).x) * (random(8, i) - origin));
+            let found = accel.closest(&ray, &mut stack, |_| true);
+            let expected = by_brute_force(&meshes, &ray);
+            hits += u32::from(found.is_some());
+            // At an edge the two may decide differently, which is rare.
+            let same = match (found, expected) {
+                (Some(hit), Some(t)) => (f64::from(hit.t) - t).abs() < 1e-4 * t.max(0.1),
+                (found, expected) => found.is_none() && expected.is_none(),
+            };
+            differ += u32::from(!same);
+            assert_eq!(accel.occluded(&ray, &mut stack, |_| true), found.is_some());
+            if let Some(hit) = found {
+                let before = Ray { t_max: hit.t * 0.9999, ..ray };
+                assert_eq!(
+                    accel.closest(&before, &mut stack, |_| true),
+                    None,
+                    "nothing lies before the nearest"
+                );
+            }
+        }
+        assert!(hits > 1000 && differ <= 2, "{kernel:?}: {hits} hits, {differ} differ");
+    }
+}
+
+#[test]
+fn kernels_agree() {
+    let meshes = placed_soups();
+    let all: Vec<_> = kernels().into_iter().map(|k| accel(&meshes, k)).collect();
+    let mut stack = Stack::default();
+    for i in 0..4000 {
+        let ray = ray(3.0 * random(7, i) - 1.0, sphere(random(8, i).truncate()));
+        let hits: Vec<_> = all.iter().map(|a| a.closest(&ray, &mut stack, |_| true)).collect();
+        for pair in hits.windows(2) {
+            match (pair[0], pair[1]) {
+                (Some(a), Some(b)) => {
+                    assert_eq!(
+                        (a.instance, a.primitive, a.triangle),
+                        (b.instance, b.primitive, b.triangle)
+                    );
+                    assert!((a.t - b.t).abs() <= 1e-4 * a.t && (a.u - b.u).abs() < 1e-3);
+                }
+                (a, b) => assert_eq!(a, b),
+            }
+        }
+    }
+}
+
+#[test]
+fn refused_hits_let_the_next_one_through() {
+    let at = |y: f32| [Vec3::new(-1.0, y, -1.0), Vec3::new(3.0, y, -1.0), Vec3::new(-1.0, y, 3.0)];
+    let positions = (0..20).flat_map(|k| at(k as f32)).collect();
+    let layers = mesh(positions, (0..20).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect());
+    for kernel in kernels() {
+        let accel = accel(&[(Affine3A::IDENTITY, layers.clone())], kernel);
+        let mut stack = Stack::default();
+        for passed in 0..20 {
+            let down = ray(Vec3::new(0.0, 20.0, 0.0), Vec3::NEG_Y);
+            let hit = accel.closest(&down, &mut stack, |h| h.triangle < 20 - passed);
+            assert_eq!(hit.map(|h| h.triangle), Some(19 - passed));
+        }
+    }
+}
+
+/// From inside a closed mesh no ray gets out, wherever it is aimed; most are aimed at edges and
+/// vertices. Axis-parallel rays, which have zeros in their directions, are among them.
+#[test]
+fn closed_meshes_leak_nowhere() {
+    let ball = ball(24, 0.1);
+    let far = Affine3A::from_scale_rotation_translation(
+        Vec3::splat(3.0),
+        Quat::from_rotation_y(0.4),
+        Vec3::new(500.0, -200.0, 900.0),
+    );
+    for (to_world, kernel) in
+        kernels().into_iter().flat_map(|k| [(Affine3A::IDENTITY, k), (far, k)])
+    {
+        let accel = accel(&[(to_world, ball.clone())], kernel);
+        let mut stack = Stack::default();
+        let p = &ball.primitives[0];
+        for (i, t) in (0..).zip(&p.triangles) {
+            let [a, b, c] = t.map(|k| to_world.transform_point3(p.vertices.positions[k as usize]));
+            for origin in [Vec3::ZERO, 0.2 * random(3, i)].map(|o| to_world.transform_point3(o)) {
+                for w in [0.0, 0.5, random(4, i).x, 1.0] {
+                    for target in [a.lerp(b, w), b.lerp(c, w), c.lerp(a, w)] {
+                        let ray = ray(origin, target - origin);
+                        assert!(
+                            accel.closest(&ray, &mut stack, |_| true).is_some(),
+                            "{kernel:?} {i} {ray:?}"
+                        );
+                    }
+                }
+            }
+        }
+        let center = to_world.transform_point3(Vec3::ZERO);
+        for axis in Vec3::AXES {
+            for direction in [axis, -axis] {
+                assert!(accel.occluded(&ray(center, direction), &mut stack, |_| true));
+            }
+        }
+    }
+}
+
+/// A mesh whose triangles do not share bit-equal edges does leak, so the test above can fail.
+#[test]
+fn a_gap_of_a_millionth_is_found() {
+    let mut ball = (*ball(24, 0.1)).clone();
+    let p = &mut ball.primitives[0];
+    let corners: Vec<Vec3> =
+        p.triangles.iter().flatten().map(|&i| p.vertices.positions[i as usize]).collect();
+    p.vertices.positions = corners
+        .chunks(3)
+        .flat_map(|t| {
+            let m = (t[0] + t[1] + t[2]) / 3.0;
+            [0, 1, 2].map(|k| t[k].lerp(m, 1e-5))
+        })
+        .collect();
+    p.triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let accel = accel(&[(Affine3A::IDENTITY, Arc::new(ball))], Kernel::detect());
+    let mut stack = Stack::default();
+    let leaks = corners
+        .chunks(3)
+        .filter(|t| !accel.occluded(&ray(Vec3::ZERO, 0.5 * (t[0] + t[1])), &mut stack, |_| true))
+        .count();
+    assert!(leaks > 0);
+}
+
+#[test]
+fn degenerate_input_is_harmless() {
+    let same = mesh(vec![Vec3::ONE; 3], vec![[0, 1, 2]; 100]);
+    let mut positions: Vec<_> =
+        (0..300).map(|i| Vec3::splat(2.0f32.powi(i / 3 - 50)) * random(1, i as u32)).collect();
+    positions[5] = Vec3::new(f32::NAN, 0.0, 0.0);
+    positions[9] = Vec3::new(f32::INFINITY, 0.0, 0.0);
+    let wild = mesh(positions, (0..100).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect());
+    for kernel in kernels() {
+        let accel = accel(
+            &[(Affine3A::IDENTITY, same.clone()), (Affine3A::IDENTITY, wild.clone())],
+            kernel,
+        );
+        let mut stack = Stack::default();
+        for i in 0..500 {
+            for direction in
+                [sphere(random(2, i).truncate()), Vec3::X, Vec3::ZERO, Vec3::splat(f32::NAN)]
+            {
+                let hit = accel.closest(&ray(random(3, i), direction), &mut stack, |_| true);
+                assert!(hit.is_none_or(|h| h.instance == 1 && h.t > 0.0));
+            }
+        }
+    }
+    let nothing = accel(&[], Kernel::detect());
+    assert!(nothing.bounds().is_empty());
+    assert!(!nothing.occluded(&ray(Vec3::ZERO, Vec3::X), &mut Stack::default(), |_| true));
+}
+
+#[test]
+fn refitted_is_as_good_as_rebuilt() {
+    let mesh = soup(500, 0.1);
+    let rest = &mesh.primitives[0].vertices;
+    // A gentle wave refits; scattering everything makes it rebuild. Both must trace alike.
+    for strength in [0.05, 20.0] {
+        let positions: Vec<_> = (0..)
+            .zip(&rest.positions)
+            .map(|(i, p)| p + strength * (random(6, i / 3) - 0.5))
+            .collect();
+        let moved = vec![Vertices { positions, ..rest.clone() }];
+        let mut refitted = MeshBvh::build(&mesh, None);
+        refitted.refit(&mesh, &moved);
+        let rebuilt = MeshBvh::build(&mesh, Some(&moved));
+        assert_eq!(refitted.bounds(), rebuilt.bounds());
+        let accel = |bvh| Accel::new([(0, Affine3A::IDENTITY, Arc::new(bvh))], Kernel::detect());
+        let (a, b) = (accel(refitted), accel(rebuilt));
+        let mut stack = Stack::default();
+        for i in 0..2000 {
+            let ray = ray(random(7, i) * strength.max(1.0), sphere(random(8, i).truncate()));
+            let [a, b] = [&a, &b].map(|x| x.closest(&ray, &mut stack, |_| true));
+            assert_eq!(a.map(|h| h.triangle), b.map(|h| h.triangle));
+        }
+    }
+}
+
+#[test]
+fn cache_keeps_what_has_not_changed() {
+    let mesh = soup(50, 0.2);
+    let vertices = Arc::new(vec![mesh.primitives[0].vertices.clone()]);
+    let instance = |node, deformed| Instance {
+        node: NodeId(node),
+        mesh_id: MeshId(0),
+        mesh: mesh.clone(),
+        deformed,
+        world_from_object: Affine3A::IDENTITY,
+    };
+    let snapshot = |instances| Snapshot {
+        version: 0,
+        time: 0.0,
+        instances,
+        materials: Arc::new([]),
+        lights: vec![],
+        environment: Default::default(),
+    };
+    let mut cache = AccelCache::default();
+    let mut update = |s: &Snapshot| {
+        let accel = cache.update(s, Kernel::detect());
+        accel.placed.iter().map(|p| Arc::as_ptr(&p.bvh)).collect::<Vec<_>>()
+    };
+    let both =
+        snapshot(vec![instance(0, None), instance(1, None), instance(2, Some(vertices.clone()))]);
+    let first = update(&both);
+    assert_eq!(first[0], first[1], "two instances of a mesh share its hierarchy");
+    assert_ne!(first[0], first[2]);
+    assert_eq!(update(&both), first);
+    let moved = snapshot(vec![instance(0, None), instance(2, Some(Arc::new((*vertices).clone())))]);
+    assert_eq!(update(&moved)[0], first[0]);
+    update(&snapshot(vec![]));
+    assert!(cache.rigid.is_empty() && cache.deforming.is_empty());
+}
+
+/// Rays that leave a surface do not meet it again, at any scale and place.
+#[test]
+fn surfaces_do_not_shade_themselves() {
+    let ball = ball(16, 0.0);
+    for (scale, place) in
+        [(1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1.0, 1e3), (0.01, 10.0), (100.0, 1e4)]
+    {
+        let world_from_object = Affine3A::from_scale_rotation_translation(
+            Vec3::new(1.0, 0.7, -1.3) * scale,
+            Quat::from_rotation_z(0.7),
+            Vec3::new(place, -0.3 * place, 0.7 * place),
+        );
+        let instance = Instance {
+            node: NodeId(0),
+            mesh_id: MeshId(0),
+            mesh: ball.clone(),
+            deformed: None,
+            world_from_object,
+        };
+        let snapshot = Arc::new(Snapshot {
+            version: 0,
+            time: 0.0,
+            instances: vec![instance],
+            materials: Arc::new([]),
+            lights: vec![],
+            environment: Default::default(),
+        });
+        let world =
+            World::new(snapshot, Default::default(), Kernel::detect(), &mut WorldCache::default());
+        let center = world_from_object.transform_point3(Vec3::ZERO);
+        let mut stack = Stack::default();
+        for i in 0..3000 {
+            let direction = sphere(random(8, i).truncate());
+            // From outside, where the ball is convex: nothing lies ahead.
+            let from_outside = ray(center + direction * 4.0 * scale, -direction);
+            let Some(hit) = world.closest(&from_outside, None, 0, &mut stack) else { continue };
+            let Some(point) = world.point(hit, from_outside.direction) else { continue };
+            let away = (point.normal + 0.99 * sphere(random(9, i).truncate())).normalize();
+            // No identity given: only the offset protects.
+            let leaving = ray(point.leave(away), away);
+            assert!(!world.occluded(&leaving, [None, None], 0, &mut stack), "{scale} {place} {i}");
+            let moved = (point.leave(away) - point.position).length();
+            assert!(
+                moved < 3e-5 * (scale + place),
+                "offset {moved} at scale {scale}, place {place}"
+            );
+        }
+    }
+}

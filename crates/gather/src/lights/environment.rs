@@ -140,7 +140,8 @@ fn table(image: &HdrImage) -> Grid2 {
 fn picture_from_direction(d: Vec3, turn: f32) -> Vec2 {
     // A turn by +φ about +Y takes atan2(x, −z) to itself less φ.
     let u = 0.5 + d.x.atan2(-d.z) / TAU + turn;
-    Vec2::new(u - u.floor(), d.y.clamp(-1.0, 1.0).acos() * FRAC_1_PI)
+    // acos(y), but with all its digits near the poles too.
+    Vec2::new(u - u.floor(), d.x.hypot(d.z).atan2(d.y) * FRAC_1_PI)
 }
 
 fn direction_from_picture(at: Vec2, turn: f32) -> Vec3 {

@@ -2,6 +2,8 @@
 
 mod integrator;
 mod job;
+#[cfg(test)]
+mod tests;
 
 use std::collections::HashMap;
 use std::num::NonZeroUsize;

@@ -85,6 +85,7 @@ export function decodeRegion(
     }
     decodeProbe(coder, values, start, n, STEPS[steps[probe] + MAX_STEP]);
   }
+  if (coder.overrun) throw new WireError('truncated', 'the payload ends too early');
   if (!coder.atEnd) throw new WireError('malformed', 'bytes after the end');
   return region;
 }

@@ -11,6 +11,9 @@ const SHARE = { bad: 0.75, good: 0.95 } as const;
 /** Seconds for which the least delay is remembered. */
 const MEMORY = 60;
 
+/** Seconds a second by which the delay falls, at least, where a queue drains. */
+const DRAIN = 0.05;
+
 /** Updates of each layer among four: layer 0 every fourth, 1 another fourth, 2 the odd ones. */
 const PER_FOUR = [1, 2, 4] as const;
 
@@ -112,9 +115,14 @@ export class LayerControl {
     }
     const least = Math.min(this.least, this.leastBefore);
     const sorted = this.delays.toSorted((a, b) => a - b);
+    const before = this.excess ?? 0;
     this.excess = Math.max(0, sorted[sorted.length >> 1] - least);
     const share = this.share();
-    if (this.excess > Math.max(3 * tick, 0.15) || share < SHARE.bad) return 'bad';
+    if (share < SHARE.bad) return 'bad';
+    if (this.excess > Math.max(3 * tick, 0.15)) {
+      // A queue that drains, built up before the last drop, is no reason for another.
+      return before - this.excess > DRAIN * this.window ? 'fair' : 'bad';
+    }
     return this.excess < Math.max(1.5 * tick, 0.08) && share > SHARE.good ? 'good' : 'fair';
   }
 

@@ -1,0 +1,332 @@
+//! The catalog: what a server offers (docs/wire.md, "Catalog").
+
+use std::collections::HashSet;
+use std::fmt;
+use std::str::FromStr;
+
+use glam::{IVec3, Quat};
+use lumencast_light::{Grid, Order};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::{DecodeError, Region, VERSION, limits};
+
+/// A run of a server: new at every start. In JSON 16 hexadecimal digits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Epoch(pub u64);
+
+impl fmt::Display for Epoch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:016x}", self.0)
+    }
+}
+
+impl FromStr for Epoch {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        if text.len() != 16 || !text.bytes().all(|b| b.is_ascii_hexdigit()) {
+            return Err("an epoch is 16 hexadecimal digits");
+        }
+        u64::from_str_radix(text, 16).map(Self).map_err(|_| "an epoch is 16 hexadecimal digits")
+    }
+}
+
+impl TryFrom<String> for Epoch {
+    type Error = &'static str;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        text.parse()
+    }
+}
+
+impl From<Epoch> for String {
+    fn from(epoch: Epoch) -> Self {
+        epoch.to_string()
+    }
+}
+
+/// What a server offers: a scene and its light fields.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Catalog {
+    /// The server's run.
+    pub epoch: Epoch,
+    /// The scene.
+    pub scene: SceneInfo,
+    /// Length of a tick, seconds.
+    pub tick_seconds: f64,
+    /// The fields. Kinds that this program does not know are left out when a catalog is decoded.
+    pub fields: Vec<Field>,
+}
+
+/// Where clients find the scene.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SceneInfo {
+    /// Its name, which is the broadcast's too.
+    pub name: String,
+    /// Its glTF file under `/scene/` of the server's HTTP address.
+    pub root: String,
+}
+
+/// A light field: a volume of probes, the one kind there is so far.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Field {
+    /// Its number within the scene.
+    pub id: u32,
+    /// Order of the spherical harmonics.
+    pub order: Order,
+    /// Which instances it is for.
+    #[serde(rename = "use")]
+    pub usage: Use,
+    /// Where the probes are.
+    pub grid: Grid,
+    /// Absolute integer coordinates of the grid's first cell; 0 unless the volume scrolls.
+    #[serde(default)]
+    pub cells_min: IVec3,
+    /// Boxes of cells that together cover the grid, without overlap.
+    pub regions: Vec<Region>,
+    /// Temporal layers, 1 to 3.
+    pub layers: u8,
+}
+
+/// Which instances a field is for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Use {
+    /// Those that never move.
+    Static,
+    /// Those that move.
+    Moving,
+    /// All.
+    #[default]
+    All,
+}
+
+/// A catalog with its fields not yet looked into.
+#[derive(Serialize, Deserialize)]
+struct Frame<F> {
+    lumencast: Value,
+    epoch: Epoch,
+    scene: SceneInfo,
+    tick_seconds: f64,
+    fields: Vec<F>,
+}
+
+/// A field with what says how to read it.
+#[derive(Serialize)]
+struct KindOf<'a> {
+    kind: &'static str,
+    basis: &'static str,
+    #[serde(flatten)]
+    field: &'a Field,
+}
+
+impl Catalog {
+    /// The catalog as a frame.
+    pub fn encode(&self) -> Vec<u8> {
+        let fields =
+            self.fields.iter().map(|field| KindOf { kind: "volume", basis: "sh", field }).collect();
+        let frame = Frame {
+            lumencast: VERSION.into(),
+            epoch: self.epoch,
+            scene: self.scene.clone(),
+            tick_seconds: self.tick_seconds,
+            fields,
+        };
+        serde_json::to_vec(&frame).expect("numbers, text and lists have a JSON form")
+    }
+
+    /// Reads a frame of the `catalog` track. Fields of unknown kinds are left out.
+    ///
+    /// # Errors
+    /// [`DecodeError::Version`] when the server speaks another version; others when the bytes are
+    /// no catalog, exceed a limit or contradict themselves.
+    pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        DecodeError::limit("bytes of a frame", bytes.len(), limits::FRAME_BYTES)?;
+        let value: Value = json(serde_json::from_slice(bytes))?;
+        // The version comes first: of another version's catalog nothing else can be expected.
+        match value.get("lumencast").and_then(Value::as_u64) {
+            Some(VERSION) => {}
+            Some(other) => return Err(DecodeError::Version(other)),
+            None => return Err(DecodeError::Malformed("no number under lumencast")),
+        }
+        let frame: Frame<Value> = json(serde_json::from_value(value))?;
+        DecodeError::limit("fields of a catalog", frame.fields.len(), limits::FIELDS)?;
+        if !(1e-4..=3600.0).contains(&frame.tick_seconds) {
+            return Err(DecodeError::Malformed("tick_seconds"));
+        }
+        let fields = frame
+            .fields
+            .into_iter()
+            .filter(|field| field["kind"] == "volume" && field["basis"] == "sh")
+            .map(|field| json(serde_json::from_value::<Field>(field)).and_then(Field::validated))
+            .collect::<Result<Vec<_>, _>>()?;
+        let ids: HashSet<u32> = fields.iter().map(|field| field.id).collect();
+        if ids.len() < fields.len() {
+            return Err(DecodeError::Malformed("two fields have the same id"));
+        }
+        let probes = fields.iter().map(|field| field.grid.probe_count()).sum();
+        DecodeError::limit("probes of all fields", probes, limits::CATALOG_PROBES)?;
+        Ok(Self {
+            epoch: frame.epoch,
+            scene: frame.scene,
+            tick_seconds: frame.tick_seconds,
+            fields,
+        })
+    }
+
+    /// The field of a number.
+    pub fn field(&self, id: u32) -> Option<&Field> {
+        self.fields.iter().find(|field| field.id == id)
+    }
+}
+
+impl Field {
+    /// The region of a number.
+    pub fn region(&self, id: u32) -> Option<Region> {
+        self.regions.iter().copied().find(|region| region.id == id)
+    }
+
+    fn validated(mut self) -> Result<Self, DecodeError> {
+        let Grid { center, rotation, size, resolution } = self.grid;
+        let probes = u128::from(resolution.x) * u128::from(resolution.y) * u128::from(resolution.z);
+        if probes == 0 {
+            return Err(DecodeError::Malformed("a grid without cells"));
+        }
+        let probes = usize::try_from(probes).unwrap_or(usize::MAX);
+        DecodeError::limit("probes of a field", probes, limits::FIELD_PROBES)?;
+        if !(center.is_finite() && size.is_finite() && size.min_element() > 0.0) {
+            return Err(DecodeError::Malformed("a grid's center or size"));
+        }
+        if (rotation.length() - 1.0).abs() >= 1e-3 || !rotation.is_finite() {
+            return Err(DecodeError::Malformed("a grid's rotation is no unit quaternion"));
+        }
+        if rotation != Quat::IDENTITY {
+            self.grid.rotation = rotation.normalize();
+        }
+        if !(1..=3).contains(&self.layers) {
+            return Err(DecodeError::Malformed("layers"));
+        }
+        self.check_regions()?;
+        Ok(self)
+    }
+
+    /// Regions must cover the grid without overlap.
+    fn check_regions(&self) -> Result<(), DecodeError> {
+        DecodeError::limit("regions of a field", self.regions.len(), limits::REGIONS)?;
+        let ids: HashSet<u32> = self.regions.iter().map(|region| region.id).collect();
+        if ids.len() < self.regions.len() {
+            return Err(DecodeError::Malformed("two regions have the same id"));
+        }
+        let resolution = self.grid.resolution;
+        let mut covered = vec![false; self.grid.probe_count()];
+        for region in &self.regions {
+            let cells = region.size.max_element() as usize;
+            DecodeError::limit(
+                "cells of a region along an axis",
+                cells,
+                limits::REGION_CELLS as usize,
+            )?;
+            if region.size.min_element() == 0
+                || region.min.cmpgt(resolution).any()
+                || (resolution - region.min).cmplt(region.size).any()
+            {
+                return Err(DecodeError::Malformed("a region is empty or lies outside its grid"));
+            }
+            for probe in region.probes(resolution) {
+                if std::mem::replace(&mut covered[probe], true) {
+                    return Err(DecodeError::Malformed("two regions overlap"));
+                }
+            }
+        }
+        if covered.contains(&false) {
+            return Err(DecodeError::Malformed("the regions do not cover the grid"));
+        }
+        Ok(())
+    }
+}
+
+/// A JSON error as ours.
+pub(crate) fn json<T>(result: serde_json::Result<T>) -> Result<T, DecodeError> {
+    result.map_err(|error| DecodeError::Json(error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{UVec3, Vec3};
+    use serde_json::json;
+
+    fn catalog() -> Catalog {
+        let grid = Grid {
+            center: Vec3::new(0.5, 0.1, -2.0),
+            rotation: Quat::IDENTITY,
+            size: Vec3::new(8.0, 6.0, 4.0),
+            resolution: UVec3::new(12, 6, 7),
+        };
+        Catalog {
+            epoch: Epoch(0x9F0C_0000_0000_0001),
+            scene: SceneInfo { name: "sponza".into(), root: "Sponza.glb".into() },
+            tick_seconds: 0.04,
+            fields: vec![Field {
+                id: 3,
+                order: Order::L2,
+                usage: Use::All,
+                grid,
+                cells_min: IVec3::ZERO,
+                regions: crate::regions(grid.resolution),
+                layers: 3,
+            }],
+        }
+    }
+
+    #[test]
+    fn catalogs_round_trip() {
+        assert_eq!(Catalog::decode(&catalog().encode()), Ok(catalog()));
+    }
+
+    #[test]
+    fn unknown_kinds_and_members_are_skipped() {
+        let mut value: Value = serde_json::from_slice(&catalog().encode()).unwrap();
+        value["weather"] = json!("fine");
+        value["fields"][0]["colour"] = json!("red");
+        value["fields"].as_array_mut().unwrap().push(json!({ "kind": "hologram", "id": [] }));
+        assert_eq!(Catalog::decode(value.to_string().as_bytes()), Ok(catalog()));
+    }
+
+    #[test]
+    fn contradictions_and_excesses_are_refused() {
+        let cases: [(&str, Value, &str); 16] = [
+            ("/lumencast", json!(2), "version"),
+            ("/lumencast", json!("1"), "malformed"),
+            ("/epoch", json!(null), "json"),
+            ("/epoch", json!("12"), "json"),
+            ("/tick_seconds", json!(0), "malformed"),
+            ("/fields/0/order", json!(5), "json"),
+            ("/fields/0/layers", json!(4), "malformed"),
+            ("/fields/0/grid/resolution", json!([0, 6, 7]), "malformed"),
+            (
+                "/fields/0/grid/resolution",
+                json!([4_294_967_295_u32, 4_294_967_295_u32, 4_294_967_295_u32]),
+                "limit",
+            ),
+            ("/fields/0/grid/resolution", json!([13, 6, 7]), "malformed"),
+            ("/fields/0/grid/size", json!([8, -6, 4]), "malformed"),
+            ("/fields/0/grid/center", json!([1e39, 0, 0]), "malformed"),
+            ("/fields/0/grid/rotation", json!([0, 0, 0, 2]), "malformed"),
+            ("/fields/0/regions/1/min", json!([5, 0, 0]), "malformed"),
+            ("/fields/0/regions/1/min", json!([4_294_967_295_u32, 0, 0]), "malformed"),
+            ("/fields/0/regions/1/size", json!([17, 6, 7]), "limit"),
+        ];
+        for (place, wrong, kind) in cases {
+            let mut value: Value = serde_json::from_slice(&catalog().encode()).unwrap();
+            *value.pointer_mut(place).unwrap() = wrong;
+            let error = Catalog::decode(value.to_string().as_bytes());
+            assert_eq!(error.map_err(|e| e.kind()), Err(kind), "{place}");
+        }
+        let mut twice = catalog();
+        twice.fields.push(twice.fields[0].clone());
+        assert!(Catalog::decode(&twice.encode()).is_err());
+    }
+}

@@ -1,0 +1,312 @@
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+use glam::Vec3;
+use lumencast_light::Order;
+use lumencast_scene::{Environment, HdrImage, Light, LightKind, Material, Snapshot};
+use lumencast_testkit::scenes::{Stage, lambert};
+
+use super::integrator::Integrator;
+use super::*;
+use crate::Receiver as Probe;
+use crate::accel::Stack;
+use crate::sampling::Sampler;
+
+const BLACK: Vec3 = Vec3::ZERO;
+
+/// Mean radiance seen along one ray, and its standard error, over independent groups of samples.
+fn look(
+    scene: &Arc<Snapshot>,
+    origin: Vec3,
+    direction: Vec3,
+    bounces: u32,
+    clamp: f32,
+) -> (Vec3, Vec3) {
+    let world = World::new(
+        scene.clone(),
+        MaterialModel::Full,
+        Kernel::detect(),
+        &mut WorldCache::default(),
+    );
+    let mut integrator =
+        Integrator { world: &world, bounces, clamp, stack: Stack::default(), rays: 0 };
+    let (groups, samples) = (32, 512);
+    let means: Vec<Vec3> = (0..groups)
+        .map(|group| {
+            let one =
+                |s| integrator.radiance(origin, direction, &mut Sampler::new(4, group, s)).radiance;
+            (0..samples).map(one).sum::<Vec3>() / samples as f32
+        })
+        .collect();
+    let mean = means.iter().sum::<Vec3>() / groups as f32;
+    let variance =
+        means.iter().map(|m| (m - mean) * (m - mean)).sum::<Vec3>() / (groups - 1) as f32;
+    (mean, (variance / groups as f32).map(f32::sqrt))
+}
+
+#[track_caller]
+fn check((mean, error): (Vec3, Vec3), expected: Vec3, wrong: Vec3) {
+    let tolerance = 5.0 * error + 2e-4 * expected.max_element();
+    assert!(
+        (mean - expected).abs().cmple(tolerance).all(),
+        "{mean} ± {error}, expected {expected}"
+    );
+    assert!(
+        !(mean - wrong).abs().cmple(tolerance).all(),
+        "this check takes {wrong} too: ± {error}"
+    );
+}
+
+fn down() -> Vec3 {
+    Vec3::new(0.3, -1.0, 0.2).normalize()
+}
+
+/// A plane at y = 0 under the ray from (0, 1, 0) along `down`, and where the ray meets it.
+fn floor(stage: &mut Stage, material: Material) -> Vec3 {
+    let material = stage.material(material);
+    stage.quad(Vec3::new(-50.0, 0.0, 50.0), Vec3::X * 100.0, Vec3::NEG_Z * 100.0, material);
+    Vec3::new(0.3, 0.0, 0.2)
+}
+
+fn look_down(stage: &Stage, bounces: u32) -> (Vec3, Vec3) {
+    look(&stage.snapshot(), Vec3::Y, down(), bounces, f32::INFINITY)
+}
+
+/// Form factor from a point to a rectangle parallel to its surface with one corner above it
+/// (Howell, configuration C-11).
+fn corner_form_factor(x: f32, y: f32) -> f32 {
+    let part = |x: f32, y: f32| x / (1.0 + x * x).sqrt() * (y / (1.0 + x * x).sqrt()).atan();
+    (part(x, y) + part(y, x)) / (2.0 * PI)
+}
+
+#[test]
+fn rectangle_over_a_lambert_plane() {
+    let (albedo, emission) = (Vec3::new(0.8, 0.5, 0.2), Vec3::new(3.0, 2.0, 1.0));
+    let (a, b, height) = (0.4, 0.7, 0.5);
+    // Above the ray's start, so that the ray does not meet it.
+    let mut stage = Stage::default();
+    let at = floor(&mut stage, lambert(albedo, BLACK)) + (1.0 + height) * Vec3::Y;
+    let lamp = stage.material(lambert(BLACK, emission));
+    stage.quad(at - Vec3::new(a, 0.0, b), 2.0 * a * Vec3::X, 2.0 * b * Vec3::Z, lamp);
+    let form = 4.0 * corner_form_factor(a / (1.0 + height), b / (1.0 + height));
+    let expected = albedo * emission * form;
+    let solid = 4.0 * a * b / (1.0 + height).powi(2) / PI;
+    check(look_down(&stage, 1), expected, albedo * emission * solid);
+}
+
+#[test]
+fn point_light_falls_by_cosine_and_square() {
+    let albedo = Vec3::splat(0.5);
+    let mut stage = Stage::default();
+    let at = floor(&mut stage, lambert(albedo, BLACK));
+    let light = Light { kind: LightKind::Point, color: Vec3::ONE, intensity: 20.0, range: None };
+    let place = Vec3::new(1.5, 2.0, -0.5);
+    stage.light(light, place, Vec3::X);
+    let d = place - at;
+    let without_cosine = albedo / PI * 20.0 / d.length_squared();
+    check(look_down(&stage, 1), without_cosine * d.normalize().y, without_cosine);
+}
+
+/// Rough and smooth metals and dielectrics in a closed emitting room, direct light only: chance,
+/// next-event estimation and both together must agree. A room is the hardest case for the weights,
+/// since every direction can be found both ways.
+#[test]
+fn both_ways_of_finding_light_together_count_once() {
+    for (metallic, roughness) in [(1.0, 0.1), (1.0, 0.6), (0.0, 0.4)] {
+        let glossy = Material { metallic, roughness, double_sided: true, ..Material::default() };
+        let emission = Vec3::splat(2.0);
+        let mut room = Stage::default();
+        floor(&mut room, glossy.clone());
+        let walls = room.material(lambert(BLACK, emission));
+        room.room(Vec3::new(0.0, 45.0, 0.0), Vec3::splat(98.0), walls);
+        // The same light from a constant environment, which only chance finds.
+        let mut open = Stage::default();
+        floor(&mut open, glossy.clone());
+        open.environment(Environment::Constant { radiance: emission });
+        let (expected, error) = look_down(&open, 1);
+        let (mean, e) = look_down(&room, 1);
+        let tolerance = 5.0 * (e * e + error * error).map(f32::sqrt) + 2e-3 * expected;
+        assert!(
+            (mean - expected).abs().cmple(tolerance).all(),
+            "{metallic} {roughness}: {mean} ± {e}, {expected} ± {error}"
+        );
+        assert!((mean - 1.1 * expected).abs().cmpgt(tolerance).all(), "too coarse a check");
+    }
+}
+
+/// A picture of a sun in a dim sky, over Lambert: ∫ L cos dω/π by quadrature.
+#[test]
+fn picture_of_a_sun_over_a_lambert_plane() {
+    let (width, height) = (64u32, 32u32);
+    let mut texels = vec![Vec3::splat(0.1); (width * height) as usize];
+    texels[(6 * width + 40) as usize] = Vec3::splat(3000.0);
+    let mut irradiance = 0.0;
+    for (k, t) in texels.iter().enumerate().take((width * height / 2) as usize) {
+        let (top, bottom) = (k as u32 / width, k as u32 / width + 1);
+        let sin2 = |row: u32| (PI * row as f32 / height as f32).sin().powi(2);
+        // ∫ cos θ sin θ dθ dφ over the texel.
+        irradiance += t.x * (sin2(bottom) - sin2(top)) / 2.0 * 2.0 * PI / width as f32;
+    }
+    let image = Some(Arc::new(HdrImage { width, height, texels }));
+    let mut stage = Stage::default();
+    floor(&mut stage, lambert(Vec3::splat(0.7), BLACK));
+    stage.environment(Environment::Image {
+        uri: String::new(),
+        intensity: 1.0,
+        rotation: 0.3,
+        image,
+    });
+    let expected = Vec3::splat(0.7 * irradiance / PI);
+    check(look_down(&stage, 1), expected, 1.02 * expected);
+}
+
+#[test]
+fn clamp_holds_scattered_light_and_leaves_the_rest() {
+    let mut stage = Stage::default();
+    floor(&mut stage, lambert(Vec3::ONE, Vec3::splat(100.0)));
+    let sun = Light { kind: LightKind::Directional, color: Vec3::ONE, intensity: 1e5, range: None };
+    stage.light(sun, BLACK, Vec3::NEG_Y);
+    let (mean, _) = look(&stage.snapshot(), Vec3::Y, down(), 1, 7.0);
+    assert!((mean - Vec3::splat(107.0)).abs().max_element() < 1e-3, "{mean}");
+}
+
+/// Thin glass: what it lets through is behind it, undeviated.
+#[test]
+fn thin_glass_shows_what_is_behind() {
+    let mut stage = Stage::default();
+    let glass =
+        Material { metallic: 0.0, roughness: 0.0, transmission: 1.0, ..Material::default() };
+    floor(&mut stage, glass);
+    let (sky, ground) = (Vec3::splat(1.0), Vec3::new(0.0, 3.0, 0.0));
+    stage.environment(Environment::Sky { zenith: sky, horizon: ground, ground });
+    let cos = -down().y;
+    let fresnel = 0.04 + 0.96 * (1.0 - cos).powi(5);
+    // Mirrored upwards it sees the gradient at sin(elevation) = cos.
+    let expected = (1.0 - fresnel) * ground + fresnel * ground.lerp(sky, cos);
+    check(look_down(&stage, 1), expected, ground);
+}
+
+/// Directions that the normal map's normal allows and the triangle does not carry no light.
+#[test]
+fn shading_normals_make_no_light() {
+    use lumencast_scene::{Image, TextureRef};
+    let slanted =
+        Image { name: String::new(), width: 1, height: 1, texels: vec![[240, 128, 170, 255]] };
+    let map = TextureRef {
+        image: Arc::new(slanted),
+        tex_coord: 0,
+        texture_from_mesh: glam::Affine2::IDENTITY,
+        wrap: Default::default(),
+        filter: Default::default(),
+    };
+    let mut stage = Stage::default();
+    floor(&mut stage, Material { normal_texture: Some(map), ..lambert(Vec3::ONE, BLACK) });
+    stage.environment(Environment::Sky { zenith: BLACK, horizon: BLACK, ground: Vec3::splat(1e3) });
+    let (mean, _) = look_down(&stage, 1);
+    assert_eq!(mean, BLACK);
+}
+
+fn job(scene: &Arc<Snapshot>, seed: u64) -> Job {
+    let probe =
+        |k: u32| Probe { position: Vec3::new(0.1 * k as f32, 0.5, 0.0), samples: 1 + 40 * k };
+    Job {
+        scene: scene.clone(),
+        receivers: (0..9).map(probe).collect(),
+        order: Order::L3,
+        bounces: 2,
+        clamp: f32::INFINITY,
+        seed,
+    }
+}
+
+fn lit_room() -> Arc<Snapshot> {
+    let mut stage = Stage::default();
+    let wall = stage.material(Material {
+        metallic: 0.3,
+        roughness: 0.5,
+        ..lambert(Vec3::splat(0.7), Vec3::splat(0.1))
+    });
+    stage.room(BLACK, Vec3::splat(4.0), wall).sphere(Vec3::new(0.0, -1.0, 0.0), 0.5, 12, wall);
+    let light = Light { kind: LightKind::Point, color: Vec3::ONE, intensity: 3.0, range: None };
+    stage.light(light, Vec3::new(1.0, 1.0, 1.0), Vec3::X);
+    stage.snapshot()
+}
+
+fn tracer(threads: usize) -> CpuPathTracer {
+    CpuPathTracer::new(Options { threads: NonZeroUsize::new(threads), ..Options::default() })
+        .unwrap()
+}
+
+#[test]
+fn results_do_not_depend_on_threads() {
+    let scene = lit_room();
+    let gather = |threads, seed| {
+        let mut tracer = tracer(threads);
+        let ticket = tracer.submit(job(&scene, seed));
+        tracer.wait(ticket).unwrap().sums
+    };
+    let one = gather(1, 5);
+    assert_eq!(one, gather(3, 5));
+    assert_ne!(one, gather(3, 6));
+    assert!(one.iter().zip(0..).all(|(s, k)| s.count == 1 + 40 * k && s.sum.len() == 16));
+}
+
+#[test]
+fn jobs_run_beside_each_other_and_can_be_given_up() {
+    let scene = lit_room();
+    let mut tracer = tracer(2);
+    let mut huge = job(&scene, 1);
+    huge.receivers = vec![Probe { position: Vec3::ZERO, samples: u32::MAX }; 4].into();
+    huge.receivers = Arc::from([Probe { position: Vec3::ZERO, samples: 20_000_000 }]);
+    let endless = tracer.submit(huge.clone());
+    let queued = tracer.submit(job(&scene, 2));
+    let wanted = tracer.submit(job(&scene, 3));
+    assert!(matches!(tracer.poll(endless), Progress::Working(share) if share < 1.0));
+    tracer.cancel(queued);
+    tracer.cancel(endless);
+    assert!(tracer.wait(wanted).is_some());
+    assert!(matches!(tracer.poll(wanted), Progress::Unknown), "a result is given once");
+    assert!(matches!(tracer.poll(endless), Progress::Unknown));
+    assert!(tracer.wait(queued).is_none());
+    // Dropping must not wait for the rest of this one.
+    tracer.submit(huge);
+    drop(tracer);
+}
+
+#[test]
+fn empty_jobs_end() {
+    let mut tracer = tracer(1);
+    let mut empty = job(&Stage::default().snapshot(), 1);
+    empty.receivers = Arc::from([]);
+    let ticket = tracer.submit(empty);
+    assert!(tracer.wait(ticket).unwrap().sums.is_empty());
+}
+
+#[test]
+fn lambert_model_takes_only_base_colour() {
+    let mut stage = Stage::default();
+    let odd = Material {
+        base_color: Vec3::splat(0.5).extend(0.1),
+        metallic: 1.0,
+        roughness: 0.1,
+        alpha_mode: lumencast_scene::AlphaMode::Blend,
+        ..Material::default()
+    };
+    floor(&mut stage, odd);
+    stage.environment(Environment::Constant { radiance: Vec3::ONE });
+    let model = MaterialModel::Lambert;
+    let world = World::new(stage.snapshot(), model, Kernel::detect(), &mut WorldCache::default());
+    let mut integrator = Integrator {
+        world: &world,
+        bounces: 1,
+        clamp: f32::INFINITY,
+        stack: Stack::default(),
+        rays: 0,
+    };
+    for (origin, direction) in [(Vec3::Y, down()), (Vec3::NEG_Y, -down())] {
+        for s in 0..64 {
+            let seen = integrator.radiance(origin, direction, &mut Sampler::new(1, 1, s));
+            assert!((seen.radiance - Vec3::splat(0.5)).abs().max_element() < 1e-5);
+        }
+    }
+}

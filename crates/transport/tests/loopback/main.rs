@@ -1,0 +1,6 @@
+//! A real server and real clients, over QUIC and WebSocket, on loopback.
+
+mod common;
+mod restart;
+mod security;
+mod stream;

@@ -1,0 +1,388 @@
+import { describe, expect, it } from 'vitest';
+
+import { Cache, type CacheEvent } from '../src/cache.js';
+import type { Edit } from '../src/edit.js';
+import { WireError } from '../src/wire-error.js';
+import { FakeServer, json, type SentFrame, TICK } from './support/fake-server.js';
+import { join, varint } from './support/probe-encoder.js';
+import { random } from './support/random.js';
+import { SimulatedLink } from './support/simulated-link.js';
+
+const ME = 'me';
+
+function joined(server: FakeServer): Cache {
+  const cache = new Cache(ME);
+  cache.addCatalog(server.catalog);
+  cache.events();
+  return cache;
+}
+
+function feed(cache: Cache, frames: { state?: Uint8Array; probes?: SentFrame[] }, now: number): void {
+  if (frames.state) cache.addState(frames.state, now);
+  for (const { track, bytes } of frames.probes ?? []) addProbes(cache, track, bytes, now);
+}
+
+function addProbes(cache: Cache, track: string, bytes: Uint8Array, now: number): void {
+  cache.addProbes(0, Number(/r(\d+)/.exec(track)?.[1]), bytes, now);
+}
+
+/** Red of the first probe's c0. */
+function shown(cache: Cache, now: number): number {
+  return cache.light(now).fields[0].coefficients[0];
+}
+
+function move(node: number, x: number): Edit {
+  return { edit: 'move_node', node, translation: [x, 0, 0] };
+}
+
+describe('light', () => {
+  it('shows the first update at once and blends to each next one over the interval between them', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    expect(cache.light(0).fields).toEqual([]);
+    feed(cache, server.step(), 10);
+    expect(shown(cache, 10)).toBeCloseTo(1, 3);
+    feed(cache, server.step(), 10.04);
+    expect(shown(cache, 10.04)).toBeCloseTo(1, 3);
+    expect(shown(cache, 10.06)).toBeCloseTo(1.5, 3);
+    expect(shown(cache, 10.08)).toBeCloseTo(2, 3);
+    // Overdue: it holds.
+    expect(shown(cache, 11)).toBeCloseTo(2, 3);
+    // Early: it goes on from what is shown.
+    feed(cache, server.step(), 11.04);
+    const midway = shown(cache, 11.06);
+    feed(cache, server.step(), 11.06);
+    expect(shown(cache, 11.06)).toBeCloseTo(midway, 5);
+  });
+
+  it('tells by the revision whether anything changed', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    feed(cache, server.step(), 0);
+    feed(cache, server.step(), 0.04);
+    const revision = (now: number) => cache.light(now).fields[0].revision;
+    expect(revision(0.05)).not.toBe(revision(0.06));
+    expect(revision(0.1)).toBe(revision(0.2));
+    expect(revision(0.2)).toBe(revision(5));
+  });
+
+  it('never jumps and ends at the newest update, over a link that loses, delays and reorders', () => {
+    const server = new FakeServer({ brightness: (update) => 10 + 5 * Math.sin(update / 5) });
+    const cache = joined(server);
+    const link = new SimulatedLink<SentFrame>({ loss: 0.1, delay: [0.005, 0.15], seed: 4 });
+    const refused = new Map<string, number>();
+    let before: number | undefined;
+    for (let now = 0; now < 20; now += 0.005) {
+      if (now >= (server.tick + 1) * TICK && now < 19) {
+        const { state, probes } = server.step();
+        cache.addState(state, now);
+        for (const frame of probes) link.send(frame, now);
+      }
+      for (const { what } of link.arrived(now)) {
+        try {
+          addProbes(cache, what.track, what.bytes, now);
+        } catch (error) {
+          const kind = (error as WireError).kind;
+          refused.set(kind, (refused.get(kind) ?? 0) + 1);
+        }
+      }
+      if (cache.light(now).fields.length === 0) continue;
+      const value = shown(cache, now);
+      expect(value).toBeGreaterThan(4.9);
+      expect(value).toBeLessThan(15.1);
+      // The light moves by at most 1 a tick; after gaps it catches up within the blend.
+      if (before !== undefined) expect(Math.abs(value - before)).toBeLessThan(1.3);
+      before = value;
+    }
+    const newest = cache.light(20).fields[0].tick;
+    // A lost frame of layer 0 costs all until the next keyframe, 40 updates later.
+    expect(newest).toBeGreaterThan(server.tick - 48);
+    expect(shown(cache, 20)).toBeCloseTo(server.brightness(newest ?? NaN), 2);
+    // The link must have done its worst, or this has shown nothing.
+    expect(link.lost).toBeGreaterThan(10);
+    expect(link.reordered).toBeGreaterThan(10);
+    expect([...refused.keys()]).toEqual(['missing_base']);
+  });
+
+  it('does not go back to an older or doubled update', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    const frames = Array.from({ length: 3 }, () => server.step());
+    feed(cache, frames[0], 0);
+    feed(cache, frames[2], 0.08);
+    feed(cache, { probes: frames[1].probes }, 0.09);
+    feed(cache, { probes: frames[2].probes }, 0.09);
+    expect(shown(cache, 1)).toBeCloseTo(3, 3);
+    expect(cache.light(1).fields[0].tick).toBe(2);
+  });
+
+  it('tells its age by the server’s clock', () => {
+    const server = new FakeServer({ clock: 77 });
+    const cache = joined(server);
+    const delay = 0.02;
+    for (let tick = 0; tick < 10; tick++) {
+      const { state, probes } = server.step();
+      const now = 5 + tick * TICK + delay;
+      cache.addState(state, now);
+      // Light of a tick comes another 30 ms later.
+      if (tick < 8) feed(cache, { probes }, now + 0.03);
+    }
+    const now = 5 + 10 * TICK;
+    // Tick 7 ended 3 ticks ago; the least delay of the way cannot be seen.
+    expect(cache.age(now)).toBeCloseTo(3 * TICK - delay, 6);
+    expect(cache.light(now).fields[0].age).toBeCloseTo(3 * TICK - delay, 6);
+  });
+
+  it('passes over fields and regions that it does not know', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    const { probes } = server.step();
+    expect(cache.addProbes(9, 0, probes[0].bytes, 0)).toBeUndefined();
+    expect(cache.addProbes(0, 7, probes[0].bytes, 0)).toBeUndefined();
+    expect(cache.light(0).fields).toEqual([]);
+  });
+
+  it('is unmoved by bad frames', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    for (let i = 0; i < 3; i++) feed(cache, server.step(), i * TICK);
+    const before = shown(cache, 1);
+    const { state, probes } = server.step();
+    const next = random(3);
+    for (let round = 0; round < 500; round++) {
+      const noise = Uint8Array.from({ length: next() * 80 }, () => next() * 256);
+      expect(() => cache.addCatalog(noise)).toThrow(WireError);
+      expect(() => cache.addState(noise, 1)).toThrow(WireError);
+      expect(() => cache.addProbes(0, 0, noise, 1)).toThrow(WireError);
+    }
+    expect(shown(cache, 1)).toBe(before);
+    feed(cache, { state, probes }, 1);
+    expect(shown(cache, 2)).toBeCloseTo(4, 3);
+  });
+});
+
+describe('time', () => {
+  it('follows the server’s clock by its fastest frames', () => {
+    const server = new FakeServer({ clock: 500 });
+    const cache = joined(server);
+    const link = new SimulatedLink<Uint8Array>({ delay: [0.01, 0.2], seed: 9 });
+    let worst = 0;
+    for (let now = 0; now < 30; now += 0.01) {
+      if (now >= (server.tick + 1) * TICK) link.send(server.step().state, now);
+      for (const { at, what } of link.arrived(now)) cache.addState(what, at);
+      if (now < 5) continue;
+      const time = cache.serverTime(now) ?? NaN;
+      // Late by the least delay, about 10 ms, and never early.
+      expect(time).toBeLessThan(500 + now - 0.0099);
+      worst = Math.max(worst, 500 + now - time);
+      const scene = cache.sceneTime(now) ?? NaN;
+      expect(Math.abs(scene - (time - 500))).toBeLessThan(0.01);
+    }
+    expect(worst).toBeLessThan(0.02);
+  });
+
+  it('stands still when the server is silent', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    expect(cache.sceneTime(0)).toBeUndefined();
+    cache.addState(server.step().state, 0);
+    expect(cache.sceneTime(0.5)).toBeCloseTo(0.5);
+    expect(cache.sceneTime(60)).toBeCloseTo(1);
+  });
+});
+
+describe('the scene', () => {
+  /** Applies what a cache passes on, as a page would. */
+  class Page {
+    scene = new Map<number, Edit>();
+    snapshots = 0;
+
+    take(events: CacheEvent[]): void {
+      for (const event of events) {
+        if (event.kind === 'snapshot') {
+          this.snapshots++;
+          this.scene = new Map();
+          event.edits.forEach((edit) => this.apply(edit));
+        } else if (event.kind === 'edit') {
+          this.apply(event.accepted.edit);
+        }
+      }
+    }
+
+    private apply(edit: Edit): void {
+      if ('node' in edit && edit.node !== undefined) this.scene.set(edit.node, edit);
+    }
+  }
+
+  it('is followed edit by edit, and taken up again only where ticks are missing', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    const page = new Page();
+    const next = random(5);
+    for (let tick = 0; tick < 400; tick++) {
+      // Edits fall into ticks with snapshots too.
+      server.accept(move(Math.floor(next() * 9), tick));
+      const { state } = server.step();
+      // Ticks 100 to 109 are lost.
+      if (tick < 100 || tick > 109) cache.addState(state, tick * TICK);
+      page.take(cache.events());
+      // From the loss to the next snapshot (128) the page knows that it cannot know.
+      if (tick < 100 || tick >= 128) expect(page.scene).toEqual(server.scene);
+    }
+    expect(page.snapshots).toBe(2);
+  });
+
+  it('comes out right over a link that loses, delays and reorders', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    const page = new Page();
+    const link = new SimulatedLink<Uint8Array>({ loss: 0.02, delay: [0, 0.1], seed: 6 });
+    const next = random(7);
+    for (let now = 0; now < 60; now += TICK) {
+      if (now < 50) server.accept(move(Math.floor(next() * 9), now));
+      link.send(server.step().state, now);
+      for (const { at, what } of link.arrived(now)) cache.addState(what, at);
+      page.take(cache.events());
+    }
+    expect(page.scene).toEqual(server.scene);
+    expect(page.snapshots).toBeGreaterThan(3);
+    expect(link.lost).toBeGreaterThan(5);
+  });
+
+  it('skips edits that it does not know and keeps the rest', () => {
+    const cache = joined(new FakeServer());
+    const tick = { time: 0, clock: 0, version: 0, tick_ms: 1, samples: 1 };
+    cache.addState(json({ snapshot: [{ edit: 'explode' }, move(1, 2)], ...tick, tick: 0 }), 0);
+    cache.addState(
+      json({ edits: [{ edit: { edit: 'explode' } }, { edit: move(1, 3) }], ...tick, tick: 1 }),
+      0,
+    );
+    expect(cache.events()).toEqual([
+      { kind: 'snapshot', edits: [move(1, 2)] },
+      { kind: 'edit', accepted: { edit: move(1, 3), own: false } },
+    ]);
+  });
+});
+
+describe('own edits', () => {
+  it('wait until they are accepted, refused, or covered by a snapshot', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    cache.addState(server.step().state, 0);
+    cache.events();
+    const [a, b, c] = [1, 2, 3].map((x) => cache.edit(move(1, x)));
+    expect([a.seq, b.seq, c.seq]).toEqual([1, 2, 3]);
+    expect(JSON.parse(new TextDecoder().decode(b.bytes))).toEqual({ seq: 2, edit: move(1, 2) });
+
+    server.accept(move(1, 1), ME, 1);
+    server.accept(move(8, 8), 'another', 1);
+    server.refuse(ME, 2, 'node 1 does not exist');
+    cache.addState(server.step().state, 0.04);
+    expect(cache.events()).toEqual([
+      { kind: 'edit', accepted: { edit: move(1, 1), client: ME, seq: 1, own: true } },
+      { kind: 'edit', accepted: { edit: move(8, 8), client: 'another', seq: 1, own: false } },
+      { kind: 'acknowledged', seq: 1 },
+      { kind: 'refused', refused: { seq: 2, edit: move(1, 2), reason: 'node 1 does not exist' } },
+    ]);
+    expect(cache.pending.map(({ seq }) => seq)).toEqual([3]);
+
+    // The answer to the third is lost with its tick; the next snapshot has it.
+    server.accept(move(1, 3), ME, 3);
+    server.step();
+    while (server.tick < 63) server.step();
+    cache.addState(server.step().state, 3);
+    expect(cache.events().map(({ kind }) => kind)).toEqual(['snapshot', 'acknowledged']);
+    expect(cache.pending).toEqual([]);
+  });
+
+  it('are at most so many at once', () => {
+    const cache = new Cache(ME);
+    for (let i = 0; i < 4096; i++) cache.edit(move(1, i));
+    expect(() => cache.edit(move(1, 0))).toThrow('4096');
+  });
+});
+
+describe('a restarted server', () => {
+  it('is known by its epoch: the light stays, the rest begins anew', () => {
+    const old = new FakeServer({ clock: 5000 });
+    const cache = joined(old);
+    for (let i = 0; i < 50; i++) feed(cache, old.step(), i * TICK);
+    cache.edit(move(1, 1));
+    cache.events();
+
+    const fresh = new FakeServer({ epoch: '00000000000000bb', clock: 3, brightness: () => 80 });
+    cache.addCatalog(fresh.catalog);
+    expect(cache.events().map(({ kind }) => kind)).toEqual(['lost', 'catalog']);
+    expect(shown(cache, 3)).toBeCloseTo(50, 2);
+    expect(cache.age(3)).toBeUndefined();
+    // Update 0 is news again, and fades in.
+    feed(cache, fresh.step(), 3);
+    expect(cache.events().map(({ kind }) => kind)).toEqual(['snapshot']);
+    expect(shown(cache, 3)).toBeCloseTo(50, 2);
+    expect(shown(cache, 4)).toBeCloseTo(80, 2);
+    expect(cache.serverTime(4)).toBeCloseTo(4, 6);
+    expect(cache.edit(move(1, 2)).seq).toBe(1);
+  });
+
+  it('with other fields shows the old light until there is new light', () => {
+    const old = new FakeServer();
+    const cache = joined(old);
+    feed(cache, old.step(), 0);
+    const fresh = new FakeServer({ epoch: '00000000000000bb', regions: 2, brightness: () => 80 });
+    cache.addCatalog(fresh.catalog);
+    expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([1]);
+    feed(cache, fresh.step(), 1);
+    expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([2]);
+  });
+
+  it('that changes its fields without restarting has those forgotten that are gone', () => {
+    const server = new FakeServer({ regions: 2 });
+    const cache = joined(server);
+    feed(cache, server.step(), 0);
+    const catalog = JSON.parse(new TextDecoder().decode(server.catalog));
+    catalog.fields = [];
+    cache.addCatalog(json(catalog));
+    expect(cache.light(1).fields).toEqual([]);
+  });
+});
+
+describe('a saved light field', () => {
+  /** A `.light` file: the catalog and a keyframe of each region. */
+  function file(server: FakeServer): Uint8Array {
+    const record = (bytes: Uint8Array) => join(varint(bytes.length), bytes);
+    const frames = server
+      .step()
+      .probes.map(({ bytes }, region) => record(join(varint(0), varint(region), bytes)));
+    return join(new TextEncoder().encode('LUMENCST'), [1], record(server.catalog), ...frames);
+  }
+
+  it('is shown until the server’s light comes', () => {
+    const cache = new Cache(ME);
+    cache.load(file(new FakeServer({ brightness: () => 7 })), 0);
+    expect(shown(cache, 0)).toBeCloseTo(7, 2);
+    expect(cache.age(100)).toBeUndefined();
+    const { seq } = cache.edit(move(1, 1));
+    const server = new FakeServer({ brightness: () => 9 });
+    cache.addCatalog(server.catalog);
+    expect(shown(cache, 1)).toBeCloseTo(7, 2);
+    // Made before there was a server, the edit is still to be sent.
+    expect(cache.pending.map((edit) => edit.seq)).toEqual([seq]);
+    feed(cache, server.step(), 1);
+    expect(shown(cache, 2)).toBeCloseTo(9, 2);
+  });
+
+  it('that is damaged is refused', () => {
+    const good = file(new FakeServer({ regions: 2 }));
+    for (let length = 0; length < good.length; length++) {
+      // Cut between two records it is a whole file with less in it.
+      try {
+        new Cache(ME).load(good.subarray(0, length), 0);
+      } catch (error) {
+        expect(error).toBeInstanceOf(WireError);
+      }
+    }
+    const wrong = good.slice();
+    wrong[0]++;
+    expect(() => new Cache(ME).load(wrong, 0)).toThrow('not a light file');
+  });
+});

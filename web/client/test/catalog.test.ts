@@ -1,0 +1,132 @@
+import { describe, expect, it } from 'vitest';
+
+import { parseCatalog } from '../src/codec/catalog.js';
+import { parseState } from '../src/codec/state.js';
+import { FakeServer, json } from './support/fake-server.js';
+import { random } from './support/random.js';
+
+type Loose = Record<string, any>;
+
+function catalog(change: (catalog: Loose, field: Loose) => void = () => {}): Uint8Array {
+  const value = JSON.parse(new TextDecoder().decode(new FakeServer({ regions: 2 }).catalog)) as Loose;
+  change(value, value.fields[0]);
+  return json(value);
+}
+
+describe('a catalog', () => {
+  it('is read, without the fields of unknown kinds', () => {
+    const { epoch, tickSeconds, fields } = parseCatalog(catalog());
+    expect([epoch, tickSeconds, fields.length]).toEqual(['00000000000000aa', 0.04, 1]);
+    expect(fields[0].regions[1]).toEqual({ id: 1, min: [2, 0, 0], size: [2, 2, 2] });
+  });
+
+  it('has its rotation made a unit quaternion', () => {
+    const { fields } = parseCatalog(catalog((_, field) => (field.grid.rotation = [0, 0.6001, 0, 0.8])));
+    expect(Math.hypot(...fields[0].grid.rotation)).toBeCloseTo(1, 12);
+  });
+
+  const refused: [string, string, (catalog: Loose, field: Loose) => void][] = [
+    ['another version', 'version', (c) => (c.lumencast = 2)],
+    ['a short epoch', 'malformed', (c) => (c.epoch = 'abc')],
+    ['no scene', 'malformed', (c) => delete c.scene],
+    ['a tick of no length', 'malformed', (c) => (c.tick_seconds = 0)],
+    ['257 fields', 'limit', (c) => (c.fields = Array(257).fill({}))],
+    ['a field twice', 'malformed', (c, f) => c.fields.push(f)],
+    ['order 5', 'malformed', (_, f) => (f.order = 5)],
+    ['an unknown use', 'malformed', (_, f) => (f.use = 'some')],
+    ['no layers', 'malformed', (_, f) => (f.layers = 0)],
+    ['a flat box', 'malformed', (_, f) => (f.grid.size = [1, 0, 1])],
+    ['a rotation of length 2', 'malformed', (_, f) => (f.grid.rotation = [0, 0, 0, 2])],
+    ['too many probes', 'limit', (_, f) => (f.grid.resolution = [65, 64, 64])],
+    ['half a cell', 'malformed', (_, f) => (f.grid.resolution = [4, 2, 1.5])],
+    ['a cell without region', 'malformed', (_, f) => f.regions.pop()],
+    ['overlapping regions', 'malformed', (_, f) => (f.regions[1].min = [1, 0, 0])],
+    ['a region outside', 'malformed', (_, f) => (f.regions[1].min = [3, 0, 0])],
+    ['a region of 17 cells', 'malformed', (_, f) => (f.regions[0].size = [17, 2, 2])],
+    ['a region twice', 'malformed', (_, f) => (f.regions[1].id = 0)],
+  ];
+  for (const [name, kind, change] of refused) {
+    it(`with ${name} is refused`, () => {
+      expect(() => parseCatalog(catalog(change))).toThrow(expect.objectContaining({ kind }));
+    });
+  }
+
+  it('of too many probes over all fields is refused', () => {
+    const regions: unknown[] = [];
+    for (let x = 0; x < 4; x++) {
+      for (let y = 0; y < 4; y++) {
+        for (let z = 0; z < 4; z++) {
+          regions.push({ id: regions.length, min: [16 * x, 16 * y, 16 * z], size: [16, 16, 16] });
+        }
+      }
+    }
+    const many = (count: number) =>
+      catalog((c, f) => {
+        const grid = { ...f.grid, resolution: [64, 64, 64] };
+        c.fields = Array.from({ length: count }, (_, id) => ({ ...f, id, grid, regions }));
+      });
+    expect(parseCatalog(many(2)).fields.length).toBe(2);
+    expect(() => parseCatalog(many(3))).toThrow(expect.objectContaining({ kind: 'limit' }));
+  });
+
+  it('damaged at random gives a catalog or a WireError', () => {
+    const good = catalog();
+    const next = random(8);
+    let refusals = 0;
+    for (let round = 0; round < 3000; round++) {
+      const bytes = good.slice();
+      bytes[Math.floor(next() * bytes.length)] = 32 + Math.floor(next() * 95);
+      try {
+        parseCatalog(bytes);
+      } catch (error) {
+        expect(error).toMatchObject({ name: 'WireError' });
+        refusals++;
+      }
+    }
+    expect(refusals).toBeGreaterThan(1000);
+    expect(refusals).toBeLessThan(3000);
+  });
+});
+
+describe('a state frame', () => {
+  const tick = { tick: 1, time: 0.04, clock: 9, version: 2, tick_ms: 30, samples: 8 };
+
+  it('may leave out what is empty', () => {
+    expect(parseState(json(tick))).toMatchObject({ kind: 'delta', accepted: [], refused: [], tickMs: 30 });
+    const snapshot = { snapshot: [], acks: { me: 4 }, ...tick };
+    expect(parseState(json(snapshot))).toMatchObject({
+      kind: 'snapshot',
+      edits: [],
+      acks: new Map([['me', 4]]),
+    });
+  });
+
+  it('keeps strange client names apart from what objects have by nature', () => {
+    const acks = JSON.parse('{ "__proto__": 7, "constructor": 8 }');
+    const state = parseState(json({ snapshot: [], acks, ...tick }));
+    expect(state.kind === 'snapshot' && [...state.acks]).toEqual([
+      ['__proto__', 7],
+      ['constructor', 8],
+    ]);
+  });
+
+  for (const [name, change] of [
+    ['no tick', { tick: undefined }],
+    ['a negative tick', { tick: -1 }],
+    ['a clock of text', { clock: '9' }],
+    ['edits that are no list', { edits: {} }],
+    ['a refusal without reason', { refused: [{ client: 'me', seq: 1 }] }],
+    ['half an acknowledgement', { snapshot: [], acks: { me: 0.5 } }],
+  ] as const) {
+    it(`with ${name} is refused`, () => {
+      expect(() => parseState(json({ ...tick, ...change }))).toThrow(
+        expect.objectContaining({ kind: 'malformed' }),
+      );
+    });
+  }
+
+  it('with more edits than allowed is refused', () => {
+    const edits = Array(4097).fill({ edit: { edit: 'remove_node', node: 1 } });
+    expect(() => parseState(json({ ...tick, edits }))).toThrow(expect.objectContaining({ kind: 'limit' }));
+  });
+});

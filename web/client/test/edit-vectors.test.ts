@@ -1,0 +1,37 @@
+import { describe, expect, it } from 'vitest';
+
+import { parseEdit } from '../src/codec/edits.js';
+import { checkEdit } from '../src/codec/state.js';
+import type { Edit } from '../src/edit.js';
+import { readVectors } from './support/vectors.js';
+
+interface Case {
+  name: string;
+  json: unknown;
+  /** What Rust writes, where that is more than `json`: with the defaults of what was left out. */
+  full?: unknown;
+}
+
+const vectors = readVectors<{ edits: Case[]; refused: Case[] }>('edits');
+
+describe('vectors/edits.json', () => {
+  for (const { name, json, full } of vectors.edits) {
+    it(`reads ${name}`, () => {
+      expect(parseEdit(json)).toEqual(json);
+      if (full !== undefined) expect(parseEdit(full)).toEqual(full);
+      expect(() => checkEdit(json as Edit)).not.toThrow();
+    });
+  }
+
+  for (const { name, json } of vectors.refused) {
+    it(`refuses ${name}`, () => {
+      expect(parseEdit(json)).toBeUndefined();
+      expect(() => checkEdit(json as Edit)).toThrow(TypeError);
+    });
+  }
+
+  it('leaves out members that it does not know', () => {
+    const edit = { edit: 'remove_node', node: 3, later: true };
+    expect(parseEdit(edit)).toEqual({ edit: 'remove_node', node: 3 });
+  });
+});
