@@ -4,6 +4,7 @@
 //! volumes or lightmaps. It works on its own threads; the caller submits and polls.
 
 mod accel;
+pub mod blend;
 mod bsdf;
 mod lights;
 pub mod path_trace;

@@ -1,0 +1,388 @@
+//! Blending over time: many small, noisy updates become a steady estimate that still follows the
+//! light.
+//!
+//! **Averaging.** An update of n samples moves an estimate that rests on N samples by
+//! n/(N + n), until that falls to the ratio r, where it stays. So the first updates average
+//! exactly, later ones exponentially; the noise that is left is √(r/2) of an update's.
+//!
+//! **Following.** At r = 0.01 alone, 95 % of a change needs 300 updates. So every receiver keeps a
+//! *ladder* of means of the same updates, with weights no smaller than ½, ⅛, 1/32 and r; the last is
+//! the estimate. After each update, going from the quick to the slow: where a mean differs from the
+//! next quicker one by more than chance explains, it is replaced by that one. "More than chance" is
+//! κ standard deviations ([`BlendSettings::significance`]) in the luminance of any of the first
+//! four coefficients. What chance explains follows from q, the variance of a mean for unit variance
+//! a sample (q' = (1 − w)²q + w²/n), and from the variance a sample, which is estimated from
+//! differences of successive updates (von Neumann 1941), so that it includes what the lattice saves
+//! and does not take a change of light for noise for long.
+//!
+//! A lamp that jumps is thus answered within a few updates, a slow drift within as many as its
+//! significance needs, and while nothing changes the ladder leaves the estimate alone. Measured by
+//! `examples/reaction.rs`. A change of colour alone, at equal luminance, is followed at the ratio.
+//!
+//! Memory: 4 means a receiver, 12 bytes a coefficient each (432 bytes at L2). All in f32.
+
+use glam::Vec3;
+use lumencast_light::Order;
+
+use crate::Sums;
+use crate::sampling::luminance;
+
+/// The least weights of the quick means.
+const QUICK: [f32; 3] = [0.5, 0.125, 1.0 / 32.0];
+/// Least weight of the estimate of the noise.
+const NOISE: f32 = 1.0 / 32.0;
+/// Coefficients that are watched: bands 0 and 1.
+const WATCHED: usize = 4;
+
+/// How updates are blended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlendSettings {
+    /// Least weight of an update, above 0 to 1; 1 shows each update alone.
+    pub ratio: f32,
+    /// Standard deviations by which a change must stand out to be followed at once; infinite to
+    /// follow by the ratio alone.
+    pub significance: f32,
+}
+
+impl Default for BlendSettings {
+    fn default() -> Self {
+        Self { ratio: 0.01, significance: 5.0 }
+    }
+}
+
+/// The blended light of a set of receivers.
+#[derive(Clone, Debug)]
+pub struct History {
+    settings: BlendSettings,
+    receivers: Vec<Ladder>,
+}
+
+impl History {
+    /// Nothing known yet about `receivers` receivers.
+    pub fn new(settings: BlendSettings, receivers: usize, order: Order) -> Self {
+        let ladder =
+            Ladder::new(settings.ratio.clamp(f32::MIN_POSITIVE, 1.0), order.coefficients());
+        Self { settings, receivers: vec![ladder; receivers] }
+    }
+
+    /// Number of receivers.
+    pub fn len(&self) -> usize {
+        self.receivers.len()
+    }
+
+    /// Whether there are no receivers.
+    pub fn is_empty(&self) -> bool {
+        self.receivers.is_empty()
+    }
+
+    /// Sets the least weight of an update for one receiver.
+    pub fn set_ratio(&mut self, receiver: usize, ratio: f32) {
+        self.receivers[receiver].ratio = ratio.clamp(f32::MIN_POSITIVE, 1.0);
+    }
+
+    /// Takes an update, one entry a receiver in order. Entries without samples, or with numbers that
+    /// are not finite, change nothing.
+    pub fn update(&mut self, sums: &[Sums]) {
+        for (ladder, sums) in self.receivers.iter_mut().zip(sums) {
+            if let Some(update) = Update::new(sums, ladder.coefficients()) {
+                ladder.update(&update, self.settings.significance);
+            }
+        }
+    }
+
+    /// Trusts what is known as if it rested on `factor` (0 to 1) times as many samples: 0 replaces
+    /// it by the next update, 1 changes nothing. For changes that the caller knows of.
+    pub fn forget(&mut self, factor: f32) {
+        for ladder in &mut self.receivers {
+            ladder.means.iter_mut().for_each(|m| m.forget(factor.clamp(0.0, 1.0)));
+        }
+    }
+
+    /// The estimate: coefficients of arriving radiance, cd/m²; zero before the first update.
+    pub fn coefficients(&self, receiver: usize) -> &[Vec3] {
+        &self.receivers[receiver].estimate().coefficients
+    }
+
+    /// On how many samples the estimate's noise rests.
+    pub fn effective_samples(&self, receiver: usize) -> f32 {
+        let q = self.receivers[receiver].estimate().q;
+        if q > 0.0 { 1.0 / q } else { 0.0 }
+    }
+}
+
+/// One update of one receiver.
+struct Update {
+    mean: Vec<Vec3>,
+    samples: f32,
+    /// Variance a sample of the watched luminances, were samples independent.
+    variance: [f32; WATCHED],
+}
+
+impl Update {
+    fn new(sums: &Sums, coefficients: usize) -> Option<Self> {
+        let usable = sums.count > 0
+            && sums.sum.len() == coefficients
+            && sums.sum_of_squares.len() == coefficients;
+        let samples = sums.count as f32;
+        let mean: Vec<Vec3> = sums.sum.iter().map(|s| s / samples).collect();
+        if !usable || !mean.iter().all(|m| m.is_finite()) {
+            return None;
+        }
+        let variance = std::array::from_fn(|k| {
+            let square = sums.sum_of_squares[k] / samples - mean[k] * mean[k];
+            // Channels vary together, so deviations add up.
+            luminance(square.max(Vec3::ZERO).map(f32::sqrt)).powi(2)
+        });
+        Some(Self { mean, samples, variance })
+    }
+
+    fn watched(&self) -> [f32; WATCHED] {
+        watched(&self.mean)
+    }
+}
+
+fn watched(coefficients: &[Vec3]) -> [f32; WATCHED] {
+    std::array::from_fn(|k| luminance(coefficients[k]))
+}
+
+/// The means of one receiver, the quickest first, the estimate last.
+#[derive(Clone, Debug)]
+struct Ladder {
+    means: [Mean; QUICK.len() + 1],
+    ratio: f32,
+    noise: Noise,
+}
+
+impl Ladder {
+    fn new(ratio: f32, coefficients: usize) -> Self {
+        let mean = Mean { coefficients: vec![Vec3::ZERO; coefficients], samples: 0.0, q: 0.0 };
+        Self { means: std::array::from_fn(|_| mean.clone()), ratio, noise: Noise::default() }
+    }
+
+    fn coefficients(&self) -> usize {
+        self.estimate().coefficients.len()
+    }
+
+    fn estimate(&self) -> &Mean {
+        &self.means[QUICK.len()]
+    }
+
+    fn update(&mut self, update: &Update, significance: f32) {
+        for (mean, least) in self.means.iter_mut().zip(QUICK.into_iter().chain([self.ratio])) {
+            mean.update(update, least.max(self.ratio));
+        }
+        for slow in 1..self.means.len() {
+            let (quick, rest) = self.means.split_at_mut(slow);
+            let quick = &quick[slow - 1];
+            if quick.differs(&rest[0], &self.noise, significance) {
+                rest[0].clone_from(quick);
+            }
+        }
+        self.noise.update(update);
+    }
+}
+
+/// A weighted mean of updates.
+#[derive(Clone, Debug)]
+struct Mean {
+    coefficients: Vec<Vec3>,
+    /// N: on how many samples it counts as resting when the next update is weighed.
+    samples: f32,
+    /// Its variance for unit variance a sample.
+    q: f32,
+}
+
+impl Mean {
+    fn update(&mut self, update: &Update, least: f32) {
+        let n = update.samples;
+        let w = (n / (self.samples + n)).max(least);
+        for (mean, new) in self.coefficients.iter_mut().zip(&update.mean) {
+            *mean += w * (new - *mean);
+        }
+        self.q = (1.0 - w).powi(2) * self.q + w * w / n;
+        self.samples = n / w;
+    }
+
+    fn forget(&mut self, factor: f32) {
+        self.samples *= factor;
+    }
+
+    /// Whether another mean of the same updates lies further away than chance explains.
+    fn differs(&self, other: &Self, noise: &Noise, significance: f32) -> bool {
+        let q = self.q + other.q;
+        let [a, b] = [watched(&self.coefficients), watched(&other.coefficients)];
+        (0..WATCHED).any(|k| {
+            let difference = a[k] - b[k];
+            difference * difference > significance * significance * noise.variance[k] * q
+        })
+    }
+}
+
+/// What is known of the variance a sample.
+#[derive(Clone, Debug, Default)]
+struct Noise {
+    variance: [f32; WATCHED],
+    previous: Option<([f32; WATCHED], f32)>,
+    updates: f32,
+}
+
+impl Noise {
+    fn update(&mut self, update: &Update) {
+        /// The variance within the first update counts as so many differences.
+        const PRIOR: f32 = 4.0;
+        /// One difference raises the variance at most as if it were so many times as large: a jump
+        /// of the light is no noise.
+        const LARGEST: f32 = 9.0;
+        let new = update.watched();
+        match self.previous {
+            None => {
+                self.variance = update.variance;
+                self.updates = PRIOR;
+            }
+            Some((old, samples)) => {
+                let unit = 1.0 / samples + 1.0 / update.samples;
+                let w = (1.0 / (self.updates + 1.0)).max(NOISE);
+                for k in 0..WATCHED {
+                    let seen = (new[k] - old[k]).powi(2) / unit;
+                    let most = LARGEST * self.variance[k].max(1e-6 * update.variance[k]);
+                    self.variance[k] += w * (seen.min(most) - self.variance[k]);
+                }
+                self.updates += 1.0;
+            }
+        }
+        self.previous = Some((new, update.samples));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::{mix, unit};
+
+    /// Noise of standard deviation 1, about normal.
+    fn normal(seed: u64) -> f32 {
+        (0..12).map(|k| unit(mix(seed * 12 + k) as u32)).sum::<f32>() - 6.0
+    }
+
+    const COUNT: u32 = 16;
+
+    /// An update whose mean has c₀ = `level` with a standard deviation of `noise`.
+    fn sums(level: f32, noise: f32, seed: u64) -> Sums {
+        let n = COUNT as f32;
+        let value =
+            |k: u64| Vec3::splat((if k == 0 { level } else { 0.0 }) + noise * normal(seed * 9 + k));
+        let sum: Vec<Vec3> = (0..9).map(|k| n * value(k)).collect();
+        let sum_of_squares =
+            sum.iter().map(|s| s * s / n + Vec3::splat(n * n * noise * noise)).collect();
+        Sums { sum, sum_of_squares, count: COUNT, back_face_fraction: 0.0, mean_distance: 1.0 }
+    }
+
+    fn blend(settings: BlendSettings, updates: impl IntoIterator<Item = Sums>) -> Vec<f32> {
+        let mut history = History::new(settings, 1, Order::L2);
+        updates
+            .into_iter()
+            .map(|s| {
+                history.update(&[s]);
+                history.coefficients(0)[0].x
+            })
+            .collect()
+    }
+
+    #[test]
+    fn first_updates_average_exactly_and_later_ones_by_the_ratio() {
+        let settings = BlendSettings { ratio: 0.25, significance: f32::INFINITY };
+        let seen = blend(settings, [1.0, 2.0, 6.0, 7.0, 4.0, 8.0].map(|x| sums(x, 0.0, 1)));
+        for (seen, expected) in seen.iter().zip([1.0, 1.5, 3.0, 4.0, 4.0, 5.0]) {
+            assert!((seen - expected).abs() < 1e-5, "{seen} {expected}");
+        }
+    }
+
+    #[test]
+    fn no_stall_at_small_ratios() {
+        let settings = BlendSettings { ratio: 0.001, significance: f32::INFINITY };
+        let levels = std::iter::repeat_n(1.0, 1000).chain(std::iter::repeat_n(1.01, 20_000));
+        let seen = blend(settings, levels.map(|x| sums(x, 0.0, 1)));
+        // f32 stops where w·(x − mean) falls below half an ulp; a half float would stop at the start.
+        assert!((seen.last().unwrap() - 1.01).abs() < 1e-4);
+    }
+
+    #[test]
+    fn weights_follow_samples() {
+        let mut history =
+            History::new(BlendSettings { ratio: 1e-6, significance: f32::INFINITY }, 1, Order::L2);
+        let mut few = sums(1.0, 0.0, 1);
+        let scaled = |s: &Sums, n: u32| Sums {
+            sum: s.sum.iter().map(|x| x / COUNT as f32 * n as f32).collect(),
+            count: n,
+            ..s.clone()
+        };
+        few = scaled(&few, 10);
+        history.update(&[few]);
+        history.update(&[scaled(&sums(4.0, 0.0, 1), 30)]);
+        assert!((history.coefficients(0)[0].x - 3.25).abs() < 1e-5);
+        assert!((history.effective_samples(0) - 40.0).abs() < 1e-3);
+        history.update(&[Sums::default()]);
+        assert!((history.coefficients(0)[0].x - 3.25).abs() < 1e-5);
+    }
+
+    /// Still light: the ladder leaves the noise where the ratio puts it.
+    #[test]
+    fn still_light_stays_still() {
+        let settings = BlendSettings::default();
+        let (mut worst, mut total) = (0.0f32, 0.0);
+        for receiver in 0..200 {
+            let seen = blend(settings, (0..1000).map(|t| sums(10.0, 1.0, receiver * 1000 + t)));
+            for x in &seen[400..] {
+                worst = worst.max((x - 10.0).abs());
+                total += (x - 10.0).powi(2) / (200.0 * 600.0);
+            }
+        }
+        let expected = (0.01f32 / 1.99).sqrt();
+        assert!((total.sqrt() / expected - 1.0).abs() < 0.1, "{} {expected}", total.sqrt());
+        assert!(worst < 6.0 * expected, "{worst}");
+    }
+
+    /// Updates until the error stays below a share of a jump of `jump` standard deviations.
+    fn updates_to(share: f32, jump: f32, significance: f32) -> usize {
+        let settings = BlendSettings { significance, ..Default::default() };
+        let mut answers: Vec<usize> = (0..100)
+            .map(|receiver| {
+                let at = |t: u64| {
+                    sums(if t < 400 { 10.0 } else { 10.0 + jump }, 1.0, receiver * 2000 + t)
+                };
+                let seen = blend(settings, (0..1200).map(at));
+                1200 - 400
+                    - seen[400..]
+                        .iter()
+                        .rev()
+                        .take_while(|x| (*x - 10.0 - jump).abs() < share * jump)
+                        .count()
+                    + 1
+            })
+            .collect();
+        answers.sort_unstable();
+        answers[answers.len() / 2]
+    }
+
+    #[test]
+    fn jumps_are_answered_at_once() {
+        // Twenty standard deviations of an update: as when a lamp is switched.
+        assert!(updates_to(0.5, 20.0, 5.0) <= 2);
+        assert!(updates_to(0.1, 20.0, 5.0) <= 12);
+        assert!(updates_to(0.05, 20.0, 5.0) <= 25);
+        // Five: hidden in the noise of single updates.
+        assert!(updates_to(0.5, 5.0, 5.0) <= 10);
+        // By the ratio alone: ln 2/0.01 and ln 10/0.01.
+        assert!((60..80).contains(&updates_to(0.5, 20.0, f32::INFINITY)));
+        assert!((220..240).contains(&updates_to(0.1, 20.0, f32::INFINITY)));
+    }
+
+    #[test]
+    fn forgetting_all_shows_the_next_update() {
+        let mut history = History::new(BlendSettings::default(), 1, Order::L2);
+        (0..50).for_each(|_| history.update(&[sums(1.0, 0.0, 1)]));
+        history.forget(0.0);
+        history.update(&[sums(5.0, 0.0, 1)]);
+        assert!((history.coefficients(0)[0].x - 5.0).abs() < 1e-5);
+    }
+}
