@@ -44,8 +44,7 @@ export class Controls {
       { class: 'controls' },
       this.#brand,
       this.notices.element,
-      this.#inspector.element,
-      this.#stats.element,
+      h('div', { class: 'side' }, this.#stats.element, this.#inspector.element),
       this.#help,
       this.#dock.element,
     );

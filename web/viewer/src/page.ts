@@ -28,6 +28,7 @@ export interface Inside extends Pick<Viewer, 'light' | 'scene' | 'renderer' | 's
   stats(): ReturnType<Viewer['stats']>;
   setMode: Viewer['setMode'];
   pixel: Viewer['pixel'];
+  pixels: Viewer['pixels'];
 }
 
 /** Builds the page: a curtain with progress, then the picture, or why there is none. */
@@ -81,6 +82,7 @@ function inside(viewer: Viewer): Inside {
     stats: () => viewer.stats(),
     setMode: (shown) => viewer.setMode(shown),
     pixel: (x, y) => viewer.pixel(x, y),
+    pixels: (points) => viewer.pixels(points),
   };
 }
 

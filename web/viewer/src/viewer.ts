@@ -28,6 +28,9 @@ export interface ViewerOptions {
 /** Frames after the first light that exposure is measured at again: the light settles meanwhile. */
 const METER_AT = [0, 40, 120];
 
+/** Milliseconds between two looks at the server's metrics. */
+const ASK_INTERVAL = 3000;
+
 /** Loads everything that a viewer needs, in the order in which it can fail. */
 export async function openViewer(options: ViewerOptions): Promise<Viewer> {
   const renderer = await createRenderer(options.renderer, options.canvas);
@@ -58,6 +61,7 @@ export class Viewer {
   #drawnRevision = -1;
   #litFrames = 0;
   #frameTime = 16;
+  #askedAt = 0;
   #clients: number | undefined;
   #metering: Promise<void> | undefined;
 
@@ -98,7 +102,6 @@ export class Viewer {
   /** Draws from now on. */
   start(): void {
     void this.renderer.setAnimationLoop((now: number) => this.#frame(now));
-    setInterval(() => void this.#askClients(), 3000);
   }
 
   #frame(now: number): void {
@@ -109,6 +112,10 @@ export class Viewer {
     this.draw(performance.now(), seconds);
     this.controls.update();
     this.#meterWhenLit();
+    if (now - this.#askedAt > ASK_INTERVAL) {
+      this.#askedAt = now;
+      void this.#askClients();
+    }
   }
 
   /** One picture, at a time as of `performance.now()`. */
@@ -192,18 +199,28 @@ export class Viewer {
     }
   }
 
-  /** Red, green, blue, 0 to 255, of a point of a picture drawn now; from the upper left, in CSS pixels. */
-  pixel(x: number, y: number): [number, number, number] {
+  /** Red, green, blue, 0 to 255, of points of one picture drawn now; from the upper left, in CSS pixels. */
+  pixels(points: readonly (readonly [x: number, y: number])[]): [r: number, g: number, b: number][] {
     const { canvas } = this.options;
     const copy = document.createElement('canvas');
-    copy.width = copy.height = 1;
+    copy.width = canvas.width;
+    copy.height = canvas.height;
     const context = copy.getContext('2d', { willReadFrequently: true })!;
+    // A canvas holds its picture only until the browser has shown it.
     this.draw();
+    context.drawImage(canvas, 0, 0);
+    const { data } = context.getImageData(0, 0, copy.width, copy.height);
     const { width, height } = canvas.getBoundingClientRect();
-    const [sx, sy] = [(x / width) * canvas.width, (y / height) * canvas.height];
-    context.drawImage(canvas, Math.floor(sx), Math.floor(sy), 1, 1, 0, 0, 1, 1);
-    const [r, g, b] = context.getImageData(0, 0, 1, 1).data;
-    return [r, g, b];
+    return points.map(([x, y]) => {
+      const column = Math.floor((x / width) * copy.width);
+      const at = (Math.floor((y / height) * copy.height) * copy.width + column) * 4;
+      return [data[at], data[at + 1], data[at + 2]];
+    });
+  }
+
+  /** One point; see {@link pixels}. */
+  pixel(x: number, y: number): [r: number, g: number, b: number] {
+    return this.pixels([[x, y]])[0];
   }
 }
 

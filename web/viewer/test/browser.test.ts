@@ -1,0 +1,221 @@
+/**
+ * The whole way: a real server, a real headless browser, real transport. The page draws, shows indirect
+ * light, follows edits, stands a server's death, and stays in step with other pages.
+ *
+ * LUMENCAST_BIN names the program, CHROMIUM the browser, LUMENCAST_SHOTS a folder for screenshots.
+ */
+import { mkdirSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join, resolve } from 'node:path';
+import { type Browser, chromium, type Page } from 'playwright-core';
+import { build } from 'vite';
+import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import { chromiumProgram, freePort, lumencastProgram, Server, sharedScene } from './server.js';
+
+const FLAGS = [
+  '--headless=new',
+  '--no-sandbox',
+  '--enable-unsafe-webgpu',
+  '--use-webgpu-adapter=swiftshader',
+  '--enable-features=Vulkan',
+  '--use-vulkan=swiftshader',
+  '--use-angle=swiftshader',
+  '--enable-unsafe-swiftshader',
+];
+/** Small: every pixel is drawn by the processor. */
+const VIEWPORT = { width: 400, height: 300 };
+const SHOTS = process.env.LUMENCAST_SHOTS;
+
+const program = lumencastProgram();
+const browserProgram = chromiumProgram();
+const missing = !program ? 'no lumencast program (cargo build -p lumencast-cli)' : !browserProgram ? 'no Chromium' : undefined;
+if (missing) console.log(`skipped: ${missing}`);
+
+describe.skipIf(missing !== undefined)('the page', () => {
+  let folder: string;
+  let browser: Browser;
+  let server: Server;
+  let page: Page;
+
+  const start = (scene: string, port: number) => Server.start(program!, scene, port, ['--page', folder]);
+
+  beforeAll(async () => {
+    folder = mkdtempSync(join(tmpdir(), 'lumencast-page-'));
+    if (SHOTS) mkdirSync(SHOTS, { recursive: true });
+    await build({ root: resolve(import.meta.dirname, '..'), logLevel: 'error', build: { outDir: folder, emptyOutDir: true } });
+    browser = await chromium.launch({ executablePath: browserProgram!, headless: true, args: FLAGS });
+    server = await start('cornell', await freePort());
+    page = await open(browser, server.address);
+  }, 180_000);
+
+  afterAll(async () => {
+    await browser?.close();
+    await server?.kill();
+    rmSync(folder, { recursive: true, force: true });
+  }, 30_000);
+
+  it('draws the scene', async () => {
+    const picture = await look(page, 'both');
+    const bright = picture.filter(([r, g, b]) => r + g + b > 60).length;
+    expect(bright).toBeGreaterThan(picture.length / 4);
+    // Red and green walls, not one grey.
+    expect(picture.some(([r, g]) => r > 1.5 * g && r > 40)).toBe(true);
+    expect(picture.some(([r, g]) => g > 1.2 * r && g > 40)).toBe(true);
+    await shoot(page, 'cornell');
+  });
+
+  it('brightens what direct light does not reach', async () => {
+    const direct = await look(page, 'direct');
+    const both = await look(page, 'both');
+    const indirect = await look(page, 'indirect');
+    const sum = ([r, g, b]: Pixel) => r + g + b;
+    const shadowed = [...direct.keys()].filter((i) => sum(direct[i]) < 20 && sum(indirect[i]) > 20);
+    expect(shadowed.length).toBeGreaterThan(5);
+    for (const i of shadowed) expect(sum(both[i])).toBeGreaterThan(sum(direct[i]) + 10);
+  });
+
+  it('follows a moved light within a second', async () => {
+    const elapsed = await page.evaluate(async () => {
+      const { light, viewer, setMode } = window.lumencast!;
+      setMode('indirect');
+      const lamp = viewer.lights[0];
+      const node = light.content.nodeOf(lamp)!;
+      const points = Array.from({ length: 60 }, (_, i) => [60 + (i % 10) * 30, 40 + Math.floor(i / 10) * 30] as const);
+      const brightness = () => viewer.pixels(points).flat().reduce((a, b) => a + b);
+      const before = brightness();
+      const began = performance.now();
+      await light.edit({ edit: 'set_light', node, intensity: lamp.intensity * 4 });
+      while (brightness() < before * 1.1) {
+        if (performance.now() - began > 10_000) return Infinity;
+        await new Promise((resolve) => requestAnimationFrame(resolve));
+      }
+      const after = performance.now() - began;
+      await light.edit({ edit: 'set_light', node, intensity: lamp.intensity / 4 });
+      return after;
+    });
+    console.log(`light changed on the page ${elapsed.toFixed(0)} ms after the edit was sent`);
+    expect(elapsed).toBeLessThan(1000);
+  }, 30_000);
+
+  it('keeps the picture when the server dies, and goes on when it is back', async () => {
+    const before = await look(page, 'both');
+    const { port } = server;
+    await server.kill();
+    await page.waitForSelector('.notice.standing', { timeout: 15_000 });
+    expect(await page.textContent('.notice.standing')).toMatch(/lost/i);
+    const after = await look(page, 'both');
+    expect(difference(before, after)).toBeLessThan(0.05);
+    await shoot(page, 'connection-lost');
+
+    const revision = await page.evaluate(() => window.lumencast!.light.lightRevision);
+    server = await start('cornell', port);
+    await page.waitForFunction((before) => window.lumencast!.light.lightRevision > before + 3, revision, {
+      timeout: 20_000,
+    });
+    expect(await page.isVisible('.notice.standing')).toBe(false);
+    expect(difference(before, await look(page, 'both'))).toBeLessThan(0.25);
+  }, 90_000);
+
+  it('shows one page’s edit on another', async () => {
+    const second = await open(browser, server.address);
+    try {
+      const moved: [number, number, number] = [0.31, 1.27, 0.11];
+      const node = await page.evaluate(async (translation) => {
+        const { light, viewer } = window.lumencast!;
+        const node = light.content.nodeOf(viewer.lights[0])!;
+        await light.edit({ edit: 'move_node', node, translation });
+        return node;
+      }, moved);
+      await second.waitForFunction(
+        ([node, x]) => Math.abs(window.lumencast!.light.content.object(node)!.position.x - x) < 1e-4,
+        [node, moved[0]] as const,
+        { timeout: 5000 },
+      );
+      // A page that joins later gets it with the snapshot.
+      const third = await open(browser, server.address);
+      const position = await third.evaluate(
+        (node) => window.lumencast!.light.content.object(node)!.position.toArray(),
+        node,
+      );
+      position.forEach((value, axis) => expect(value).toBeCloseTo(moved[axis], 4));
+      await third.close();
+    } finally {
+      await second.close();
+    }
+  }, 90_000);
+
+  it('says so when there is no server', async () => {
+    const lonely = await browser.newPage();
+    await lonely.route('**/lumencast.json', (route) => route.abort());
+    await lonely.goto(server.address);
+    expect(await lonely.textContent('.curtain.failed')).toMatch(/does not answer/);
+    await lonely.close();
+  });
+
+  const sponza = sharedScene('sponza/Sponza.glb');
+  it.skipIf(!SHOTS || !sponza)('draws Sponza', async () => {
+    const other = await start(sponza!, await freePort());
+    try {
+      const view = await open(browser, other.address, { width: 1280, height: 720 });
+      await view.waitForTimeout(15_000);
+      await shoot(view, 'sponza');
+      await view.close();
+    } finally {
+      await other.kill();
+    }
+  }, 240_000);
+});
+
+type Pixel = [r: number, g: number, b: number];
+
+/** Opens the page and waits for its first light, at a fixed exposure. */
+async function open(browser: Browser, address: string, viewport = VIEWPORT): Promise<Page> {
+  const page = await browser.newPage({ viewport });
+  const errors: string[] = [];
+  page.on('pageerror', (error) => errors.push(String(error)));
+  page.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
+  try {
+    await page.goto(`${address}/?scale=1`);
+    await page.waitForFunction(() => window.lumencast, undefined, { timeout: 60_000 });
+    await page.evaluate(() => window.lumencast!.ready);
+    await page.evaluate(() => window.lumencast!.viewer.meter());
+    await page.evaluate(() => (window.lumencast!.viewer.autoExposure = false));
+    await page.waitForSelector('.curtain', { state: 'detached', timeout: 20_000 });
+    return page;
+  } catch (error) {
+    const shown = await page.textContent('body').catch(() => '');
+    throw new Error(`the page did not come up; it says: ${shown}\n${errors.join('\n')}`, { cause: error });
+  }
+}
+
+/** Points of the picture on a grid, with one part of the light shown. */
+function look(page: Page, shown: 'both' | 'direct' | 'indirect'): Promise<Pixel[]> {
+  return page.evaluate((shown) => {
+    const { pixels, setMode } = window.lumencast!;
+    setMode(shown);
+    const points: [number, number][] = [];
+    for (let y = 10; y < innerHeight; y += 15) {
+      for (let x = 10; x < innerWidth; x += 15) points.push([x, y]);
+    }
+    return pixels(points);
+  }, shown);
+}
+
+/** Mean difference of two pictures over their mean brightness. */
+function difference(a: readonly Pixel[], b: readonly Pixel[]): number {
+  const [va, vb] = [a.flat(), b.flat()];
+  const sum = va.reduce((total, value, i) => total + Math.abs(value - vb[i]), 0);
+  return sum / Math.max(va.reduce((total, value) => total + value), 1);
+}
+
+async function shoot(page: Page, name: string): Promise<void> {
+  if (!SHOTS) return;
+  // A page that draws without pause in software never comes to rest for a screenshot.
+  await page.evaluate(async () => {
+    const { viewer } = window.lumencast!;
+    await viewer.renderer.setAnimationLoop(null);
+    viewer.draw();
+  });
+  await page.screenshot({ path: join(SHOTS, `${name}.png`), timeout: 60_000 });
+  await page.evaluate(() => window.lumencast!.viewer.start());
+}

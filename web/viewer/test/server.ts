@@ -1,0 +1,79 @@
+import { type ChildProcess, spawn } from 'node:child_process';
+import { existsSync } from 'node:fs';
+import { createServer } from 'node:net';
+import { resolve } from 'node:path';
+
+const ROOT = resolve(import.meta.dirname, '../../..');
+
+/** The program under test: what the environment says, else what cargo has built. */
+export function lumencastProgram(): string | undefined {
+  const target = process.env.CARGO_TARGET_DIR ?? resolve(ROOT, 'target');
+  return [process.env.LUMENCAST_BIN, resolve(target, 'debug/lumencast')].find((path) => path && existsSync(path));
+}
+
+/** A browser to drive: what the environment says, else the system's Chromium. */
+export function chromiumProgram(): string | undefined {
+  return [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/google-chrome'].find((path) => path && existsSync(path));
+}
+
+/** A scene from beside the repository; `undefined` when it is not there. */
+export function sharedScene(name: string): string | undefined {
+  const path = resolve(process.env.LUMENCAST_SCENES ?? resolve(ROOT, '../shared/scenes'), name);
+  return existsSync(path) ? path : undefined;
+}
+
+/** A port that nobody listens on at the moment. */
+export function freePort(): Promise<number> {
+  return new Promise((found, reject) => {
+    const socket = createServer();
+    socket.once('error', reject);
+    socket.listen(0, '127.0.0.1', () => {
+      const address = socket.address();
+      socket.close(() => found(typeof address === 'object' && address ? address.port : 0));
+    });
+  });
+}
+
+/** A running `lumencast serve`, of which only this process is ever killed. */
+export class Server {
+  private constructor(
+    private readonly process: ChildProcess,
+    readonly port: number,
+    private readonly said: string[],
+  ) {}
+
+  static async start(program: string, scene: string, port: number, options: readonly string[]): Promise<Server> {
+    const child = spawn(program, ['serve', scene, '--listen', `127.0.0.1:${port}`, ...options], {
+      stdio: ['ignore', 'pipe', 'pipe'],
+    });
+    const said: string[] = [];
+    child.stdout.on('data', (chunk: Buffer) => said.push(chunk.toString()));
+    child.stderr.on('data', (chunk: Buffer) => said.push(chunk.toString()));
+    const server = new Server(child, port, said);
+    await server.#healthy();
+    return server;
+  }
+
+  get address(): string {
+    return `http://127.0.0.1:${this.port}`;
+  }
+
+  /** Ends it at once, as a crash would. */
+  async kill(): Promise<void> {
+    if (this.process.exitCode !== null || this.process.signalCode !== null) return;
+    const gone = new Promise((resolve) => this.process.once('exit', resolve));
+    this.process.kill('SIGKILL');
+    await gone;
+  }
+
+  async #healthy(): Promise<void> {
+    for (const start = Date.now(); Date.now() - start < 90_000; ) {
+      if (this.process.exitCode !== null) break;
+      const answer = await fetch(`${this.address}/healthz`).catch(() => undefined);
+      if (answer?.ok) return;
+      await new Promise((resolve) => setTimeout(resolve, 100));
+    }
+    await this.kill();
+    throw new Error(`the server did not start:\n${this.said.join('')}`);
+  }
+}
