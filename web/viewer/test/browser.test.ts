@@ -28,7 +28,11 @@ const SHOTS = process.env.LUMENCAST_SHOTS;
 
 const program = lumencastProgram();
 const browserProgram = chromiumProgram();
-const missing = !program ? 'no lumencast program (cargo build -p lumencast-cli)' : !browserProgram ? 'no Chromium' : undefined;
+const missing = !program
+  ? 'no lumencast program (cargo build -p lumencast-cli)'
+  : !browserProgram
+    ? 'no Chromium'
+    : undefined;
 if (missing) console.log(`skipped: ${missing}`);
 
 describe.skipIf(missing !== undefined)('the page', () => {
@@ -42,7 +46,11 @@ describe.skipIf(missing !== undefined)('the page', () => {
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), 'lumencast-page-'));
     if (SHOTS) mkdirSync(SHOTS, { recursive: true });
-    await build({ root: resolve(import.meta.dirname, '..'), logLevel: 'error', build: { outDir: folder, emptyOutDir: true } });
+    await build({
+      root: resolve(import.meta.dirname, '..'),
+      logLevel: 'error',
+      build: { outDir: folder, emptyOutDir: true },
+    });
     browser = await chromium.launch({ executablePath: browserProgram!, headless: true, args: FLAGS });
     server = await start('cornell', await freePort());
     page = await open(browser, server.address);
@@ -80,8 +88,15 @@ describe.skipIf(missing !== undefined)('the page', () => {
       setMode('indirect');
       const lamp = viewer.lights[0];
       const node = light.content.nodeOf(lamp)!;
-      const points = Array.from({ length: 60 }, (_, i) => [60 + (i % 10) * 30, 40 + Math.floor(i / 10) * 30] as const);
-      const brightness = () => viewer.pixels(points).flat().reduce((a, b) => a + b);
+      const points = Array.from(
+        { length: 60 },
+        (_, i) => [60 + (i % 10) * 30, 40 + Math.floor(i / 10) * 30] as const,
+      );
+      const brightness = () =>
+        viewer
+          .pixels(points)
+          .flat()
+          .reduce((a, b) => a + b);
       const before = brightness();
       const began = performance.now();
       await light.edit({ edit: 'set_light', node, intensity: lamp.intensity * 4 });
@@ -153,17 +168,21 @@ describe.skipIf(missing !== undefined)('the page', () => {
   });
 
   const sponza = sharedScene('sponza/Sponza.glb');
-  it.skipIf(!SHOTS || !sponza)('draws Sponza', async () => {
-    const other = await start(sponza!, await freePort());
-    try {
-      const view = await open(browser, other.address, { width: 1280, height: 720 });
-      await view.waitForTimeout(15_000);
-      await shoot(view, 'sponza');
-      await view.close();
-    } finally {
-      await other.kill();
-    }
-  }, 240_000);
+  it.skipIf(!SHOTS || !sponza)(
+    'draws Sponza',
+    async () => {
+      const other = await start(sponza!, await freePort());
+      try {
+        const view = await open(browser, other.address, { width: 1280, height: 720 });
+        await view.waitForTimeout(15_000);
+        await shoot(view, 'sponza');
+        await view.close();
+      } finally {
+        await other.kill();
+      }
+    },
+    240_000,
+  );
 });
 
 type Pixel = [r: number, g: number, b: number];
@@ -205,7 +224,13 @@ function look(page: Page, shown: 'both' | 'direct' | 'indirect'): Promise<Pixel[
 function difference(a: readonly Pixel[], b: readonly Pixel[]): number {
   const [va, vb] = [a.flat(), b.flat()];
   const sum = va.reduce((total, value, i) => total + Math.abs(value - vb[i]), 0);
-  return sum / Math.max(va.reduce((total, value) => total + value), 1);
+  return (
+    sum /
+    Math.max(
+      va.reduce((total, value) => total + value),
+      1,
+    )
+  );
 }
 
 async function shoot(page: Page, name: string): Promise<void> {

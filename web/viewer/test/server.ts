@@ -8,12 +8,16 @@ const ROOT = resolve(import.meta.dirname, '../../..');
 /** The program under test: what the environment says, else what cargo has built. */
 export function lumencastProgram(): string | undefined {
   const target = process.env.CARGO_TARGET_DIR ?? resolve(ROOT, 'target');
-  return [process.env.LUMENCAST_BIN, resolve(target, 'debug/lumencast')].find((path) => path && existsSync(path));
+  return [process.env.LUMENCAST_BIN, resolve(target, 'debug/lumencast')].find(
+    (path) => path && existsSync(path),
+  );
 }
 
 /** A browser to drive: what the environment says, else the system's Chromium. */
 export function chromiumProgram(): string | undefined {
-  return [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/google-chrome'].find((path) => path && existsSync(path));
+  return [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/google-chrome'].find(
+    (path) => path && existsSync(path),
+  );
 }
 
 /** A scene from beside the repository; `undefined` when it is not there. */
@@ -42,7 +46,12 @@ export class Server {
     private readonly said: string[],
   ) {}
 
-  static async start(program: string, scene: string, port: number, options: readonly string[]): Promise<Server> {
+  static async start(
+    program: string,
+    scene: string,
+    port: number,
+    options: readonly string[],
+  ): Promise<Server> {
     const child = spawn(program, ['serve', scene, '--listen', `127.0.0.1:${port}`, ...options], {
       stdio: ['ignore', 'pipe', 'pipe'],
     });
@@ -67,7 +76,7 @@ export class Server {
   }
 
   async #healthy(): Promise<void> {
-    for (const start = Date.now(); Date.now() - start < 90_000; ) {
+    for (const start = Date.now(); Date.now() - start < 90_000;) {
       if (this.process.exitCode !== null) break;
       const answer = await fetch(`${this.address}/healthz`).catch(() => undefined);
       if (answer?.ok) return;
