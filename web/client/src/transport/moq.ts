@@ -81,7 +81,7 @@ class MoqLink implements Link {
 }
 
 /** Reads one track for as long as it is wanted, through stale groups and failed subscriptions. */
-class MoqReader implements TrackReader {
+export class MoqReader implements TrackReader {
   private subscriber: Track.Subscriber | undefined;
   private closed = false;
 
@@ -148,7 +148,7 @@ class MoqReader implements TrackReader {
 }
 
 /** The broadcast by which a client sends its edits. */
-class EditTrack {
+export class EditTrack {
   readonly broadcast = new Broadcast.Producer();
   private readonly track = this.broadcast.createTrack('edits');
   private group: Group.Producer | undefined;
