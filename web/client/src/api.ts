@@ -171,7 +171,10 @@ export interface Session {
   sceneTime(now?: number, delay?: number): number | undefined;
   /** Where the camera is, in world space: near regions come first. */
   setCamera(position: Vec3): void;
-  /** The last 1,000 arrivals, oldest first. */
+  /**
+   * The last 1,000 arrivals, oldest first. On joining, the group under way is sent from its beginning:
+   * its frames come late, and are no measure of the way.
+   */
   timings(): readonly Timing[];
   /** Ends the session; pending edits reject. */
   close(): void;

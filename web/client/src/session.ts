@@ -151,7 +151,7 @@ class LiveSession implements Session, Sink {
       const limit = AbortSignal.any([this.ending.signal, AbortSignal.timeout(ATTEMPT)]);
       link = await this.connector(this.target, limit);
     } catch (error) {
-      return `no connection to ${this.origin}: ${describe(error)}`;
+      return `no answer from ${this.origin} (${describe(error)})`;
     }
     if (this.ending.signal.aborted) {
       link.close();
@@ -370,10 +370,11 @@ function equal(a: Uint8Array, b: Uint8Array): boolean {
   return a.length === b.length && a.every((byte, i) => byte === b[i]);
 }
 
+/** An error in words; those of several attempts one after the other, each once. */
 function describe(error: unknown): string {
-  if (error instanceof AggregateError) return error.errors.map(describe).join('; ');
+  if (error instanceof AggregateError) return [...new Set(error.errors.map(describe))].join('; ');
   const message = error instanceof Error ? error.message : String(error);
-  return message || 'no reason given';
+  return message.replace(/\.$/, '') || 'no reason given';
 }
 
 /** Waits for some seconds, or less when `signal` is aborted. */
