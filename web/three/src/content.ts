@@ -62,6 +62,12 @@ export class Content {
     return undefined;
   }
 
+  /** The object that stands for the node that an object is, or belongs to: what edits of it move. */
+  carrier(object: Object3D): Object3D {
+    const node = this.nodeOf(object);
+    return (node === undefined ? undefined : this.object(node)) ?? object;
+  }
+
   /** The numbers of an object's node and of all nodes below it. */
   nodesBelow(object: Object3D): number[] {
     const nodes: number[] = [];

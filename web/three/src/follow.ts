@@ -1,6 +1,6 @@
 import type { LightSpec, Transform } from '@lumencast/client';
-import type { Object3D } from 'three';
-import { isPunctualLight, lightSpec } from './lights.js';
+import { Matrix4, type Object3D, PointLight, Quaternion, Vector3 } from 'three';
+import { lightSpec, type PunctualLight } from './lights.js';
 
 /** Least time between two edits of one object, milliseconds: 30 a second. */
 export const FOLLOW_INTERVAL = 1000 / 30;
@@ -11,14 +11,35 @@ export interface Pose {
   readonly light: LightSpec | undefined;
 }
 
-export function poseOf(object: Object3D): Pose {
+/** A node's place relative to its parent, and its light where it has one. */
+export function poseOf(object: Object3D, light: PunctualLight | undefined): Pose {
   return {
     transform: {
       translation: object.position.toArray(),
       rotation: object.quaternion.toArray() as [number, number, number, number],
       scale: object.scale.toArray(),
     },
-    light: isPunctualLight(object) ? lightSpec(object) : undefined,
+    light: light && lightSpec(light),
+  };
+}
+
+/** The same in world space, for a light of the program's own: it may have a parent, and a target. */
+export function worldPoseOf(light: PunctualLight): Pose {
+  light.updateWorldMatrix(true, false);
+  const position = new Vector3().setFromMatrixPosition(light.matrixWorld);
+  const rotation = new Quaternion();
+  if (!(light instanceof PointLight)) {
+    light.target.updateWorldMatrix(true, false);
+    const target = new Vector3().setFromMatrixPosition(light.target.matrixWorld);
+    rotation.setFromRotationMatrix(new Matrix4().lookAt(position, target, light.up));
+  }
+  return {
+    transform: {
+      translation: position.toArray(),
+      rotation: rotation.toArray() as [number, number, number, number],
+      scale: [1, 1, 1],
+    },
+    light: lightSpec(light),
   };
 }
 

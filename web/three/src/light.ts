@@ -2,12 +2,12 @@ import type { AcceptedEdit, Edit, Field, Session } from '@lumencast/client';
 import { type Camera, type Object3D, type Scene, Vector3 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import type { Content } from './content.js';
-import { changedParts, FOLLOW_INTERVAL, type Pose, poseOf } from './follow.js';
+import { changedParts, FOLLOW_INTERVAL, type Pose, poseOf, worldPoseOf } from './follow.js';
 import { ProbeGrids } from './grids.js';
 import { describeLight, isPunctualLight } from './lights.js';
 import type { Platform, ProbeGrid } from './platform.js';
 import { Replica } from './replica.js';
-import { type ShadowOptions, Shadows } from './shadows.js';
+import { DEFAULT_SHADOW_LIGHTS, type ShadowOptions, Shadows } from './shadows.js';
 
 /** What a session must offer; {@link Session} does. */
 export type LightSession = Pick<
@@ -118,7 +118,7 @@ export class LumencastLight {
     };
     if (node !== undefined) {
       followed.release = this.#replica.hold(node);
-      followed.sent = poseOf(this.#replica.content.object(node) ?? object);
+      followed.sent = this.#poseOf(followed);
     }
     this.#followed.set(object, followed);
     return () => this.#unfollow(object);
@@ -184,7 +184,10 @@ export class LumencastLight {
   }
 
   #setFields(fields: readonly Field[]): void {
-    for (const warning of this.#grids.setFields(fields, this.#shadows?.lightCount ?? 0)) this.#warn(warning);
+    const { shadows } = this.options;
+    // A program's own shadows take units as well.
+    const shadowLights = (shadows || {}).lights ?? DEFAULT_SHADOW_LIGHTS;
+    for (const warning of this.#grids.setFields(fields, shadowLights)) this.#warn(warning);
   }
 
   #receive(event: SceneEvent): void {
@@ -219,8 +222,8 @@ export class LumencastLight {
 
   #sendNow(followed: Followed, now: number): void {
     if (followed.node === undefined) return this.#adopt(followed, now);
-    const { node, object, sent } = followed;
-    const pose = poseOf(this.content.light(node) === object ? object : (this.content.object(node) ?? object));
+    const { node, sent } = followed;
+    const pose = this.#poseOf(followed);
     const transform = changedParts(sent?.transform, pose.transform);
     const light = pose.light && changedParts(sent?.light, pose.light);
     if (!transform && !light) return;
@@ -231,10 +234,17 @@ export class LumencastLight {
     if (light) this.#track(followed, this.session.edit({ edit: 'set_light', node, ...light }));
   }
 
+  #poseOf({ object, node }: Followed): Pose {
+    if (isPunctualLight(object) && (node === undefined || this.#replica.isAdopted(node)))
+      return worldPoseOf(object);
+    if (node === undefined) return poseOf(object, undefined);
+    return poseOf(this.content.object(node) ?? object, this.content.light(node));
+  }
+
   #adopt(followed: Followed, now: number): void {
     const { object } = followed;
     if (!isPunctualLight(object) || followed.underWay.size > 0) return;
-    const pose = poseOf(object);
+    const pose = this.#poseOf(followed);
     followed.sent = pose;
     followed.sentAt = now;
     const adopted = this.#replica.adoptLight(object, describeLight(object), pose.transform).then((node) => {

@@ -106,6 +106,11 @@ export class Replica implements Values {
     });
   }
 
+  /** Whether a node is one of the program's own lights. */
+  isAdopted(node: number): boolean {
+    return this.#adopted.has(node);
+  }
+
   /** Lets this page own a node's transform and light until the returned function is called. */
   hold(node: number): () => void {
     return this.#reconciler.hold([

@@ -15,6 +15,8 @@ import {
 import { isPunctualLight } from './lights.js';
 import { materialsOf } from './patch.js';
 
+export const DEFAULT_SHADOW_LIGHTS = 4;
+
 export interface ShadowOptions {
   /** Texels of a shadow map along an axis; a point light has six maps of half that. 2048 unless given. */
   mapSize?: number;
@@ -33,14 +35,9 @@ export class Shadows {
   readonly #bounds = new Box3();
   readonly #fitted = new WeakMap<DirectionalLight, Quaternion>();
 
-  constructor({ mapSize = 2048, lights = 4 }: ShadowOptions = {}) {
+  constructor({ mapSize = 2048, lights = DEFAULT_SHADOW_LIGHTS }: ShadowOptions = {}) {
     this.#mapSize = mapSize;
     this.#maxLights = lights;
-  }
-
-  /** Lights that cast shadows. */
-  get lightCount(): number {
-    return this.#lights.length;
   }
 
   /** Lets an object and all below it cast and receive shadows. */

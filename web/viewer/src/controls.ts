@@ -34,6 +34,7 @@ export class Controls {
     this.#dock = this.#createDock(gltf.cameras.map((camera, i) => camera.name || `Camera ${i + 1}`));
     this.#inspector = new Inspector({
       touched: (object) => viewer.touch.touch(object),
+      carrier: (object) => viewer.light.content.carrier(object),
       gizmo: (mode) => this.#setGizmo(mode),
       close: () => selection.select(undefined),
     });

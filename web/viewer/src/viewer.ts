@@ -34,7 +34,9 @@ const ASK_INTERVAL = 3000;
 /** Loads everything that a viewer needs, in the order in which it can fail. */
 export async function openViewer(options: ViewerOptions): Promise<Viewer> {
   const renderer = await createRenderer(options.renderer, options.canvas);
-  const gltf = await loadGltf(options.file, options.onProgress);
+  const gltf = await loadGltf(options.file, options.onProgress).catch((error: Error) => {
+    throw new Error(`The scene's file cannot be shown (${error.message}).`, { cause: error });
+  });
   const scene = new Scene();
   scene.add(gltf.scene);
   const session = options.connect();

@@ -7,6 +7,8 @@ import { h, iconButton, setPressed, slider } from './dom.js';
 export interface InspectorActions {
   /** The object has been changed by hand. */
   touched(object: Object3D): void;
+  /** What is turned where the object belongs to a node. */
+  carrier(object: Object3D): Object3D;
   gizmo(mode: Gizmo): void;
   close(): void;
 }
@@ -54,15 +56,16 @@ export class Inspector {
       this.#color(object),
     ];
     if (object instanceof DirectionalLight) {
+      const carrier = this.actions.carrier(object);
       const degrees = (value: number) => `${value.toFixed(0)}°`;
       rows.push(
         this.#slider('Height', { min: 1, max: 90, step: 0.2 }, degrees, {
           get: () => sunAngles(object).elevation * DEGREES,
-          set: (value) => setSunAngles(object, { ...sunAngles(object), elevation: value / DEGREES }),
+          set: (value) => setSunAngles(carrier, { ...sunAngles(object), elevation: value / DEGREES }),
         }),
         this.#slider('Direction', { min: -180, max: 180, step: 0.5 }, degrees, {
           get: () => sunAngles(object).azimuth * DEGREES,
-          set: (value) => setSunAngles(object, { ...sunAngles(object), azimuth: value / DEGREES }),
+          set: (value) => setSunAngles(carrier, { ...sunAngles(object), azimuth: value / DEGREES }),
         }),
       );
     }

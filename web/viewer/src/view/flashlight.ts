@@ -57,10 +57,11 @@ export class Flashlight {
     this.touch.touch(spot);
     const { translation, rotation } = this.#pose();
     const world = new Matrix4().compose(translation, rotation, new Vector3(1, 1, 1));
-    const parent = spot.parent?.matrixWorld ?? new Matrix4();
+    const carrier = this.light.content.carrier(spot);
+    const parent = carrier.parent?.matrixWorld ?? new Matrix4();
     const local = parent.clone().invert().multiply(world);
-    local.decompose(spot.position, spot.quaternion, new Vector3());
-    spot.updateMatrixWorld();
+    local.decompose(carrier.position, carrier.quaternion, new Vector3());
+    carrier.updateMatrixWorld();
   }
 
   /** In world space: at the hand, aimed at a point far along the pointer's ray. */

@@ -66,7 +66,8 @@ export class Selection {
   select(object: Object3D | undefined): void {
     this.#selected = object;
     // A directional light has no place; sliders turn it.
-    if (object && !(object instanceof DirectionalLight)) this.#controls.attach(object);
+    if (object && !(object instanceof DirectionalLight))
+      this.#controls.attach(this.light.content.carrier(object));
     else this.#controls.detach();
     this.onChange(object);
   }

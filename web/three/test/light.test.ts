@@ -1,0 +1,238 @@
+import type { Edit, Field, LightState, SessionEvents } from '@lumencast/client';
+import {
+  DataUtils,
+  Group,
+  Light,
+  Mesh,
+  MeshStandardMaterial,
+  PerspectiveCamera,
+  PointLight,
+  Scene,
+  SpotLight,
+  Vector3,
+  Box3,
+} from 'three';
+import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
+import { beforeEach, describe, expect, it, vi } from 'vitest';
+import { type LightSession, LumencastLight } from '../src/light.js';
+import type { Platform, ProbeGrid } from '../src/platform.js';
+
+const camera = new PerspectiveCamera();
+const settle = () => new Promise((resolve) => setTimeout(resolve));
+
+class FakeSession {
+  readonly sent: { edit: Edit; accept: () => void; refuse: (error: Error) => void }[] = [];
+  readonly origin = 'http://localhost:1';
+  catalog: SessionEvents['catalog'] | undefined;
+  state: LightState = { fields: [], age: undefined };
+  closed = false;
+  readonly #listeners = new Map<string, (value: never) => void>();
+
+  on(event: string, listener: (value: never) => void): () => void {
+    this.#listeners.set(event, listener);
+    return () => this.#listeners.delete(event);
+  }
+
+  tell<K extends keyof SessionEvents>(event: K, value: SessionEvents[K]): void {
+    this.#listeners.get(event)?.(value as never);
+  }
+
+  edit(edit: Edit): Promise<void> {
+    return new Promise((accept, refuse) => this.sent.push({ edit, accept, refuse }));
+  }
+
+  light = () => this.state;
+  sceneTime = () => undefined;
+  setCamera = vi.fn();
+  close = () => void (this.closed = true);
+}
+
+class FakeGrid extends Light {
+  resolution = new Vector3();
+  boundingBox = new Box3();
+  priority = 0;
+  texture: ProbeGrid['texture'] = null;
+  width = 0;
+  height = 0;
+  depth = 0;
+  updateBoundingBox(): void {}
+}
+
+const platform: Platform = {
+  createGrid: () => new FakeGrid() as ProbeGrid,
+  scaleIn: 'atlas',
+  freeGrids: () => 2,
+  max3DTextureSize: 256,
+  patch: () => {},
+  unpatch: () => {},
+};
+
+const field: Field = {
+  id: 4,
+  kind: 'volume',
+  basis: 'sh',
+  order: 2,
+  use: 'all',
+  grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: [1, 1, 1], resolution: [1, 1, 1] },
+  cellsMin: [0, 0, 0],
+  regions: [],
+  layers: 3,
+};
+
+let session: FakeSession;
+let scene: Scene;
+let mesh: Mesh;
+let light: LumencastLight;
+let warnings: string[];
+
+beforeEach(() => {
+  session = new FakeSession();
+  scene = new Scene();
+  mesh = new Mesh(undefined, new MeshStandardMaterial());
+  const root = new Group().add(mesh);
+  scene.add(root);
+  const gltf = {
+    scene: root,
+    cameras: [],
+    animations: [],
+    parser: { associations: new Map([[mesh, { nodes: 3 }]]) },
+  };
+  warnings = [];
+  light = new LumencastLight(session as unknown as LightSession, platform, {
+    scene,
+    gltf: gltf as unknown as GLTF,
+    onWarning: (message) => warnings.push(message),
+  });
+});
+
+describe('light', () => {
+  it('goes into a grid: halves of value over scale, and the scale in the free channel', () => {
+    session.tell('catalog', { epoch: '', scene: { name: '', root: '' }, tickSeconds: 0.04, fields: [field] });
+    const coefficients = new Float32Array(27).fill(1024).with(0, 2048);
+    const lit = { field, coefficients, scale: 2048, revision: 1, age: 0, sceneVersion: 0, tick: 0 };
+    session.state = { fields: [{ ...lit, regions: { lit: 1, all: 1 } }], age: 0 };
+    light.update(camera);
+    const texture = light.grids[0].texture!;
+    const halves = [...(texture.image.data as Uint16Array)].map((half) => DataUtils.fromHalfFloat(half));
+    expect(halves).toHaveLength(7 * 3 * 4);
+    expect(halves.slice(0, 4)).toEqual([1, 0.5, 0.5, 0.5]);
+    expect(halves.slice(-4)).toEqual([0.5, 0.5, 0.5, 11]);
+
+    const version = texture.version;
+    light.update(camera);
+    expect(texture.version).toBe(version);
+    session.state = { fields: [{ ...session.state.fields[0], revision: 2 }], age: 0 };
+    light.update(camera);
+    expect(texture.version).toBe(version + 1);
+
+    light.show = 'direct';
+    expect(light.grids[0].texture).not.toBe(texture);
+    light.show = 'both';
+    expect(light.grids[0].texture).toBe(texture);
+    light.dispose();
+    expect(scene.children).toHaveLength(1);
+    expect(session.closed).toBe(true);
+  });
+});
+
+describe('follow', () => {
+  const edits = () => session.sent.map(({ edit }) => edit);
+
+  it('sends what changed, at most 30 times a second', () => {
+    light.follow(mesh);
+    light.update(camera, 0);
+    expect(edits()).toEqual([]);
+    for (let now = 100; now < 200; now += 5) {
+      mesh.position.x = now;
+      session.sent.forEach(({ accept }) => accept());
+      light.update(camera, now);
+    }
+    expect(edits()[0]).toEqual({ edit: 'move_node', node: 3, translation: [100, 0, 0] });
+    expect(edits().length).toBeGreaterThanOrEqual(2);
+    expect(edits().length).toBeLessThanOrEqual(4);
+  });
+
+  it('does not queue on a link that is too slow', () => {
+    light.follow(mesh);
+    for (let now = 100; now < 10_000; now += 100) {
+      mesh.position.x = now;
+      light.update(camera, now);
+    }
+    expect(session.sent).toHaveLength(4);
+  });
+
+  it('is not disturbed by others until it ends, and its last edit is answered', async () => {
+    const unfollow = light.follow(mesh);
+    mesh.position.x = 1;
+    light.update(camera, 100);
+    const others: Edit = { edit: 'move_node', node: 3, translation: [9, 0, 0] };
+    session.tell('edit', { edit: others, own: false });
+    expect(mesh.position.x).toBe(1);
+    mesh.position.x = 2;
+    unfollow();
+    expect(edits().at(-1)).toEqual({ edit: 'move_node', node: 3, translation: [2, 0, 0] });
+    expect(mesh.position.x).toBe(2);
+    for (const { edit, accept } of session.sent) {
+      session.tell('edit', { edit, own: true });
+      accept();
+    }
+    await settle();
+    expect(mesh.position.x).toBe(2);
+    session.tell('edit', { edit: others, own: false });
+    expect(mesh.position.x).toBe(9);
+  });
+
+  it('sends everything anew after a restart of the server', () => {
+    light.follow(mesh);
+    mesh.position.x = 5;
+    session.tell('snapshot', []);
+    expect(mesh.position.x).toBe(5);
+    light.update(camera, 100);
+    expect(edits().at(-1)).toMatchObject({ edit: 'move_node', node: 3, translation: [5, 0, 0] });
+  });
+
+  it('adds an own light to the server’s scene, aimed at its target, and moves it from then on', async () => {
+    const lamp = new SpotLight(0xffffff, 7);
+    lamp.position.set(0, 2, 0);
+    lamp.target.position.set(0, 2, 5);
+    scene.add(lamp, lamp.target);
+    light.follow(lamp);
+    light.update(camera, 100);
+    light.update(camera, 200);
+    expect(edits()).toHaveLength(1);
+    const [{ edit, accept }] = session.sent;
+    expect(edit).toMatchObject({ edit: 'add_light', light: { type: 'spot', intensity: 7 } });
+    // Along −Z of the node: half a turn about y.
+    const { rotation } = (edit as Edit & { edit: 'add_light' }).transform!;
+    expect(Math.abs(rotation![1])).toBeCloseTo(1);
+
+    session.tell('edit', { edit: { ...edit, node: 12 } as Edit, own: true });
+    accept();
+    await settle();
+    lamp.intensity = 8;
+    light.update(camera, 300);
+    expect(edits()[1]).toEqual({ edit: 'set_light', node: 12, intensity: 8 });
+  });
+
+  it('refuses what the server cannot know, and warns of what it refuses', async () => {
+    expect(() => light.follow(new Mesh())).toThrow(/not part of the server/);
+    light.follow(mesh);
+    mesh.position.x = 1;
+    light.update(camera, 100);
+    session.sent[0].refuse(new Error('no edits without a token'));
+    await settle();
+    expect(warnings.join()).toMatch(/token/);
+  });
+});
+
+describe('show', () => {
+  it('darkens lights for the time of rendering only', () => {
+    const lamp = new PointLight(0xffffff, 5);
+    scene.add(lamp);
+    light.show = 'indirect';
+    scene.onBeforeRender(undefined!, scene, camera, undefined!, undefined!, undefined!);
+    expect(lamp.intensity).toBe(0);
+    scene.onAfterRender(undefined!, scene, camera, undefined!, undefined!, undefined!);
+    expect(lamp.intensity).toBe(5);
+  });
+});
