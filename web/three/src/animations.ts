@@ -11,10 +11,15 @@ interface Clock extends Required<Playback> {
 }
 
 interface Playing {
+  readonly copies: Copy[];
+  clock: Clock;
+}
+
+/** One copy of what an animation moves. */
+interface Copy {
+  readonly of: Animation;
   readonly mixer: AnimationMixer;
   readonly action: AnimationAction;
-  readonly duration: number;
-  clock: Clock;
   /** Where the scene shows it. */
   shown: number;
 }
@@ -50,21 +55,29 @@ export class Animations {
     for (const animation of this.content.animations.keys()) {
       const playing = this.#get(animation);
       if (!playing) continue;
-      const time = wrap(timeAt(playing.clock, now), playing.duration);
-      if (time === playing.shown) continue;
-      playing.shown = playing.action.time = time;
-      playing.mixer.update(0);
-      moved = true;
+      for (const copy of playing.copies) {
+        const time = wrap(timeAt(playing.clock, now), copy.of.clip.duration);
+        if (time === copy.shown) continue;
+        copy.shown = copy.action.time = time;
+        copy.mixer.update(0);
+        moved = true;
+      }
     }
     return moved;
   }
 
   #get(animation: number): Playing | undefined {
-    const known = this.#playing.get(animation);
-    const source = this.content.animations.get(animation);
-    if (known || !source) return known;
-    const playing = start(source);
-    this.#playing.set(animation, playing);
+    const sources = this.content.animations.get(animation);
+    if (!sources) {
+      this.#playing.delete(animation);
+      return undefined;
+    }
+    let playing = this.#playing.get(animation);
+    if (!playing) {
+      playing = { copies: [], clock: { ...FROM_START } };
+      this.#playing.set(animation, playing);
+    }
+    for (const source of sources.slice(playing.copies.length)) playing.copies.push(start(source));
     return playing;
   }
 }
@@ -79,10 +92,10 @@ export function wrap(time: number, duration: number): number {
   return duration > 0 ? time - Math.floor(time / duration) * duration : 0;
 }
 
-function start({ clip, root }: Animation): Playing {
+function start(of: Animation): Copy {
   // A mixer each: their order says which one wins where two move the same node, as on the server.
-  const mixer = new AnimationMixer(root);
-  const action = mixer.clipAction(clip);
+  const mixer = new AnimationMixer(of.root);
+  const action = mixer.clipAction(of.clip);
   action.play();
-  return { mixer, action, duration: clip.duration, clock: { ...FROM_START }, shown: Number.NaN };
+  return { of, mixer, action, shown: Number.NaN };
 }

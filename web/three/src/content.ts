@@ -16,20 +16,27 @@ export class Content {
   readonly #object = new Map<number, Object3D>();
   readonly #node = new WeakMap<Object3D, number>();
   readonly #materials = new Map<number, Material[]>();
-  readonly #animations = new Map<number, Animation>();
+  readonly #animations = new Map<number, readonly Animation[]>();
   readonly cameras: Camera[] = [];
 
-  /** Takes in a file whose first node, material and animation have these numbers. */
+  /** Takes in a file, or another copy of one, whose first node, material and animation have these numbers. */
   add(gltf: GLTF, first: { node: number; material: number; animation: number }): void {
     for (const [thing, { nodes, materials }] of gltf.parser.associations) {
       if (nodes !== undefined && 'isObject3D' in thing) this.setNode(first.node + nodes, thing);
       if (materials !== undefined && 'isMaterial' in thing)
         this.#addMaterial(first.material + materials, thing);
     }
-    gltf.animations.forEach((clip, i) =>
-      this.#animations.set(first.animation + i, { clip, root: gltf.scene }),
-    );
+    gltf.animations.forEach((clip, i) => {
+      const copies = this.#animations.get(first.animation + i) ?? [];
+      this.#animations.set(first.animation + i, [...copies, { clip, root: gltf.scene }]);
+    });
     this.cameras.push(...gltf.cameras);
+  }
+
+  /** Forgets materials and animations from these numbers on. */
+  forgetFrom(first: { material: number; animation: number }): void {
+    for (const number of this.#materials.keys()) if (number >= first.material) this.#materials.delete(number);
+    for (const number of this.#animations.keys()) if (number >= first.animation) this.#animations.delete(number);
   }
 
   /** GLTFLoader makes variants of a material, say for meshes with vertex colours. */
@@ -91,7 +98,8 @@ export class Content {
     return this.#materials.get(number) ?? [];
   }
 
-  get animations(): ReadonlyMap<number, Animation> {
+  /** Animations by number; several where a file has been added several times. */
+  get animations(): ReadonlyMap<number, readonly Animation[]> {
     return this.#animations;
   }
 }

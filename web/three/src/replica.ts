@@ -2,9 +2,10 @@ import type { Edit, Environment, Light, Playback, Session, Transform, Vec4 } fro
 import { Group, Material, MeshStandardMaterial, Object3D, type Scene } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { Animations } from './animations.js';
-import { Content, instantiateMesh, loadGltf } from './content.js';
+import { Content } from './content.js';
 import { showEnvironment } from './environment.js';
 import { createLight, lightSpec, setColor, setLight } from './lights.js';
+import { Models } from './models.js';
 import { Reconciler, type Values } from './reconcile.js';
 
 /** What a replica tells those who draw the scene. */
@@ -25,6 +26,7 @@ export class Replica implements Values {
   revision = 0;
 
   readonly #root: Object3D;
+  readonly #models: Models;
   readonly #animations: Animations;
   readonly #reconciler = new Reconciler(this);
   /** Nodes that edits added, with their objects; forgotten when a snapshot starts anew. */
@@ -40,13 +42,13 @@ export class Replica implements Values {
 
   constructor(
     private readonly scene: Scene,
-    private readonly gltf: GLTF | undefined,
+    gltf: GLTF | undefined,
     private readonly session: Pick<Session, 'edit' | 'sceneTime'>,
     private readonly urlOf: (file: string) => string,
     private readonly events: ReplicaEvents,
   ) {
     this.#root = gltf?.scene ?? scene;
-    if (gltf) this.content.add(gltf, { node: 0, material: 0, animation: 0 });
+    this.#models = new Models(this.content, urlOf, gltf);
     this.#animations = new Animations(this.content);
     const environment = (gltf?.scene.userData as Extras | undefined)?.lumencast?.environment;
     if (environment) this.set('environment', environment);
@@ -66,6 +68,7 @@ export class Replica implements Values {
       this.#adopted.delete(node);
       this.content.deleteNode(node);
     }
+    this.#models.restart();
     this.#animations.restart();
     // What the edits add must be there before values are set on it.
     for (const edit of edits) this.#applyStructure(edit, undefined);
@@ -230,15 +233,7 @@ export class Replica implements Values {
 
   async #fillInstance(group: Group, { source, node = 0 }: Edit & { edit: 'add_instance' }): Promise<void> {
     try {
-      if ('mesh' in source) {
-        if (this.gltf) group.add(await instantiateMesh(this.gltf, source.mesh));
-      } else {
-        const gltf = await loadGltf(this.urlOf(source.file));
-        for (const [thing, { nodes }] of gltf.parser.associations) {
-          if (nodes !== undefined && 'isObject3D' in thing) this.content.setNode(node + 1 + nodes, thing);
-        }
-        group.add(gltf.scene);
-      }
+      group.add(await this.#models.instantiate(source, node));
       this.events.added(group);
       this.revision++;
     } catch (error) {

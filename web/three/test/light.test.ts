@@ -95,7 +95,7 @@ beforeEach(() => {
     scene: root,
     cameras: [],
     animations: [],
-    parser: { associations: new Map([[mesh, { nodes: 3 }]]) },
+    parser: { associations: new Map([[mesh, { nodes: 3 }]]), json: {} },
   };
   warnings = [];
   light = new LumencastLight(session as unknown as LightSession, platform, {

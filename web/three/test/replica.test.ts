@@ -26,7 +26,12 @@ function file() {
     [lamp, { nodes: 1 }],
     [mesh.material, { materials: 0 }],
   ]);
-  const gltf = { scene, cameras: [], animations: [clip], parser: { associations } } as unknown as GLTF;
+  const gltf = {
+    scene,
+    cameras: [],
+    animations: [clip],
+    parser: { associations, json: { materials: [{}] } },
+  } as unknown as GLTF;
   return { gltf, mesh, lamp };
 }
 
