@@ -16,6 +16,7 @@ import { Meter } from './session/meter.js';
 import { Outbox } from './session/outbox.js';
 import { CATALOG_PRIORITY, type TrackPlan } from './session/plan.js';
 import { Reading, type Sink } from './session/reading.js';
+import { reportUncaught } from './session/uncaught.js';
 import type { Connector, Link, Target } from './transport.js';
 import { moqConnector } from './transport/moq.js';
 import { WireError } from './wire-error.js';
@@ -263,8 +264,9 @@ class LiveSession implements Session, Sink {
   }
 
   private drop(error: unknown): void {
-    if (!(error instanceof WireError)) throw error;
-    this.meter.dropped++;
+    if (error instanceof WireError) this.meter.dropped++;
+    // A slip of this program, not of the sender.
+    else reportUncaught(error);
   }
 
   /** Passes on what the cache has learnt. */

@@ -5,6 +5,7 @@ import { random } from './support/random.js';
 
 const TICK = 0.04;
 const FRAME = 1000;
+const perUpdate = (layers: number) => [0.25, 0.5, 1][layers - 1];
 
 /** A link with a rate and an endless buffer, as behind many a home router. */
 class Link {
@@ -28,7 +29,7 @@ function simulate(
   seconds: number,
   jitter = 0,
 ): { now: number; layers: number }[] {
-  const control = new LayerControl(3, TICK, 1);
+  const control = new LayerControl(3, TICK, perUpdate);
   const link = new Link(rate);
   const noise = random(2);
   const history = [];
@@ -88,7 +89,7 @@ describe('temporal layers', () => {
   });
 
   it('are dropped when nothing comes though the server goes on', () => {
-    const control = new LayerControl(3, TICK, 1);
+    const control = new LayerControl(3, TICK, perUpdate);
     for (let tick = 0; tick < 50; tick++) {
       control.arrived(tick, 0.02, FRAME, tick * TICK);
       control.judge(tick * TICK);
@@ -100,7 +101,7 @@ describe('temporal layers', () => {
 
   it('wait longer where the estimate says that one more would not fit', () => {
     const recovery = (bandwidth: number | undefined) => {
-      const control = new LayerControl(2, TICK, 1);
+      const control = new LayerControl(2, TICK, perUpdate);
       for (let tick = 0; tick < 2000; tick++) {
         const now = tick * TICK;
         const due = tick % 4 === 0 || (control.layers === 2 && tick % 4 === 2);

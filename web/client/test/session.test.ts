@@ -308,6 +308,14 @@ describe('reading', () => {
     expect(timings[100].arrived - timings[0].arrived).toBeCloseTo(4000, 3);
   });
 
+  it('does not take tracks that it does not read for lost ones', async () => {
+    // 100 regions: more tracks than a connection carries.
+    const { net, server, session } = await joined(new FakeServer({ regions: 100 }));
+    expect(net.link.readers.size).toBe(82);
+    await run(net, server, 4);
+    expect(session.stats.layers).toBe(3);
+  });
+
   it('drops layers on a link that is too slow, and takes them back when it recovers', async () => {
     const { net, server, session } = await joined();
     await run(net, server, 2);

@@ -1,3 +1,5 @@
+import { reportUncaught } from './uncaught.js';
+
 /** Listeners by kind of event. A listener that throws disturbs neither the others nor the sender. */
 export class Emitter<Events> {
   private readonly listeners = new Map<keyof Events, Set<(value: never) => void>>();
@@ -15,10 +17,7 @@ export class Emitter<Events> {
       try {
         (listener as (value: Events[K]) => void)(value);
       } catch (error) {
-        // Where uncaught errors go: the console, and whoever watches them.
-        queueMicrotask(() => {
-          throw error;
-        });
+        reportUncaught(error);
       }
     }
   }

@@ -14,9 +14,6 @@ const MEMORY = 60;
 /** Seconds a second by which the delay falls, at least, where a queue drains. */
 const DRAIN = 0.05;
 
-/** Updates of each layer among four: layer 0 every fourth, 1 another fourth, 2 the odd ones. */
-const PER_FOUR = [1, 2, 4] as const;
-
 /**
  * Decides how many temporal layers to ask for. The link is too slow when light comes later and later
  * after it was computed, when frames that should have come did not, or when none comes at all while the
@@ -43,11 +40,14 @@ export class LayerControl {
   private newest = NaN;
   private lastArrival = -Infinity;
 
-  /** `most`: layers that the server offers. `regions`: how many are read. */
+  /**
+   * `most`: layers that the server offers. `framesPerUpdate`: how many frames an update of the fields
+   * brings on average when so many layers are read.
+   */
   constructor(
     private readonly most: number,
     private readonly tickSeconds: number,
-    private readonly regions: number,
+    private readonly framesPerUpdate: (layers: number) => number,
   ) {
     this.current = most;
     this.window = Math.max(WINDOW.seconds, WINDOW.ticks * tickSeconds);
@@ -128,7 +128,7 @@ export class LayerControl {
 
   /** Frames that came, of those that should have: the newest update tells how many there were. */
   private share(): number {
-    const expected = ((this.newest - this.first) * PER_FOUR[this.current - 1] * this.regions) / 4;
+    const expected = (this.newest - this.first) * this.framesPerUpdate(this.current);
     // Over few updates the layers' turns make the count too uneven to judge by.
     return this.newest - this.first < 8 ? 1 : this.frames / expected;
   }

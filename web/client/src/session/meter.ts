@@ -32,9 +32,10 @@ export class Meter {
     if (this.arrivals.length > TIMINGS) this.arrivals.shift();
   }
 
-  /** Updates are numbered anew. */
+  /** Updates are numbered anew, and tracks may be others. */
   restart(): void {
     this.newestUpdate = -1;
+    this.byTrack.clear();
   }
 
   bandwidthByTrack(now: number): Map<string, number> {

@@ -27,8 +27,8 @@ export class Reading {
     private readonly sink: Sink,
   ) {
     const most = Math.max(1, ...catalog.fields.map((field) => field.layers));
-    const regions = catalog.fields.reduce((sum, field) => sum + field.regions.length, 0);
-    this.layers = new LayerControl(most, catalog.tickSeconds, regions);
+    const perUpdate = [1, 2, 3].map((layers) => framesPerUpdate(planTracks(catalog, layers, undefined)));
+    this.layers = new LayerControl(most, catalog.tickSeconds, (layers) => perUpdate[layers - 1]);
     this.stateReader = link.subscribe('state', { priority: STATE_PRIORITY, maxAge: STATE_AGE }, (frame) =>
       sink.state(frame),
     );
@@ -70,4 +70,9 @@ export class Reading {
     for (const reader of this.readers.values()) reader.close();
     this.readers.clear();
   }
+}
+
+/** Frames that an update brings on average: layers 0 and 1 have every fourth each, layer 2 every second. */
+function framesPerUpdate(plan: readonly TrackPlan[]): number {
+  return plan.reduce((sum, { layer }) => sum + (layer < 2 ? 1 / 4 : 1 / 2), 0);
 }
