@@ -1,0 +1,181 @@
+//! Reading light at a point.
+
+use glam::{UVec3, Vec3};
+
+use crate::{Grid, ProbeVolume, sh::Sh};
+
+/// How far along its normal a surface's point is moved before light is read, so that probes behind
+/// the surface count less.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum OffsetPolicy {
+    /// Not at all.
+    None,
+    /// By half the distance between probes, along each of the box's axes: three.js's rule.
+    #[default]
+    HalfCell,
+    /// By metres.
+    Metres(f32),
+}
+
+impl OffsetPolicy {
+    /// `position` in cells, moved along `normal` (both of the world).
+    fn cell_from_world(self, grid: &Grid, position: Vec3, normal: Vec3) -> Vec3 {
+        let normal = normal.normalize_or_zero();
+        match self {
+            Self::None => grid.cell_from_world(position),
+            Self::HalfCell => {
+                grid.cell_from_world(position) + 0.5 * (grid.rotation.inverse() * normal)
+            }
+            Self::Metres(metres) => grid.cell_from_world(position + metres * normal),
+        }
+    }
+}
+
+impl Grid {
+    /// Size of a cell along the box's axes, metres.
+    pub fn spacing(&self) -> Vec3 {
+        self.size / self.resolution.as_vec3()
+    }
+
+    /// A world position in cells: the first probe lies at 0, the next along x at (1, 0, 0).
+    pub fn cell_from_world(&self, position: Vec3) -> Vec3 {
+        let local = self.rotation.inverse() * (position - self.center);
+        (local / self.size + 0.5) * self.resolution.as_vec3() - 0.5
+    }
+
+    /// Distance of a world position from the box, metres; 0 inside.
+    pub fn distance(&self, position: Vec3) -> f32 {
+        let local = self.rotation.inverse() * (position - self.center);
+        (local.abs() - 0.5 * self.size).max(Vec3::ZERO).length()
+    }
+
+    /// How much a world position belongs to the box: 1 inside the outermost probes' centres, falling
+    /// smoothly (3t² − 2t³) to 0 at the border, half a cell farther out.
+    pub fn weight(&self, position: Vec3) -> f32 {
+        let cell = self.cell_from_world(position);
+        let to_border = (cell + 0.5).min(self.resolution.as_vec3() - 0.5 - cell);
+        // An axis of one cell reaches from border to border: half of it is half a cell.
+        let t = (2.0 * to_border).clamp(Vec3::ZERO, Vec3::ONE);
+        (t * t * (3.0 - 2.0 * t)).element_product()
+    }
+}
+
+impl ProbeVolume {
+    /// Light at a world position on a surface with a world `normal` (zero in free space): trilinear
+    /// between the eight probes about the moved point, which is first clamped to the outermost
+    /// probes.
+    pub fn sample(&self, position: Vec3, normal: Vec3, offset: OffsetPolicy) -> Sh {
+        let cell = offset.cell_from_world(&self.grid, position, normal);
+        let last = (self.grid.resolution - 1).as_vec3();
+        // Positions that are not finite read the first probe.
+        let cell = if cell.is_finite() { cell.clamp(Vec3::ZERO, last) } else { Vec3::ZERO };
+        let low = cell.floor();
+        let t = cell - low;
+        let (low, high) = (low.as_uvec3(), (low + 1.0).min(last).as_uvec3());
+        let mut light = Sh::dark(self.order);
+        for corner in 0..8_u32 {
+            let far = [corner & 1 != 0, corner & 2 != 0, corner & 4 != 0];
+            let pick = |axis: usize| if far[axis] { high[axis] } else { low[axis] };
+            let share = |axis: usize| if far[axis] { t[axis] } else { 1.0 - t[axis] };
+            let weight = share(0) * share(1) * share(2);
+            if weight > 0.0 {
+                let index = self.grid.index(UVec3::new(pick(0), pick(1), pick(2)));
+                for (sum, c) in light.coefficients.iter_mut().zip(self.probe(index)) {
+                    *sum += *c * weight;
+                }
+            }
+        }
+        light
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Order, VolumeId};
+    use glam::Quat;
+
+    /// A volume whose c0 is an affine function of world position, which trilinear sampling keeps.
+    fn affine(rotation: Quat) -> ProbeVolume {
+        let grid = Grid {
+            center: Vec3::new(1.0, 2.0, 3.0),
+            rotation,
+            size: Vec3::new(4.0, 2.0, 6.0),
+            resolution: UVec3::new(4, 3, 5),
+        };
+        let mut volume = ProbeVolume::dark(VolumeId(0), grid, Order::L1);
+        for i in 0..grid.probe_count() {
+            volume.probe_mut(i)[0] = value(grid.position(grid.cell(i)));
+        }
+        volume
+    }
+
+    fn value(position: Vec3) -> Vec3 {
+        Vec3::new(position.x - 2.0 * position.y, position.z, 1.0)
+    }
+
+    #[test]
+    fn probes_and_the_space_between_read_as_they_are() {
+        for rotation in [Quat::IDENTITY, Quat::from_xyzw(0.1, 0.5, -0.3, 0.8).normalize()] {
+            let volume = affine(rotation);
+            for i in 0..volume.grid.probe_count() {
+                let position = volume.grid.position(volume.grid.cell(i));
+                let sampled = volume.sample(position, Vec3::ZERO, OffsetPolicy::None);
+                assert!((sampled.coefficients[0] - volume.probe(i)[0]).length() < 1e-4);
+            }
+            let between = volume.grid.center + rotation * Vec3::new(0.7, -0.3, 1.1);
+            let sampled = volume.sample(between, Vec3::ZERO, OffsetPolicy::None);
+            assert!((sampled.coefficients[0] - value(between)).length() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn beyond_the_outermost_probes_light_stays() {
+        let volume = affine(Quat::IDENTITY);
+        let last = volume.grid.resolution - 1;
+        let far = volume.grid.position(last) + Vec3::splat(100.0);
+        let sampled = volume.sample(far, Vec3::ZERO, OffsetPolicy::None);
+        assert_eq!(sampled.coefficients[0], volume.probe(volume.grid.index(last))[0]);
+        let nowhere = volume.sample(Vec3::NAN, Vec3::ZERO, OffsetPolicy::None);
+        assert_eq!(nowhere.coefficients[0], volume.probe(0)[0]);
+    }
+
+    #[test]
+    fn offsets_move_along_the_normal() {
+        for rotation in [Quat::IDENTITY, Quat::from_rotation_y(0.8)] {
+            let volume = affine(rotation);
+            let spacing = volume.grid.spacing();
+            let position = volume.grid.center;
+            let normal = rotation * Vec3::new(0.6, 0.8, 0.0);
+            let read = |offset| volume.sample(position, normal, offset).coefficients[0];
+            let half = position + rotation * (0.5 * spacing * Vec3::new(0.6, 0.8, 0.0));
+            assert!((read(OffsetPolicy::HalfCell) - value(half)).length() < 1e-4);
+            assert!(
+                (read(OffsetPolicy::Metres(0.25)) - value(position + 0.25 * normal)).length()
+                    < 1e-4
+            );
+            assert!((read(OffsetPolicy::None) - value(position)).length() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn a_volume_of_one_probe_reads_everywhere() {
+        let grid = Grid {
+            center: Vec3::ZERO,
+            rotation: Quat::IDENTITY,
+            size: Vec3::ONE,
+            resolution: UVec3::ONE,
+        };
+        let mut volume = ProbeVolume::dark(VolumeId(0), grid, Order::L1);
+        volume.probe_mut(0)[0] = Vec3::ONE;
+        for position in [Vec3::ZERO, Vec3::splat(7.0), Vec3::splat(-0.2)] {
+            assert_eq!(
+                volume.sample(position, Vec3::Y, OffsetPolicy::HalfCell).coefficients[0],
+                Vec3::ONE
+            );
+        }
+        assert_eq!(grid.weight(Vec3::ZERO), 1.0);
+        assert_eq!(grid.weight(Vec3::X * 0.25), 0.5);
+        assert_eq!(grid.weight(Vec3::X * 0.5), 0.0);
+    }
+}
