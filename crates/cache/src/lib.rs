@@ -1,1 +1,26 @@
-//! Order, loss, staleness and blending of received light.
+//! Order, loss, staleness and blending of received light: what a client knows, without a socket, a
+//! thread or a clock.
+//!
+//! ```
+//! use lumencast_cache::Cache;
+//! # use lumencast_codec::{Catalog, Epoch, SceneInfo};
+//! # let scene = SceneInfo { name: "room".into(), root: "room.glb".into() };
+//! # let catalog = Catalog { epoch: Epoch(1), scene, tick_seconds: 0.04, fields: vec![] }.encode();
+//! let mut cache = Cache::of_client("me");
+//! cache.catalog(&catalog, 0.0)?; // bytes of the tracks, as they come, with the time
+//! let light = cache.light(0.02); // at any time
+//! assert_eq!(light.age, None); // nothing has come yet
+//! # Ok::<(), lumencast_cache::CacheError>(())
+//! ```
+
+#![forbid(unsafe_code)]
+
+mod cache;
+mod clock;
+mod edits;
+mod error;
+mod region;
+
+pub use cache::{Cache, Light, Received};
+pub use edits::SceneEvent;
+pub use error::CacheError;

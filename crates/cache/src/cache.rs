@@ -1,0 +1,314 @@
+//! The cache itself: what comes in, and what is to be seen at a time.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::ops::Deref;
+
+use glam::Vec3;
+use lumencast_codec::{Catalog, ClientEdit, Epoch, Field, LightFile, ProbeHeader, StateFrame};
+use lumencast_light::{LightField, OffsetPolicy, ProbeVolume, VolumeId};
+use lumencast_scene::Edit;
+
+use crate::clock::ServerClock;
+use crate::edits::{Edits, SceneEvent};
+use crate::region::{Newest, RegionCache};
+use crate::CacheError;
+
+/// Seconds that the scene's time may run on past the newest state frame.
+const LONGEST_RUN: f64 = 1.0;
+
+/// What a client knows of a server: its fields and their light, its clock, its scene.
+///
+/// It owns no socket, no thread and no clock: the caller passes bytes in, and with every call the
+/// time `now` in seconds on a clock of its own that never goes back. Frames may be late, lost,
+/// doubled and out of order; the catalog comes first, again after each new connection. Wrong bytes
+/// give an error and change nothing.
+///
+/// Memory: five copies of the light of those regions that frames have come for, at most
+/// [`lumencast_codec::limits::CATALOG_PROBES`] probes.
+#[derive(Clone, Debug, Default)]
+pub struct Cache {
+    catalog: Option<Catalog>,
+    /// Whether the catalog is that of a file.
+    saved: bool,
+    fields: BTreeMap<u32, BTreeMap<u32, RegionCache>>,
+    light: LightField,
+    clock: ServerClock,
+    state: Option<StateFrame>,
+    edits: Edits,
+}
+
+/// What became of a probe frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Received {
+    /// Its head.
+    pub header: ProbeHeader,
+    /// Whether it was newer than what its region had. Older ones are not shown, but later deltas
+    /// may build on them.
+    pub news: bool,
+}
+
+/// Light at a moment.
+#[derive(Clone, Copy, Debug)]
+pub struct Light<'a> {
+    /// The volumes, blended to that moment. Regions for which nothing has come yet hold the light
+    /// of before, or none.
+    pub field: &'a LightField,
+    /// Seconds since the newest light was computed; `None` when none came from a server.
+    pub age: Option<f64>,
+    /// Seconds since the oldest region's light was computed.
+    pub oldest_age: Option<f64>,
+    /// Tick of the newest light.
+    pub tick: Option<u64>,
+    /// Version of the scene that the newest light was computed from.
+    pub scene_version: Option<u64>,
+}
+
+impl Light<'_> {
+    /// Irradiance on a surface at a world position, lux.
+    pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Vec3 {
+        self.field.irradiance(position, normal, OffsetPolicy::default())
+    }
+}
+
+impl Deref for Light<'_> {
+    type Target = LightField;
+
+    fn deref(&self) -> &LightField {
+        self.field
+    }
+}
+
+impl Cache {
+    /// For a client that sends no edits.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// For a client that sends edits under the name `client`, by which they come back.
+    pub fn of_client(client: impl Into<String>) -> Self {
+        Self { edits: Edits::of_client(client.into()), ..Self::default() }
+    }
+
+    /// The name under which this client's edits come back.
+    pub fn client(&self) -> &str {
+        self.edits.client()
+    }
+
+    /// Takes in a frame of the `catalog` track. A new epoch makes the cache forget updates,
+    /// acknowledgements and clock of the old one; the light stays until new light is there. Fields
+    /// and regions that are no longer listed are forgotten.
+    ///
+    /// # Errors
+    /// [`CacheError::Decode`].
+    pub fn catalog(&mut self, bytes: &[u8], _now: f64) -> Result<(), CacheError> {
+        self.set_catalog(Catalog::decode(bytes)?, false);
+        Ok(())
+    }
+
+    /// Starts from a saved field, before a server has been heard of.
+    ///
+    /// # Errors
+    /// [`CacheError::Decode`]; [`CacheError::Connected`] once a server's catalog has come.
+    pub fn load(&mut self, file: &[u8], now: f64) -> Result<(), CacheError> {
+        if self.catalog.is_some() && !self.saved {
+            return Err(CacheError::Connected);
+        }
+        let file = LightFile::read(file)?;
+        let mut loaded = Self::default();
+        loaded.set_catalog(file.catalog, true);
+        for frame in &file.frames {
+            match loaded.probes(frame.field, frame.region, 0, &frame.bytes, now) {
+                Ok(_) | Err(CacheError::UnknownField(_) | CacheError::UnknownRegion { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        *self = Self { edits: std::mem::take(&mut self.edits), ..loaded };
+        Ok(())
+    }
+
+    fn set_catalog(&mut self, catalog: Catalog, saved: bool) {
+        let restarted = self.catalog.as_ref().is_some_and(|old| old.epoch != catalog.epoch);
+        if restarted || self.saved {
+            self.clock = ServerClock::default();
+            self.state = None;
+            if !self.saved {
+                self.edits.restart();
+            }
+            for (id, regions) in &mut self.fields {
+                if let Some(field) = self.catalog.as_ref().and_then(|old| old.field(*id)) {
+                    regions.values_mut().for_each(|region| region.forget_updates(field.order));
+                }
+            }
+        }
+        let mut fields = BTreeMap::new();
+        let mut volumes = Vec::with_capacity(catalog.fields.len());
+        for field in &catalog.fields {
+            let same = self.catalog.as_ref().and_then(|old| old.field(field.id)).is_some_and(|old| old == field);
+            let known = self.light.volumes().iter().find(|volume| volume.id.0 == field.id);
+            match (same, self.fields.remove(&field.id), known) {
+                (true, Some(regions), Some(volume)) => {
+                    fields.insert(field.id, regions);
+                    volumes.push(volume.clone());
+                }
+                _ => {
+                    fields.insert(field.id, BTreeMap::new());
+                    volumes.push(lit_by(&self.light, field));
+                }
+            }
+        }
+        self.fields = fields;
+        self.light = LightField::new(volumes);
+        self.catalog = Some(catalog);
+        self.saved = saved;
+    }
+
+    /// Takes in a frame of the `state` track; whether it was newer than all before. What it tells
+    /// of the scene waits in [`Cache::scene_events`].
+    ///
+    /// # Errors
+    /// [`CacheError::Decode`], [`CacheError::NoCatalog`].
+    pub fn state(&mut self, bytes: &[u8], now: f64) -> Result<bool, CacheError> {
+        if self.catalog.is_none() || self.saved {
+            return Err(CacheError::NoCatalog);
+        }
+        let frame = StateFrame::decode(bytes)?;
+        let news = self.edits.take_in(&frame);
+        if news {
+            self.clock.sample(frame.tick, frame.clock, now);
+            let (edits, refused, snapshot) = (Vec::new(), Vec::new(), None);
+            self.state = Some(StateFrame { edits, refused, snapshot, ..frame });
+        }
+        Ok(news)
+    }
+
+    /// Takes in a frame of the track of a layer of a region.
+    ///
+    /// # Errors
+    /// Any [`CacheError`] but [`CacheError::Connected`]. A missing base
+    /// ([`lumencast_codec::DecodeError::MissingBase`]) is no reason to worry: a later frame helps.
+    pub fn probes(
+        &mut self,
+        field: u32,
+        region: u32,
+        layer: u8,
+        bytes: &[u8],
+        now: f64,
+    ) -> Result<Received, CacheError> {
+        let catalog = self.catalog.as_ref().ok_or(CacheError::NoCatalog)?;
+        let known = catalog.field(field).ok_or(CacheError::UnknownField(field))?;
+        let cells = known.region(region).ok_or(CacheError::UnknownRegion { field, region })?;
+        let header = ProbeHeader::read(bytes)?;
+        if header.info.layer() != layer {
+            return Err(CacheError::WrongLayer { update: header.info.update, layer });
+        }
+        let volume = self.light.volumes_mut().iter_mut().find(|volume| volume.id.0 == field);
+        let volume = volume.ok_or(CacheError::UnknownField(field))?;
+        let regions = self.fields.entry(field).or_default();
+        let news = regions
+            .entry(region)
+            .or_insert_with(|| RegionCache::new(cells, known.order))
+            .add(bytes, now, volume)?;
+        Ok(Received { header, news })
+    }
+
+    /// The light to be seen at `now`: every region on the way from its last update to its newest,
+    /// which it reaches one measured interval after that one came. An update that is overdue leaves
+    /// the newest standing.
+    pub fn light(&mut self, now: f64) -> Light<'_> {
+        for volume in self.light.volumes_mut() {
+            for region in self.fields.get_mut(&volume.id.0).into_iter().flat_map(|r| r.values_mut()) {
+                region.show(now, volume);
+            }
+        }
+        let all = || self.fields.values().flat_map(|r| r.values()).filter_map(RegionCache::newest);
+        let newest = all().max_by_key(|newest| newest.header.info.tick);
+        let oldest = all().min_by_key(|newest| newest.header.info.tick);
+        Light {
+            field: &self.light,
+            age: newest.and_then(|newest| self.age(newest, now)),
+            oldest_age: oldest.and_then(|oldest| self.age(oldest, now)),
+            tick: newest.map(|newest| newest.header.info.tick),
+            scene_version: newest.map(|newest| newest.header.info.scene_version),
+        }
+    }
+
+    /// Seconds since light was computed; since it came, where the server's clock is not known.
+    fn age(&self, light: &Newest, now: f64) -> Option<f64> {
+        if self.saved {
+            return None;
+        }
+        let tick_seconds = self.catalog.as_ref()?.tick_seconds;
+        let computed = self.clock.of_tick(light.header.info.tick, tick_seconds);
+        let age = match (self.clock.at(now), computed) {
+            (Some(time), Some(computed)) => time - computed,
+            _ => now - light.arrived,
+        };
+        Some(age.max(0.0))
+    }
+
+    /// What happened to the scene since the last call, in order.
+    pub fn scene_events(&mut self) -> Vec<SceneEvent> {
+        self.edits.take_events()
+    }
+
+    /// Edits that turn the scene as it stands in its file into the server's; `None` while a tick is
+    /// missing, until the next snapshot.
+    pub fn server_edits(&self) -> Option<&[Edit]> {
+        self.edits.server()
+    }
+
+    /// Puts an edit on the list of those that wait for the server; the bytes are to be sent. The
+    /// caller shows the edit at once and hears of its fate by [`Cache::scene_events`].
+    ///
+    /// # Errors
+    /// [`CacheError::TooManyPending`].
+    pub fn edit(&mut self, edit: Edit) -> Result<Vec<u8>, CacheError> {
+        self.edits.add(edit)
+    }
+
+    /// Edits that the server has not dealt with yet, oldest first; to be sent again on a new
+    /// connection.
+    pub fn pending(&self) -> &VecDeque<ClientEdit> {
+        self.edits.pending()
+    }
+
+    /// The server's run; `None` before its catalog.
+    pub fn epoch(&self) -> Option<Epoch> {
+        self.catalog.as_ref().filter(|_| !self.saved).map(|catalog| catalog.epoch)
+    }
+
+    /// What the server, or the loaded file, offers.
+    pub fn current_catalog(&self) -> Option<&Catalog> {
+        self.catalog.as_ref()
+    }
+
+    /// The newest state frame, without its edits.
+    pub fn newest_state(&self) -> Option<&StateFrame> {
+        self.state.as_ref()
+    }
+
+    /// The server's clock at `now`, seconds, late by the least delay of the way.
+    pub fn server_time(&self, now: f64) -> Option<f64> {
+        self.clock.at(now)
+    }
+
+    /// Scene time at `now`, seconds; it stands still when the server has been silent for a second.
+    pub fn scene_time(&self, now: f64) -> Option<f64> {
+        let state = self.state.as_ref()?;
+        let passed = self.clock.at(now)? - state.clock;
+        Some(state.time + passed.clamp(0.0, LONGEST_RUN))
+    }
+}
+
+/// A field's volume with the light that was known there before.
+fn lit_by(light: &LightField, field: &Field) -> ProbeVolume {
+    let mut volume = ProbeVolume::dark(VolumeId(field.id), field.grid, field.order);
+    for probe in 0..volume.grid.probe_count() {
+        let position = volume.grid.position(volume.grid.cell(probe));
+        if let Some(before) = light.sample(position, Vec3::ZERO, OffsetPolicy::None) {
+            let n = field.order.coefficients();
+            volume.probe_mut(probe).copy_from_slice(&before.coefficients[..n]);
+        }
+    }
+    volume
+}
