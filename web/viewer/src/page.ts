@@ -54,11 +54,13 @@ export async function openPage(find: () => Promise<Source>): Promise<void> {
     });
     warn = (message) => viewer.controls.notices.passing(message);
     early.forEach(warn);
-    curtain.say('Preparing the picture…');
+    curtain.say('Connecting to the light…');
     document.body.insertBefore(viewer.controls.element, curtain.element);
+    // Compiling shaders keeps the page busy for so long that WebTransport would lose against a WebSocket.
+    await Promise.race([viewer.session.ready, afterSeconds(4)]);
+    curtain.say('Preparing the picture…');
     viewer.start();
     window.lumencast = inside(viewer);
-    await Promise.race([viewer.session.ready, afterSeconds(4)]);
     curtain.lift();
   } catch (error) {
     console.error(error);
