@@ -128,7 +128,7 @@ export class Viewer {
     this.touch.update(now);
     this.light.update(this.rig.camera, now);
     this.selection.update();
-    this.probes.update(this.session.light(now), now);
+    if (this.probes.group.visible) this.probes.update(this.session.light(now), now);
     this.#refreshShadows();
     this.renderer.render(this.scene, this.rig.camera);
   }
@@ -180,8 +180,7 @@ export class Viewer {
   }
 
   #meterWhenLit(): void {
-    const { autoExposure, session } = this;
-    if (!autoExposure || session.light().fields.length === 0) return;
+    if (!this.autoExposure || this.light.lightRevision === 0) return;
     if (METER_AT.includes(this.#litFrames++)) void this.meter();
   }
 

@@ -18,7 +18,7 @@ const KEYS: readonly [keys: string, meaning: string][] = [
 export function helpPanel(): HTMLElement {
   return h(
     'aside',
-    { class: 'panel help', hidden: true, 'aria-label': 'Keys' },
+    { class: 'panel keys', hidden: true, 'aria-label': 'Keys' },
     h(
       'dl',
       {},

@@ -25,7 +25,7 @@ export class ProbeSpheres {
   }
 
   update(light: LightState, now: number): void {
-    if (!this.group.visible || now - this.#at < INTERVAL) return;
+    if (now - this.#at < INTERVAL) return;
     this.#at = now;
     for (const lit of light.fields) {
       let spheres = this.#fields.get(lit.field.id);
