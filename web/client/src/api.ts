@@ -35,7 +35,10 @@ export interface FieldLight {
 export interface LightState {
   /** In the catalog's order; fields of which nothing has arrived yet are left out. */
   readonly fields: readonly FieldLight[];
-  /** Seconds since the oldest part of the light was computed; `undefined` when there is none. */
+  /**
+   * Seconds since the newest light was computed; `undefined` when none came from a server. That of the
+   * oldest region stands with each field.
+   */
   readonly age: number | undefined;
 }
 

@@ -179,13 +179,13 @@ export class Cache {
     return { fields, age: this.age(now) };
   }
 
-  /** Seconds since the oldest part of the light was computed; `undefined` when none came from a server. */
+  /** Seconds since the newest light was computed; `undefined` when none came from a server. */
   age(now: number): number | undefined {
     const ages = [...this.fields.values()]
-      .map((cache) => cache.oldest())
-      .map((oldest) => oldest && this.ageOf(oldest.header.tick, oldest.arrived, now))
+      .map((cache) => cache.span()?.newest)
+      .map((newest) => newest && this.ageOf(newest.header.tick, newest.arrived, now))
       .filter((age) => age !== undefined);
-    return ages.length > 0 ? Math.max(...ages) : undefined;
+    return ages.length > 0 ? Math.min(...ages) : undefined;
   }
 
   /** Seconds since a tick's light was computed; since it came, where the server's clock is unknown. */

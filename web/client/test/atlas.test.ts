@@ -4,6 +4,7 @@ import { atlasLayout, halfBits, packAtlas } from '../src/atlas.js';
 import { valuesPerProbe } from '../src/codec/catalog.js';
 import type { Vec3 } from '../src/edit.js';
 import { random } from './support/random.js';
+import { readVectors } from './support/vectors.js';
 
 /** What a half is worth, from its definition. */
 function halfValue(bits: number): number {
@@ -78,4 +79,23 @@ describe('the atlas', () => {
     expect(() => packAtlas(coefficients, [1, 1, 1], 2, 1, new Uint16Array(3))).toThrow(RangeError);
     expect(() => packAtlas(coefficients, [1, 1, 2], 2, 1)).toThrow(RangeError);
   });
+
+  const { atlas: vectors } = readVectors<{
+    atlas: {
+      coefficients: Vec3[];
+      resolution: Vec3;
+      order: number;
+      scale_log2: number;
+      size: Vec3;
+      halves: number[];
+    }[];
+  }>('sh');
+  for (const { coefficients, resolution, order, scale_log2, size, halves } of vectors) {
+    it(`of order ${order} is that of vectors/sh.json`, () => {
+      const { width, height, depth } = atlasLayout(resolution, order);
+      expect([width, height, depth]).toEqual(size);
+      const atlas = packAtlas(Float32Array.from(coefficients.flat()), resolution, order, 2 ** scale_log2);
+      expect([...atlas]).toEqual(halves);
+    });
+  }
 });

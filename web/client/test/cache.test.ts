@@ -133,6 +133,16 @@ describe('light', () => {
     expect(cache.light(now).fields[0].age).toBeCloseTo(3 * TICK - delay, 6);
   });
 
+  it('tells the age of the newest light, and of each field’s oldest region', () => {
+    const server = new FakeServer({ regions: 2 });
+    const cache = joined(server);
+    feed(cache, server.step(), 0);
+    const { state, probes } = server.step();
+    feed(cache, { state, probes: probes.filter(({ track }) => track.includes('r1')) }, TICK);
+    expect(cache.light(0.1).age).toBeCloseTo(0.06, 6);
+    expect(cache.light(0.1).fields[0]).toMatchObject({ age: 0.1, tick: 0, sceneVersion: 0 });
+  });
+
   it('passes over fields and regions that it does not know', () => {
     const server = new FakeServer();
     const cache = joined(server);

@@ -6,6 +6,12 @@ import { ProbeDecoder } from '../codec/probes.js';
 /** Seconds that a change takes to show at most, however long the silence before it was. */
 const LONGEST_BLEND = 0.5;
 
+/** A frame that came. */
+export interface Arrival {
+  readonly header: ProbeHeader;
+  readonly arrived: number;
+}
+
 /** The newest light of a region and what is shown on the way there. */
 interface RegionState {
   readonly region: Region;
@@ -107,13 +113,16 @@ export class FieldCache {
     return { header, news: true };
   }
 
-  /** Head of the oldest of the regions' newest frames, and when it came. */
-  oldest(): { header: ProbeHeader; arrived: number } | undefined {
-    let oldest: { header: ProbeHeader; arrived: number } | undefined;
+  /** Of the regions' newest frames the oldest and the newest: their heads, and when they came. */
+  span(): { oldest: Arrival; newest: Arrival } | undefined {
+    let oldest: Arrival | undefined;
+    let newest: Arrival | undefined;
     for (const { header, arrived } of this.regions.values()) {
-      if (header && (!oldest || header.tick < oldest.header.tick)) oldest = { header, arrived };
+      if (!header) continue;
+      if (!oldest || header.tick < oldest.header.tick) oldest = { header, arrived };
+      if (!newest || header.tick > newest.header.tick) newest = { header, arrived };
     }
-    return oldest;
+    return oldest && newest && { oldest, newest };
   }
 
   /** The light at `now`; `undefined` when no region has any. `ageOf` tells the age of a tick's light. */
@@ -129,7 +138,7 @@ export class FieldCache {
     }
     if (lit === 0) return undefined;
     if (changed) this.revision++;
-    const oldest = this.oldest();
+    const oldest = this.span()?.oldest;
     return {
       field: this.field,
       coefficients: this.coefficients,
