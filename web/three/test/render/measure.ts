@@ -117,6 +117,7 @@ async function lamp(
     inner: number;
     outer: number;
   },
+  withPlugin = true,
 ): Promise<Radiance[]> {
   const { scene, camera } = floor();
   const three = light.type === 'point' ? new PointLight() : new SpotLight();
@@ -130,7 +131,7 @@ async function lamp(
   }
   scene.add(three);
   const renderer = await rendererOf(kind);
-  lit(kind, renderer, scene, session({ fields: [], age: undefined })).update(camera);
+  if (withPlugin) lit(kind, renderer, scene, session({ fields: [], age: undefined })).update(camera);
   return middleRow(renderer, scene, camera);
 }
 
