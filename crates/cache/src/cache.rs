@@ -8,10 +8,10 @@ use lumencast_codec::{Catalog, ClientEdit, Epoch, Field, LightFile, ProbeHeader,
 use lumencast_light::{LightField, OffsetPolicy, ProbeVolume, VolumeId};
 use lumencast_scene::Edit;
 
+use crate::CacheError;
 use crate::clock::ServerClock;
 use crate::edits::{Edits, SceneEvent};
 use crate::region::{Newest, RegionCache};
-use crate::CacheError;
 
 /// Seconds that the scene's time may run on past the newest state frame.
 const LONGEST_RUN: f64 = 1.0;
@@ -143,7 +143,11 @@ impl Cache {
         let mut fields = BTreeMap::new();
         let mut volumes = Vec::with_capacity(catalog.fields.len());
         for field in &catalog.fields {
-            let same = self.catalog.as_ref().and_then(|old| old.field(field.id)).is_some_and(|old| old == field);
+            let same = self
+                .catalog
+                .as_ref()
+                .and_then(|old| old.field(field.id))
+                .is_some_and(|old| old == field);
             let known = self.light.volumes().iter().find(|volume| volume.id.0 == field.id);
             match (same, self.fields.remove(&field.id), known) {
                 (true, Some(regions), Some(volume)) => {
@@ -216,7 +220,8 @@ impl Cache {
     /// the newest standing.
     pub fn light(&mut self, now: f64) -> Light<'_> {
         for volume in self.light.volumes_mut() {
-            for region in self.fields.get_mut(&volume.id.0).into_iter().flat_map(|r| r.values_mut()) {
+            for region in self.fields.get_mut(&volume.id.0).into_iter().flat_map(|r| r.values_mut())
+            {
                 region.show(now, volume);
             }
         }

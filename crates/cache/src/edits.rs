@@ -210,7 +210,10 @@ mod tests {
         assert!(edits.take_in(&snapshot(3, vec![remove(7)], 0)));
         assert_eq!(
             edits.take_events(),
-            [SceneEvent::Snapshot(vec![remove(1)]), SceneEvent::Edit { edit: remove(2), own: None }]
+            [
+                SceneEvent::Snapshot(vec![remove(1)]),
+                SceneEvent::Edit { edit: remove(2), own: None }
+            ]
         );
         assert_eq!(edits.server(), Some(&[remove(7)][..]));
     }

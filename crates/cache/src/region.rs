@@ -90,7 +90,8 @@ impl RegionCache {
         }
         let passage = self.interval.unwrap_or(0.0).min(LONGEST_PASSAGE);
         let passed = (now - newest.arrived).max(0.0);
-        let share = if self.from.is_empty() || passed >= passage { 1.0 } else { passed / passage } as f32;
+        let share =
+            if self.from.is_empty() || passed >= passage { 1.0 } else { passed / passage } as f32;
         let n = volume.order.coefficients();
         for (i, probe) in self.region.probes(volume.grid.resolution).enumerate() {
             let (own, range) = (volume.probe_mut(probe), i * n..(i + 1) * n);
