@@ -5,6 +5,8 @@ use std::sync::Arc;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use crate::limits;
+
 /// The environment: radiance (cd/m²) as a function of direction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
@@ -47,6 +49,24 @@ fn one() -> f32 {
 impl Environment {
     /// No light.
     pub const BLACK: Self = Self::Constant { radiance: Vec3::ZERO };
+
+    /// Whether it makes sense; the reason when it does not.
+    pub fn check(&self) -> Result<(), String> {
+        let is_light = |v: Vec3| v.cmpge(Vec3::ZERO).all() && v.max_element() <= limits::LIGHT;
+        let sound = match self {
+            Self::Constant { radiance } => is_light(*radiance),
+            Self::Sky { zenith, horizon, ground } => {
+                [*zenith, *horizon, *ground].into_iter().all(is_light)
+            }
+            Self::Image { intensity, rotation, .. } => {
+                is_light(Vec3::splat(*intensity)) && rotation.is_finite()
+            }
+        };
+        match sound {
+            true => Ok(()),
+            false => Err(format!("its light has to be within 0 and {:e} cd/m²", limits::LIGHT)),
+        }
+    }
 }
 
 impl Default for Environment {

@@ -6,19 +6,40 @@
 //! Space is glTF's: right-handed, +Y up, metres. Colours are linear Rec. 709. Lights have the units
 //! of KHR_lights_punctual (candela, lux); emission is a radiance in cd/m².
 
+mod aabb;
+mod animation;
+mod asset;
+mod builtin;
+mod deform;
 mod edit;
 mod environment;
+mod error;
+mod gltf;
+mod hdr;
 mod light;
+mod limits;
 mod material;
 mod mesh;
+mod scene;
+mod script;
+mod settings;
 mod snapshot;
+mod trs;
+mod volume;
 
+pub use aabb::Aabb;
+pub use asset::{Camera, FileContents, Projection, SceneFile};
+pub use builtin::NAMES as BUILTINS;
 pub use edit::{Edit, InstanceSource, LightSpec, MaterialChange, Playback, Transform};
 pub use environment::{Environment, HdrImage};
+pub use error::{Fault, SceneError};
 pub use light::{Light, LightKind, PlacedLight};
 pub use material::{AlphaMode, Filter, Image, Material, TextureRef, Wrap};
 pub use mesh::{Mesh, MorphTarget, Primitive, Vertices};
+pub use scene::{AnimationInfo, EditError, NodeInfo, PlacedCamera, Scene};
+pub use script::{Script, ScriptError};
 pub use snapshot::{Instance, Snapshot};
+pub use volume::VolumeSpec;
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {

@@ -1,9 +1,11 @@
 //! Punctual lights.
 
+use std::f32::consts::FRAC_PI_2;
+
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::NodeId;
+use crate::{NodeId, limits};
 
 /// A punctual light as in KHR_lights_punctual. It shines along its node's −Z.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,6 +23,33 @@ pub struct Light {
     /// recommends; infinite when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub range: Option<f32>,
+}
+
+impl Light {
+    /// Whether it makes sense; the reason when it does not.
+    pub fn check(&self) -> Result<(), String> {
+        let Self { kind, color, intensity, range } = *self;
+        if !(intensity >= 0.0 && intensity <= limits::LIGHT) {
+            return Err(format!(
+                "its intensity is {intensity}; 0 to {:e} is possible",
+                limits::LIGHT
+            ));
+        }
+        if !(color.cmpge(Vec3::ZERO).all() && color.max_element() <= limits::LIGHT) {
+            return Err(format!("its colour is {color}; channels are finite and not negative"));
+        }
+        if range.is_some_and(|range| !(range > 0.0 && range.is_finite())) {
+            return Err("its range has to be finite and more than 0".into());
+        }
+        if let LightKind::Spot { inner, outer } = kind
+            && !(inner >= 0.0 && inner < outer && outer <= FRAC_PI_2 + 1e-6)
+        {
+            return Err(format!(
+                "its cones are {inner} and {outer}; 0 ≤ inner < outer ≤ π/2 is needed"
+            ));
+        }
+        Ok(())
+    }
 }
 
 fn white() -> Vec3 {

@@ -40,6 +40,9 @@ pub struct Primitive {
     pub weights: Vec<Vec4>,
     /// Morph targets (displacements).
     pub morph_targets: Vec<MorphTarget>,
+    /// The file has no normals: each triangle has three vertices of its own and its normals are the
+    /// triangle's, also when it is deformed.
+    pub flat: bool,
     /// Material; the default material of glTF has a number of its own.
     pub material: MaterialId,
 }

@@ -1,0 +1,102 @@
+//! Morph targets and skins: glTF 2.0, sections 3.7.2.2 and 3.7.3.
+
+use glam::{Affine3A, Mat3A, Vec3, Vec3A, Vec4};
+use rayon::prelude::*;
+
+use crate::gltf::face_normal;
+use crate::mesh::{Mesh, Primitive, Vertices};
+
+/// Vertices handled by a core at a time.
+const BATCH: usize = 2048;
+
+/// A mesh's vertices after morphing by `weights` and, if there are joints, skinning: then they are in
+/// the space that `to_space` (one a joint) leads to, and parts without joints are brought there by
+/// `rigid`. One entry a primitive.
+pub(crate) fn deform(
+    mesh: &Mesh,
+    weights: &[f32],
+    to_space: Option<&[Affine3A]>,
+    rigid: Affine3A,
+) -> Vec<Vertices> {
+    let deform = |primitive: &Primitive| {
+        let mut vertices = morph(primitive, weights);
+        if let Some(joints) = to_space {
+            skin(primitive, &mut vertices, joints, rigid);
+        }
+        let moved = to_space.is_some() || !primitive.morph_targets.is_empty();
+        if moved && primitive.flat {
+            let triangles = vertices.positions.as_chunks::<3>().0;
+            vertices.normals = triangles.iter().flat_map(|t| [face_normal(*t); 3]).collect();
+        }
+        vertices
+    };
+    mesh.primitives.iter().map(deform).collect()
+}
+
+fn morph(primitive: &Primitive, weights: &[f32]) -> Vertices {
+    let mut vertices = primitive.vertices.clone();
+    let targets = primitive.morph_targets.iter().zip(weights).filter(|(_, w)| **w != 0.0);
+    for (target, &weight) in targets.clone() {
+        add(&mut vertices.positions, &target.positions, weight);
+        add(&mut vertices.normals, &target.normals, weight);
+        for (tangent, delta) in vertices.tangents.iter_mut().zip(&target.tangents) {
+            *tangent += (weight * *delta).extend(0.0);
+        }
+    }
+    if targets.count() > 0 {
+        for (normal, rest) in vertices.normals.iter_mut().zip(&primitive.vertices.normals) {
+            *normal = normal.try_normalize().unwrap_or(*rest);
+        }
+        for (tangent, rest) in vertices.tangents.iter_mut().zip(&primitive.vertices.tangents) {
+            *tangent = unit(tangent.truncate(), *rest);
+        }
+    }
+    vertices
+}
+
+fn add(values: &mut [Vec3], deltas: &[Vec3], weight: f32) {
+    values.iter_mut().zip(deltas).for_each(|(value, delta)| *value += weight * *delta);
+}
+
+fn unit(tangent: Vec3, rest: Vec4) -> Vec4 {
+    tangent.try_normalize().map_or(rest, |t| t.extend(rest.w))
+}
+
+fn skin(primitive: &Primitive, vertices: &mut Vertices, joints: &[Affine3A], rigid: Affine3A) {
+    let blended = |vertex: usize| {
+        let Some(names) = primitive.joints.get(vertex) else { return rigid };
+        let weights = primitive.weights[vertex].to_array();
+        let mut matrix = Affine3A::from_mat3_translation(glam::Mat3::ZERO, Vec3::ZERO);
+        for (joint, weight) in names.iter().zip(weights).filter(|(_, w)| *w > 0.0) {
+            let joint = joints.get(usize::from(*joint)).copied().unwrap_or(rigid);
+            matrix.matrix3 += joint.matrix3 * weight;
+            matrix.translation += joint.translation * weight;
+        }
+        matrix
+    };
+    let Vertices { positions, normals, tangents } = vertices;
+    positions.par_iter_mut().with_min_len(BATCH).zip(normals).enumerate().for_each(
+        |(i, (position, normal))| {
+            let matrix = blended(i);
+            *position = matrix.transform_point3(*position);
+            *normal = normal_matrix(&matrix.matrix3)
+                .mul_vec3a(Vec3A::from(*normal))
+                .try_normalize()
+                .map_or(*normal, Vec3::from);
+        },
+    );
+    tangents.par_iter_mut().with_min_len(BATCH).enumerate().for_each(|(i, tangent)| {
+        let matrix = blended(i).matrix3;
+        let sign = if matrix.determinant() < 0.0 { -1.0 } else { 1.0 };
+        *tangent = unit(matrix * tangent.truncate(), *tangent);
+        tangent.w *= sign;
+    });
+}
+
+/// The inverse transpose up to a positive factor, also of matrices without inverse: the cofactors
+/// with the determinant's sign, so that normals keep to the side that they are on.
+fn normal_matrix(m: &Mat3A) -> Mat3A {
+    let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
+    let cofactors = Mat3A::from_cols(y.cross(z), z.cross(x), x.cross(y));
+    if m.determinant() < 0.0 { cofactors * -1.0 } else { cofactors }
+}

@@ -1,0 +1,100 @@
+//! Tangents for normal maps, where the file has none.
+//!
+//! At each vertex the directions in which u grows over its triangles are averaged, weighted by the
+//! angle (as MikkTSpace does), then made orthogonal to the normal. A vertex between triangles whose
+//! texture is mirrored and ones where it is not is split in two.
+
+use glam::{Vec2, Vec3, Vec4};
+
+use super::mesh::select_vertices;
+use crate::mesh::Primitive;
+
+/// Fills in the tangents of a primitive for a normal map on this set of texture coordinates.
+pub(super) fn generate(primitive: &mut Primitive, set: usize) {
+    if primitive.uv[set].is_empty() {
+        return;
+    }
+    split_mirrored(primitive, set);
+    let (vertices, uv) = (&primitive.vertices, &primitive.uv[set]);
+    let mut sums = vec![Vec3::ZERO; vertices.positions.len()];
+    let mut mirrored = vec![false; vertices.positions.len()];
+    for &triangle in &primitive.triangles {
+        let corners = triangle.map(|i| vertices.positions[i as usize]);
+        let frame = Frame::new(corners, triangle.map(|i| uv[i as usize]));
+        for (k, index) in triangle.into_iter().enumerate() {
+            let normal = vertices.normals[index as usize];
+            let along = frame.u_axis - normal * normal.dot(frame.u_axis);
+            let angle = angle_at(corners, k);
+            sums[index as usize] += angle * along.normalize_or_zero();
+            mirrored[index as usize] = frame.mirrored;
+        }
+    }
+    primitive.vertices.tangents = sums
+        .into_iter()
+        .zip(&primitive.vertices.normals)
+        .zip(mirrored)
+        .map(|((sum, normal), mirrored)| tangent(sum, *normal, mirrored))
+        .collect();
+}
+
+fn tangent(sum: Vec3, normal: Vec3, mirrored: bool) -> Vec4 {
+    let direction = sum.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+    direction.extend(if mirrored { -1.0 } else { 1.0 })
+}
+
+/// How a texture lies on a triangle.
+struct Frame {
+    /// Direction in which u grows; zero where the texture has no area.
+    u_axis: Vec3,
+    mirrored: bool,
+}
+
+impl Frame {
+    fn new([a, b, c]: [Vec3; 3], [ta, tb, tc]: [Vec2; 3]) -> Self {
+        let (e1, e2, t1, t2) = (b - a, c - a, tb - ta, tc - ta);
+        let area = t1.perp_dot(t2);
+        let u_axis = (e1 * t2.y - e2 * t1.y) * area.signum();
+        Self { u_axis: u_axis.normalize_or_zero(), mirrored: is_mirrored([ta, tb, tc]) }
+    }
+}
+
+/// Whether a triangle shows the texture mirrored. A normal map's y points up the image while v grows
+/// down it, and the bitangent is cross(normal, tangent)·w: so a texture seen the right way round has
+/// clockwise texture coordinates on its counter-clockwise triangles, and w = 1.
+fn is_mirrored([a, b, c]: [Vec2; 3]) -> bool {
+    (b - a).perp_dot(c - a) > 0.0
+}
+
+fn angle_at(corners: [Vec3; 3], k: usize) -> f32 {
+    let [p, q, r] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
+    let cosine = (q - p).normalize_or_zero().dot((r - p).normalize_or_zero());
+    cosine.clamp(-1.0, 1.0).acos()
+}
+
+/// Gives triangles with a mirrored texture vertices of their own where others share them.
+fn split_mirrored(primitive: &mut Primitive, set: usize) {
+    let uv = &primitive.uv[set];
+    let mirrored: Vec<bool> =
+        primitive.triangles.iter().map(|t| is_mirrored(t.map(|i| uv[i as usize]))).collect();
+    let count = primitive.vertices.positions.len();
+    let mut straight = vec![false; count];
+    for (triangle, _) in primitive.triangles.iter().zip(&mirrored).filter(|(_, m)| !**m) {
+        triangle.iter().for_each(|i| straight[*i as usize] = true);
+    }
+    let mut order: Vec<u32> = (0..count as u32).collect();
+    let mut twin = vec![None; count];
+    for (triangle, _) in primitive.triangles.iter_mut().zip(&mirrored).filter(|(_, m)| **m) {
+        for index in triangle {
+            let original = *index as usize;
+            if straight[original] {
+                *index = *twin[original].get_or_insert_with(|| {
+                    order.push(original as u32);
+                    order.len() as u32 - 1
+                });
+            }
+        }
+    }
+    if order.len() > count {
+        select_vertices(primitive, &order);
+    }
+}

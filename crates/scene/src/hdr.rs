@@ -1,0 +1,55 @@
+//! Equirectangular pictures of the environment.
+
+use std::io::Cursor;
+use std::sync::Arc;
+
+use glam::Vec3;
+use image::{ImageFormat, ImageReader, Limits};
+
+use crate::HdrImage;
+use crate::error::Fault;
+use crate::gltf::source::Folder;
+use crate::limits::{self, Budget};
+
+/// Reads an .hdr or .exr file in the scene's folder. Texels that are not finite or negative become
+/// black, or the largest light; the second value counts them.
+pub(crate) fn read(
+    folder: &Folder,
+    uri: &str,
+    budget: &Budget,
+) -> Result<(Arc<HdrImage>, usize), Fault> {
+    let (_, _, bytes) = folder.read(uri)?;
+    let fail = |reason: String| Fault::Image { name: uri.to_owned(), reason };
+    let reader = || {
+        let mut reader = ImageReader::new(Cursor::new(&bytes))
+            .with_guessed_format()
+            .map_err(|e| fail(e.to_string()))?;
+        let mut bounds = Limits::default();
+        bounds.max_image_width = Some(limits::IMAGE_SIDE);
+        bounds.max_image_height = Some(limits::IMAGE_SIDE);
+        bounds.max_alloc = Some(32 * u64::from(limits::IMAGE_SIDE).pow(2));
+        reader.limits(bounds);
+        Ok(reader)
+    };
+    let first = reader()?;
+    if !matches!(first.format(), Some(ImageFormat::Hdr | ImageFormat::OpenExr)) {
+        return Err(fail("an environment has to be a .hdr or .exr file".into()));
+    }
+    let (width, height) = first.into_dimensions().map_err(|e| fail(e.to_string()))?;
+    if width == 0 || height == 0 || width.max(height) > limits::IMAGE_SIDE {
+        let side = limits::IMAGE_SIDE;
+        return Err(fail(format!("{width} × {height} texels; 1 to {side} a side are read")));
+    }
+    // Three floats where other images have four bytes.
+    budget.texels(width, 3 * height)?;
+    let decoded = reader()?.decode().map_err(|e| fail(e.to_string()))?.into_rgb32f();
+    let mut repaired = 0;
+    let texels = decoded.as_chunks::<3>().0.iter().map(|texel| sanitise(*texel, &mut repaired));
+    Ok((Arc::new(HdrImage { width, height, texels: texels.collect() }), repaired))
+}
+
+fn sanitise(texel: [f32; 3], repaired: &mut usize) -> Vec3 {
+    let clean = texel.map(|v| if v > 0.0 { v.min(limits::LIGHT) } else { 0.0 });
+    *repaired += usize::from(clean != texel);
+    Vec3::from(clean)
+}

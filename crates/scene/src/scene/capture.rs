@@ -1,0 +1,151 @@
+//! The scene at one moment, flattened.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::{Affine3A, Vec3, Vec3A};
+
+use super::Scene;
+use super::nodes::{Node, PlacedSkin};
+use crate::deform::deform;
+use crate::trs::is_invertible;
+use crate::{Instance, Mesh, NodeId, PlacedLight, Snapshot, Vertices};
+
+/// Deformed vertices by node, kept while what deforms them stays as it is.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Deformed(BTreeMap<NodeId, Kept>);
+
+#[derive(Clone, Debug)]
+struct Kept {
+    mesh: Arc<Mesh>,
+    cause: Cause,
+    vertices: Arc<Vec<Vertices>>,
+    used: bool,
+}
+
+/// What deforms a mesh.
+#[derive(Clone, Debug, PartialEq)]
+struct Cause {
+    weights: Vec<f32>,
+    world_from_rest: Option<Vec<Affine3A>>,
+}
+
+impl Scene {
+    /// The scene as it is now. Cheap while nothing changes: then it is the same one.
+    pub fn snapshot(&mut self) -> Arc<Snapshot> {
+        let snapshot = match self.snapshot.take() {
+            Some(mut snapshot) => {
+                if snapshot.time != self.time {
+                    Arc::make_mut(&mut snapshot).time = self.time;
+                }
+                snapshot
+            }
+            None => Arc::new(self.capture()),
+        };
+        self.snapshot = Some(snapshot.clone());
+        snapshot
+    }
+
+    fn capture(&mut self) -> Snapshot {
+        let materials =
+            self.shared_materials.get_or_insert_with(|| Arc::from(self.materials.clone())).clone();
+        let mut deformed = std::mem::take(&mut self.deformed);
+        deformed.0.values_mut().for_each(|kept| kept.used = false);
+        let instances = self.instances(&mut deformed);
+        deformed.0.retain(|_, kept| kept.used);
+        self.deformed = deformed;
+        let mut lights = self.lights();
+        lights.retain(|l| l.light.intensity > 0.0 && l.light.color != Vec3::ZERO);
+        let environment = self.environment.clone();
+        let (version, time) = (self.version, self.time);
+        Snapshot { version, time, instances, materials, lights, environment }
+    }
+
+    pub(super) fn instances(&self, deformed: &mut Deformed) -> Vec<Instance> {
+        let placed = self.nodes.placed().into_iter();
+        placed.filter_map(|(id, node, world)| self.instance(id, node, world, deformed)).collect()
+    }
+
+    /// The mesh of a node; `None` where it has none or has shrunk to nothing.
+    fn instance(
+        &self,
+        id: NodeId,
+        node: &Node,
+        world_from_node: Affine3A,
+        deformed: &mut Deformed,
+    ) -> Option<Instance> {
+        let mesh_id = node.mesh?;
+        let mesh = self.meshes.get(mesh_id.0 as usize).filter(|m| m.triangle_count() > 0)?.clone();
+        let world_from_rest =
+            node.skin.as_ref().map(|skin| self.world_from_rest(skin, world_from_node));
+        if let Some(joints) = &world_from_rest {
+            if !joints.iter().chain([&world_from_node]).all(|m| m.is_finite()) {
+                return None;
+            }
+        } else if !is_invertible(&world_from_node) {
+            return None;
+        }
+        // A skinned mesh is where its joints are; its own node's place does not count.
+        let is_skinned = world_from_rest.is_some();
+        let world_from_object = if is_skinned { Affine3A::IDENTITY } else { world_from_node };
+        let deformed = (is_skinned || !node.weights.is_empty()).then(|| {
+            let cause = Cause { weights: node.weights.clone(), world_from_rest };
+            deformed.vertices(id, &mesh, cause, world_from_node)
+        });
+        Some(Instance { node: id, mesh_id, mesh, deformed, world_from_object })
+    }
+
+    fn world_from_rest(&self, placed: &PlacedSkin, world_from_node: Affine3A) -> Vec<Affine3A> {
+        let world_from_rest = |(joint, joint_from_rest): &(u32, Affine3A)| {
+            let joint = NodeId(placed.first_node.saturating_add(*joint));
+            if self.nodes.contains(joint) {
+                self.nodes.world_from_node(joint) * *joint_from_rest
+            } else {
+                world_from_node
+            }
+        };
+        placed.skin.joints.iter().map(world_from_rest).collect()
+    }
+
+    /// Every punctual light that is in the scene, also those without intensity.
+    pub fn lights(&self) -> Vec<PlacedLight> {
+        let placed = self.nodes.placed();
+        placed.into_iter().filter_map(|(id, node, world)| place_light(id, node, &world)).collect()
+    }
+}
+
+impl Deformed {
+    fn vertices(
+        &mut self,
+        id: NodeId,
+        mesh: &Arc<Mesh>,
+        cause: Cause,
+        world_from_node: Affine3A,
+    ) -> Arc<Vec<Vertices>> {
+        if let Some(kept) = self.0.get_mut(&id)
+            && Arc::ptr_eq(&kept.mesh, mesh)
+            && kept.cause == cause
+        {
+            kept.used = true;
+            return kept.vertices.clone();
+        }
+        let joints = cause.world_from_rest.as_deref();
+        let vertices = Arc::new(deform(mesh, &cause.weights, joints, world_from_node));
+        let kept = Kept { mesh: mesh.clone(), cause, vertices: vertices.clone(), used: true };
+        self.0.insert(id, kept);
+        vertices
+    }
+}
+
+/// The light of a node. Its intensity is the same whatever the node's scale.
+fn place_light(id: NodeId, node: &Node, world_from_node: &Affine3A) -> Option<PlacedLight> {
+    let light = node.light?;
+    let direction = (world_from_node.matrix3 * Vec3A::NEG_Z).try_normalize()?;
+    let position = Vec3::from(world_from_node.translation);
+    position.is_finite().then(|| PlacedLight {
+        node: id,
+        light,
+        position,
+        direction: direction.into(),
+    })
+}

@@ -1,0 +1,351 @@
+//! From a file to a scene.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::Affine3A;
+
+use super::capture::Deformed;
+use super::nodes::{Node, Nodes, PlacedSkin};
+use super::playback::Clock;
+use super::{Model, Scene};
+use crate::asset::{Asset, AssetNode};
+use crate::builtin;
+use crate::error::Fault;
+use crate::gltf::{self, source::Folder};
+use crate::limits::{self, Budget};
+use crate::settings::{self, Settings};
+use crate::trs::{Trs, is_in_world};
+use crate::{Environment, HdrImage, MaterialId, MeshId, NodeId, SceneError, hdr};
+
+impl Scene {
+    /// Opens a file (.gltf or .glb), or, where there is none of that name, a built-in scene.
+    ///
+    /// # Errors
+    /// See [`Scene::load`]; a name that is neither.
+    pub fn open(name: &str) -> Result<Self, SceneError> {
+        let path = Path::new(name);
+        if path.exists() {
+            return Self::load(path);
+        }
+        Self::builtin(name).ok_or_else(|| {
+            let builtins = builtin::NAMES.join(", ");
+            Fault::Unknown { builtins }.of(path)
+        })
+    }
+
+    /// Loads a .gltf or .glb file. Files that it refers to, and those that edits add later, have to
+    /// lie in its folder.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is no valid glTF, requires an extension that is not read, exceeds
+    /// the limits, or has no triangles in its scene. The message says where, and what to do.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        let budget = Budget::default();
+        let read = || {
+            let folder = Folder::of(path).map_err(Fault::Read)?;
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let asset = gltf::read_file(path, &name, &folder, &budget)?;
+            Ok((name, folder, asset))
+        };
+        let (file, folder, asset) = read().map_err(|fault: Fault| fault.of(path))?;
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let mut scene = Self::of(short_name(&stem), file, asset, Some(folder), budget);
+        scene.check().map_err(|fault| fault.of(path))?;
+        if let Some((settings_path, settings)) = settings::beside(path)? {
+            scene.settle(settings).map_err(|fault| fault.of(settings_path))?;
+        }
+        let environment = scene.environment.clone();
+        scene.environment = scene.load_picture(environment).map_err(|fault| fault.of(path))?;
+        if scene.lights().is_empty() && !scene.shines() {
+            scene
+                .warnings
+                .push("nothing gives light: no lamps, no emission, no environment".into());
+        }
+        Ok(scene)
+    }
+
+    /// A built-in scene, one of [`BUILTINS`](crate::BUILTINS).
+    pub fn builtin(name: &str) -> Option<Self> {
+        let bytes: Arc<[u8]> = builtin::glb(name)?.into();
+        let file = format!("{name}.glb");
+        let budget = Budget::default();
+        match gltf::read_bytes(&file, bytes, &budget) {
+            Ok(asset) => Some(Self::of(name.to_owned(), file, asset, None, budget)),
+            Err(fault) => {
+                // Tests load them all.
+                tracing::error!(%fault, name, "a built-in scene is broken");
+                None
+            }
+        }
+    }
+
+    pub(super) fn of(
+        name: String,
+        file: String,
+        asset: Asset,
+        folder: Option<Folder>,
+        budget: Budget,
+    ) -> Self {
+        let asset = Arc::new(asset);
+        let mut scene = Self::empty(name, folder, budget);
+        scene.warnings = asset.warnings.clone();
+        scene.register(file, asset.clone(), None);
+        scene.place(0, 0);
+        for root in &asset.roots {
+            scene.nodes.add_root(NodeId(*root));
+        }
+        let settings = asset.settings.clone();
+        scene.environment = settings.environment.unwrap_or_default();
+        scene.volumes = settings.volumes;
+        scene.play();
+        scene
+    }
+
+    fn empty(name: String, folder: Option<Folder>, budget: Budget) -> Self {
+        Self {
+            name,
+            folder,
+            volumes: Vec::new(),
+            warnings: Vec::new(),
+            models: Vec::new(),
+            library: BTreeMap::new(),
+            pictures: BTreeMap::new(),
+            budget,
+            nodes: Nodes::default(),
+            meshes: Vec::new(),
+            materials: Vec::new(),
+            clocks: Vec::new(),
+            environment: Environment::BLACK,
+            environment_replaced: false,
+            time: 0.0,
+            version: 0,
+            deformed: Deformed::default(),
+            shared_materials: None,
+            snapshot: None,
+        }
+    }
+
+    fn check(&self) -> Result<(), Fault> {
+        let drawn =
+            |node: &Node| node.mesh.map_or(0, |m| self.meshes[m.0 as usize].triangle_count());
+        let triangles: usize = self.nodes.placed().iter().map(|(_, node, _)| drawn(node)).sum();
+        if triangles == 0 { Err(Fault::NoTriangles) } else { Ok(()) }
+    }
+
+    fn shines(&self) -> bool {
+        self.environment != Environment::BLACK
+            || self.materials.iter().any(|m| m.emissive != glam::Vec3::ZERO)
+    }
+
+    /// Takes over what a file beside the scene says.
+    fn settle(&mut self, settings: Settings) -> Result<(), Fault> {
+        if let Some(environment) = settings.environment {
+            self.environment = self.load_picture(environment)?;
+            self.environment_replaced = true;
+        }
+        if !settings.volumes.is_empty() {
+            self.volumes = settings.volumes;
+        }
+        Ok(())
+    }
+
+    /// Fills in the picture of an environment that has one.
+    pub(super) fn load_picture(&mut self, environment: Environment) -> Result<Environment, Fault> {
+        let Environment::Image { uri, intensity, rotation, .. } = environment else {
+            return Ok(environment);
+        };
+        let image = Some(self.picture(&uri)?);
+        Ok(Environment::Image { uri, intensity, rotation, image })
+    }
+
+    fn picture(&mut self, uri: &str) -> Result<Arc<HdrImage>, Fault> {
+        if let Some(picture) = self.pictures.get(uri) {
+            return Ok(picture.clone());
+        }
+        let folder = self.folder.as_ref().ok_or_else(|| Fault::Outside { uri: uri.into() })?;
+        let budget = self.budget.clone();
+        let (picture, repaired) = hdr::read(folder, uri, &budget)?;
+        self.budget = budget;
+        if repaired > 0 {
+            let warning = format!("{uri}: {repaired} texels were negative or not finite");
+            tracing::warn!("{warning}");
+            self.warnings.push(warning);
+        }
+        self.pictures.insert(uri.to_owned(), picture.clone());
+        Ok(picture)
+    }
+
+    /// Finds a file in the scene's folder among the models, or reads it. Changes nothing yet.
+    pub(super) fn find_model(&self, uri: &str) -> Result<Found, Fault> {
+        let folder = self.folder.as_ref().ok_or_else(|| Fault::Outside { uri: uri.into() })?;
+        let (name, path) = folder.resolve(uri)?;
+        if let Some(known) = self.models[1..].iter().position(|m| m.name == name) {
+            return Ok(Found::Model(known + 1));
+        }
+        if self.models.len() > limits::FILES {
+            let limit = limits::FILES as u64;
+            return Err(Fault::TooLarge { what: "files added".into(), limit });
+        }
+        let budget = self.budget.clone();
+        let asset = match self.library.get(&name) {
+            Some(asset) => asset.clone(),
+            None => {
+                let mut asset = gltf::read_file(&path, &name, folder, &budget)?;
+                asset.number_materials(self.materials.len() as u32);
+                Arc::new(asset)
+            }
+        };
+        Ok(Found::New { name, asset, budget })
+    }
+
+    /// The model of a file that was found; from now on it counts as part of the scene.
+    pub(super) fn take_model(&mut self, found: Found, added_as: NodeId) -> usize {
+        match found {
+            Found::Model(model) => model,
+            Found::New { name, asset, budget } => {
+                self.budget = budget;
+                for warning in &asset.warnings {
+                    tracing::warn!("{name}: {warning}");
+                }
+                self.register(name, asset, Some(added_as))
+            }
+        }
+    }
+
+    pub(super) fn asset<'a>(&'a self, found: &'a Found) -> &'a Asset {
+        match found {
+            Found::Model(model) => &self.models[*model].asset,
+            Found::New { asset, .. } => asset,
+        }
+    }
+
+    /// Gives a file's meshes, materials and animations their numbers.
+    fn register(&mut self, name: String, asset: Arc<Asset>, added_as: Option<NodeId>) -> usize {
+        let (first_mesh, first_animation) = (self.meshes.len() as u32, self.clocks.len() as u32);
+        self.meshes.extend_from_slice(&asset.meshes);
+        self.materials.extend_from_slice(&asset.materials);
+        self.shared_materials = None;
+        let clocks = std::iter::repeat_n(Clock::starting(self.time), asset.animations.len());
+        self.clocks.extend(clocks);
+        let copies = Vec::new();
+        self.models.push(Model { name, asset, first_mesh, first_animation, copies, added_as });
+        self.models.len() - 1
+    }
+
+    /// Puts the nodes of a file in, numbered from `first` on.
+    pub(super) fn place(&mut self, model: usize, first: u32) {
+        self.models[model].copies.push(first);
+        let Model { asset, first_mesh, .. } = &self.models[model];
+        for (index, json) in (0..).zip(&asset.nodes) {
+            let skin = json.skin.map(|skin| asset.skins[skin as usize].clone());
+            let node = Node {
+                name: json.name.clone(),
+                parent: json.parent.map(|p| NodeId(first + p)),
+                children: json.children.iter().map(|c| NodeId(first + c)).collect(),
+                parent_from_node: json.parent_from_node,
+                mesh: json.mesh.map(|m| MeshId(first_mesh + m)),
+                skin: skin
+                    .filter(|_| is_skinned(asset, json))
+                    .map(|skin| PlacedSkin { skin, first_node: first }),
+                light: json.light,
+                camera: json.camera.map(|camera| (model, camera)),
+                weights: weights(asset, json),
+            };
+            self.nodes.insert(NodeId(first + index), node);
+        }
+    }
+
+    /// Puts a copy of a file in: a node of its own number, which has `trs`, and below it the file's
+    /// nodes, numbered from the next number on.
+    pub(super) fn place_below(
+        &mut self,
+        model: usize,
+        id: NodeId,
+        parent: Option<NodeId>,
+        trs: Trs,
+    ) {
+        let first = id.0 + 1;
+        let asset = self.models[model].asset.clone();
+        let children: Vec<_> = asset.roots.iter().map(|root| NodeId(first + root)).collect();
+        let name = self.models[model].name.clone();
+        self.place(model, first);
+        for child in &children {
+            if let Some(node) = self.nodes.get_mut(*child) {
+                node.parent = Some(id);
+            }
+        }
+        let wrapper = Node { name, parent, children, parent_from_node: trs, ..Node::default() };
+        self.nodes.attach(id, wrapper);
+    }
+
+    /// The scene as its file has it, at the same time, without reading anything again.
+    pub(super) fn pristine(&self) -> Self {
+        let main = &self.models[0];
+        let mut scene = Self::empty(self.name.clone(), self.folder.clone(), self.budget.clone());
+        scene.library =
+            self.models[1..].iter().map(|m| (m.name.clone(), m.asset.clone())).collect();
+        scene.pictures.clone_from(&self.pictures);
+        scene.register(main.name.clone(), main.asset.clone(), None);
+        scene.place(0, 0);
+        main.asset.roots.iter().for_each(|root| scene.nodes.add_root(NodeId(*root)));
+        scene.environment = main.asset.settings.environment.clone().unwrap_or_default();
+        scene.volumes.clone_from(&self.volumes);
+        scene.time = self.time;
+        scene.play();
+        scene
+    }
+}
+
+/// A glTF file to be added.
+pub(super) enum Found {
+    /// One that was added before.
+    Model(usize),
+    /// One that is new, and the budget with it.
+    New { name: String, asset: Arc<Asset>, budget: Budget },
+}
+
+fn is_skinned(asset: &Asset, node: &AssetNode) -> bool {
+    let mesh = node.mesh.map(|m| &asset.meshes[m as usize]);
+    mesh.is_some_and(|mesh| mesh.primitives.iter().any(|p| !p.joints.is_empty()))
+}
+
+fn weights(asset: &Asset, node: &AssetNode) -> Vec<f32> {
+    match node.mesh {
+        Some(mesh) if node.weights.is_empty() => asset.meshes[mesh as usize].morph_weights.clone(),
+        _ => node.weights.clone(),
+    }
+}
+
+impl Asset {
+    /// Whether all its nodes have a finite place in the world when its roots are placed so.
+    pub(super) fn fits(&self, world_from_roots: Affine3A) -> bool {
+        let mut open: Vec<_> = self.roots.iter().map(|r| (*r, world_from_roots)).collect();
+        while let Some((index, world_from_parent)) = open.pop() {
+            let node = &self.nodes[index as usize];
+            let world = world_from_parent * node.parent_from_node.affine();
+            if !is_in_world(&world) {
+                return false;
+            }
+            open.extend(node.children.iter().map(|child| (*child, world)));
+        }
+        true
+    }
+
+    /// Makes meshes name materials by their numbers in the scene.
+    fn number_materials(&mut self, first: u32) {
+        for mesh in &mut self.meshes {
+            for primitive in &mut Arc::make_mut(mesh).primitives {
+                primitive.material = MaterialId(primitive.material.0 + first);
+            }
+        }
+    }
+}
+
+/// A scene's name as part of an address.
+fn short_name(stem: &str) -> String {
+    let keep = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' };
+    let name: String = stem.to_ascii_lowercase().chars().map(keep).take(64).collect();
+    if name.trim_matches(['.', '-']).is_empty() { "scene".into() } else { name }
+}

@@ -1,0 +1,327 @@
+//! The scene: loaded once, changed by edits and by time, asked for snapshots.
+
+mod apply;
+mod capture;
+mod load;
+mod nodes;
+mod playback;
+mod replay;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::{Affine3A, Quat, Vec3};
+
+pub use apply::EditError;
+use capture::Deformed;
+use nodes::Nodes;
+use playback::Clock;
+
+use crate::animation::Property;
+use crate::asset::{Asset, Camera, SceneFile};
+use crate::gltf::source::Folder;
+use crate::limits::Budget;
+use crate::trs::Trs;
+use crate::{
+    Aabb, AnimationId, Environment, FileContents, HdrImage, Instance, Light, Material, Mesh,
+    MeshId, NodeId, Snapshot, Transform, VolumeSpec,
+};
+
+/// A scene: what its file says, what edits have made of it, and its time.
+#[derive(Debug)]
+pub struct Scene {
+    name: String,
+    /// Absent for built-in scenes.
+    folder: Option<Folder>,
+    volumes: Vec<VolumeSpec>,
+    warnings: Vec<String>,
+    /// The scene's own file and the files that edits have added, in order.
+    models: Vec<Model>,
+    /// Files read before, to be added without reading them again.
+    library: BTreeMap<String, Arc<Asset>>,
+    /// Pictures of environments, by name.
+    pictures: BTreeMap<String, Arc<HdrImage>>,
+    budget: Budget,
+    nodes: Nodes,
+    meshes: Vec<Arc<Mesh>>,
+    materials: Vec<Material>,
+    clocks: Vec<Clock>,
+    environment: Environment,
+    /// The environment is another one than the glTF file's.
+    environment_replaced: bool,
+    time: f64,
+    version: u64,
+    deformed: Deformed,
+    shared_materials: Option<Arc<[Material]>>,
+    snapshot: Option<Arc<Snapshot>>,
+}
+
+/// A glTF file in the scene, and where its things stand in the scene's numbering. All copies of it
+/// share meshes, materials and animations.
+#[derive(Clone, Debug)]
+struct Model {
+    /// Name within the scene's folder.
+    name: String,
+    asset: Arc<Asset>,
+    first_mesh: u32,
+    first_animation: u32,
+    /// For each copy in the scene, the number of the node that is the file's node 0.
+    copies: Vec<u32>,
+    /// The first node that this file was added with.
+    added_as: Option<NodeId>,
+}
+
+/// A node, as others see it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NodeInfo<'a> {
+    /// Its number.
+    pub id: NodeId,
+    /// Its name in the file; may be empty.
+    pub name: &'a str,
+    /// The node above it.
+    pub parent: Option<NodeId>,
+    /// Its transform relative to the parent; all parts are set.
+    pub transform: Transform,
+    /// The mesh that it shows.
+    pub mesh: Option<MeshId>,
+    /// The light that it carries.
+    pub light: Option<Light>,
+}
+
+/// An animation and how it stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AnimationInfo<'a> {
+    /// Its number.
+    pub id: AnimationId,
+    /// Its name in the file; may be empty.
+    pub name: &'a str,
+    /// Seconds.
+    pub duration: f64,
+    /// Runs or stands.
+    pub playing: bool,
+    /// Where it stands, 0 to its duration.
+    pub time: f64,
+    /// Rate.
+    pub speed: f64,
+}
+
+/// A camera at its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlacedCamera<'a> {
+    /// The node that carries it.
+    pub node: NodeId,
+    /// The node's name; may be empty.
+    pub node_name: &'a str,
+    /// Its name and projection.
+    pub camera: &'a Camera,
+    /// It looks along −Z with +Y up.
+    pub world_from_camera: Affine3A,
+}
+
+impl Scene {
+    /// A short name made of the file's: lower-case letters, digits, `-`, `_` and `.`.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Name of the scene's glTF file within its folder.
+    pub fn root_file(&self) -> &str {
+        &self.models[0].name
+    }
+
+    /// Scene time, seconds since it was loaded.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Grows by one at every change that can change light.
+    pub fn version(&self) -> u64 {
+        self.version
+    }
+
+    /// What was found odd while loading: extensions left out, no lights, and the like.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// The volumes that the scene asks for, or one around all of it with at most 512 probes.
+    pub fn volumes(&self) -> Vec<VolumeSpec> {
+        if self.volumes.is_empty() {
+            return vec![VolumeSpec::around(self.bounds(), 512)];
+        }
+        self.volumes.clone()
+    }
+
+    /// The files that clients need to draw the scene, those that edits have added included.
+    pub fn files(&self) -> Vec<SceneFile> {
+        let mut files: Vec<SceneFile> =
+            self.models.iter().flat_map(|m| m.asset.files.iter().cloned()).collect();
+        if let (Environment::Image { uri, .. }, Some(folder)) = (&self.environment, &self.folder)
+            && let Ok((name, path)) = folder.resolve(uri)
+        {
+            files.push(SceneFile { name, contents: FileContents::Path(path) });
+        }
+        let mut seen = std::collections::BTreeSet::new();
+        files.retain(|file| seen.insert(file.name.clone()));
+        files
+    }
+
+    /// The box around everything that is drawn, in the world. Empty scenes have none: then it is a
+    /// point at the origin.
+    pub fn bounds(&self) -> Aabb {
+        let mut bounds = Aabb::EMPTY;
+        let mut add = |world: &Affine3A, positions: &[Vec3]| {
+            positions.iter().for_each(|p| bounds.grow(world.transform_point3(*p)));
+        };
+        for Instance { mesh, deformed, world_from_object, .. } in
+            self.instances(&mut self.deformed.clone())
+        {
+            match deformed {
+                Some(parts) => parts.iter().for_each(|v| add(&world_from_object, &v.positions)),
+                None => mesh
+                    .primitives
+                    .iter()
+                    .for_each(|p| add(&world_from_object, &p.vertices.positions)),
+            }
+        }
+        if bounds.is_empty() { Aabb { min: Vec3::ZERO, max: Vec3::ZERO } } else { bounds }
+    }
+
+    /// All nodes, also those that are not drawn.
+    pub fn nodes(&self) -> impl Iterator<Item = NodeInfo<'_>> {
+        self.nodes.iter().map(|(id, node)| {
+            let Trs { translation, rotation, scale } = node.parent_from_node;
+            NodeInfo {
+                id,
+                name: &node.name,
+                parent: node.parent,
+                transform: Transform {
+                    translation: Some(translation),
+                    rotation: Some(rotation),
+                    scale: Some(scale),
+                },
+                mesh: node.mesh,
+                light: node.light,
+            }
+        })
+    }
+
+    /// The cameras, in the order of the scene's tree.
+    pub fn cameras(&self) -> Vec<PlacedCamera<'_>> {
+        let placed = self.nodes.placed().into_iter();
+        let camera = placed.filter_map(|(node, n, world_from_camera)| {
+            let (model, camera) = n.camera?;
+            let camera = self.models.get(model)?.asset.cameras.get(camera as usize)?;
+            Some(PlacedCamera { node, node_name: &n.name, camera, world_from_camera })
+        });
+        camera.collect()
+    }
+
+    /// The animations and how they stand.
+    pub fn animations(&self) -> impl Iterator<Item = AnimationInfo<'_>> {
+        let animations = self.models.iter().flat_map(|m| &m.asset.animations);
+        (0..).zip(animations.zip(&self.clocks)).map(|(id, (animation, clock))| AnimationInfo {
+            id: AnimationId(id),
+            name: &animation.name,
+            duration: animation.duration,
+            playing: clock.playing,
+            time: f64::from(clock.position(self.time, animation.duration)),
+            speed: clock.speed,
+        })
+    }
+
+    /// The materials, by number.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// The meshes, by number.
+    pub fn meshes(&self) -> &[Arc<Mesh>] {
+        &self.meshes
+    }
+
+    /// The environment.
+    pub fn environment(&self) -> &Environment {
+        &self.environment
+    }
+
+    /// Lets `seconds` pass and moves what is animated; true when something has moved. A time that is
+    /// negative or not finite is none.
+    pub fn advance(&mut self, seconds: f64) -> bool {
+        if seconds.is_finite() && seconds > 0.0 {
+            self.time += seconds;
+        }
+        let moved = self.play();
+        if moved {
+            self.changed();
+        }
+        moved
+    }
+
+    fn changed(&mut self) {
+        self.version += 1;
+        self.snapshot = None;
+    }
+
+    /// Puts nodes where the animations that run have them; where two move the same one, the later
+    /// number wins.
+    fn play(&mut self) -> bool {
+        let mut moved = false;
+        for index in 0..self.clocks.len() {
+            if self.clocks[index].playing {
+                moved |= self.pose(index);
+            }
+        }
+        moved
+    }
+
+    /// Puts nodes where one animation has them now; true when that moves any.
+    fn pose(&mut self, index: usize) -> bool {
+        let model = self.models.partition_point(|m| m.first_animation as usize <= index) - 1;
+        let copies = self.models[model].copies.clone();
+        self.pose_copies(model, index, &copies)
+    }
+
+    /// Puts a new copy of a file where the file's animations have it, those that stand included.
+    fn pose_new_copy(&mut self, model: usize, first_node: u32) {
+        let first = self.models[model].first_animation as usize;
+        let mut order: Vec<_> =
+            (first..first + self.models[model].asset.animations.len()).collect();
+        order.sort_by_key(|index| self.clocks[*index].set_by);
+        for index in order {
+            self.pose_copies(model, index, &[first_node]);
+        }
+        self.play();
+    }
+
+    fn pose_copies(&mut self, model: usize, index: usize, copies: &[u32]) -> bool {
+        let Model { asset, first_animation, .. } = &self.models[model];
+        let Some(animation) = asset.animations.get(index - *first_animation as usize) else {
+            return false;
+        };
+        let time = self.clocks[index].position(self.time, animation.duration);
+        let mut moved = false;
+        for channel in &animation.channels {
+            let value = channel.curve.sample(time);
+            for first in copies {
+                let id = NodeId(first.saturating_add(channel.node));
+                let Some(node) = self.nodes.get_mut(id) else { continue };
+                let trs = &mut node.parent_from_node;
+                moved |= match channel.curve.property {
+                    Property::Translation => set(&mut trs.translation, Vec3::from_slice(&value)),
+                    Property::Scale => set(&mut trs.scale, Vec3::from_slice(&value)),
+                    Property::Rotation => set(&mut trs.rotation, Quat::from_slice(&value)),
+                    Property::Weights => set(&mut node.weights, value.clone()),
+                };
+            }
+        }
+        moved
+    }
+}
+
+/// Sets a value; true when it was another one before.
+fn set<T: PartialEq>(place: &mut T, value: T) -> bool {
+    let is_new = *place != value;
+    *place = value;
+    is_new
+}

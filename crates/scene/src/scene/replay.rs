@@ -1,0 +1,191 @@
+//! What has become of a scene since it was loaded, as edits: what those who join late are told.
+
+use super::nodes::Node;
+use super::{Model, Scene};
+use crate::trs::Trs;
+use crate::{
+    AnimationId, Edit, InstanceSource, Light, LightKind, LightSpec, Material, MaterialChange,
+    MaterialId, NodeId, Playback, Transform,
+};
+
+impl Scene {
+    /// Edits that turn the scene as it stands in its file, [advanced](Scene::advance) to this
+    /// scene's time, into this one by [`Scene::replay`]. Their number depends on what is different,
+    /// not on how many edits there have been.
+    pub fn edits_since_load(&self) -> Vec<Edit> {
+        let mut edits = self.structure();
+        edits.extend(self.playbacks());
+        let mut replica = self.pristine();
+        for edit in &edits {
+            if let Err(error) = replica.replay(edit) {
+                // Tests show that this does not happen; the differences below then say the rest.
+                tracing::error!(%error, ?edit, "an own edit is refused");
+            }
+        }
+        edits.extend(self.differences(&replica));
+        edits
+    }
+
+    /// Nodes that were added, in the order of their numbers, and then those that were removed.
+    fn structure(&self) -> Vec<Edit> {
+        let mut edits = Vec::new();
+        let file_nodes = self.models[0].asset.nodes.len() as u32;
+        for (id, node) in self.nodes.iter().filter(|(id, _)| id.0 >= file_nodes) {
+            edits.extend(self.addition(id, node).map(|edit| (id, edit)));
+        }
+        // A file whose first copy has gone still has to come first in the numbering of materials.
+        for model in &self.models[1..] {
+            if let Some(node) = model.added_as.filter(|id| !self.nodes.contains(*id)) {
+                let source = source_of(model);
+                let (parent, transform) = (None, Transform::default());
+                let add = Edit::AddInstance { node: Some(node), source, parent, transform };
+                edits.push((node, add));
+                edits.push((node, Edit::RemoveNode { node }));
+            }
+        }
+        edits.sort_by_key(|(id, _)| *id);
+        let removed = self.removed().into_iter().map(|node| Edit::RemoveNode { node });
+        edits.into_iter().map(|(_, edit)| edit).chain(removed).collect()
+    }
+
+    /// The edit that adds a node; `None` for nodes that come with another one.
+    fn addition(&self, id: NodeId, node: &Node) -> Option<Edit> {
+        let (parent, transform) = (node.parent, whole(node.parent_from_node));
+        let copy_of =
+            self.models[1..].iter().find(|m| m.copies.iter().any(|first| first - 1 == id.0));
+        if let Some(model) = copy_of {
+            let source = source_of(model);
+            return Some(Edit::AddInstance { node: Some(id), source, parent, transform });
+        }
+        if self.is_of_a_file(id) {
+            return None;
+        }
+        if let Some(mesh) = node.mesh {
+            let source = InstanceSource::Mesh(mesh);
+            return Some(Edit::AddInstance { node: Some(id), source, parent, transform });
+        }
+        // A light that was added; where it was removed since, the node that carried it is left.
+        let light = node.light.unwrap_or(NO_LIGHT);
+        Some(Edit::AddLight { node: Some(id), light, parent, transform })
+    }
+
+    fn is_of_a_file(&self, id: NodeId) -> bool {
+        self.models.iter().any(|model| {
+            let nodes = model.asset.nodes.len() as u32;
+            model.copies.iter().any(|first| (*first..first + nodes).contains(&id.0))
+        })
+    }
+
+    /// Nodes of files that are in the scene, of which the parent is still there and they are not.
+    fn removed(&self) -> Vec<NodeId> {
+        let mut removed = Vec::new();
+        for model in &self.models {
+            for &first in &model.copies {
+                for (index, node) in (first..).zip(&model.asset.nodes) {
+                    let id = NodeId(index);
+                    let parent_is_there =
+                        node.parent.is_none_or(|p| self.nodes.contains(NodeId(first + p)));
+                    if parent_is_there && !self.nodes.contains(id) {
+                        removed.push(id);
+                    }
+                }
+            }
+        }
+        removed
+    }
+
+    /// How animations stand that have been set, or that came with added files, in the order in which
+    /// they were set: of those that stand still, the last one has placed its nodes.
+    fn playbacks(&self) -> impl Iterator<Item = Edit> {
+        let of_file = self.models[0].asset.animations.len();
+        let mut set: Vec<_> = self.clocks.iter().enumerate().collect();
+        set.retain(|(index, clock)| *index >= of_file || clock.set_by > 0);
+        set.sort_by_key(|(_, clock)| clock.set_by);
+        set.into_iter().map(|(index, clock)| Edit::SetAnimation {
+            animation: AnimationId(index as u32),
+            playback: Playback {
+                playing: Some(clock.playing),
+                time: Some(clock.time_at(self.time)),
+                speed: Some(clock.speed),
+            },
+        })
+    }
+
+    /// Edits of values that turn `from`, which has the same nodes, into this scene.
+    fn differences(&self, from: &Scene) -> Vec<Edit> {
+        let mut edits = Vec::new();
+        for (id, node) in self.nodes.iter() {
+            let Some(old) = from.nodes.get(id) else { continue };
+            edits.extend(moved(id, old.parent_from_node, node.parent_from_node));
+            match (old.light, node.light) {
+                (Some(_), None) => edits.push(Edit::RemoveLight { node: id }),
+                (Some(old), Some(new)) if old != new => edits.push(light_change(id, old, new)),
+                _ => {}
+            }
+        }
+        for (index, (new, old)) in self.materials.iter().zip(&from.materials).enumerate() {
+            edits.extend(material_change(MaterialId(index as u32), old, new));
+        }
+        if self.environment_replaced {
+            edits.push(Edit::SetEnvironment { environment: self.environment.clone() });
+        }
+        edits
+    }
+}
+
+/// Stands for a light that has been removed, until the edit that removes it.
+const NO_LIGHT: Light =
+    Light { kind: LightKind::Point, color: glam::Vec3::ZERO, intensity: 0.0, range: None };
+
+/// Names are URIs.
+fn source_of(model: &Model) -> InstanceSource {
+    InstanceSource::File(model.name.replace('%', "%25"))
+}
+
+fn whole(trs: Trs) -> Transform {
+    Transform {
+        translation: Some(trs.translation),
+        rotation: Some(trs.rotation),
+        scale: Some(trs.scale),
+    }
+}
+
+/// `new` where it differs.
+fn differing<T: PartialEq>(old: T, new: T) -> Option<T> {
+    (old != new).then_some(new)
+}
+
+fn moved(node: NodeId, old: Trs, new: Trs) -> Option<Edit> {
+    let transform = Transform {
+        translation: differing(old.translation, new.translation),
+        rotation: differing(old.rotation, new.rotation),
+        scale: differing(old.scale, new.scale),
+    };
+    (transform != Transform::default()).then_some(Edit::MoveNode { node, transform })
+}
+
+fn light_change(node: NodeId, old: Light, new: Light) -> Edit {
+    let cones = |light: Light| match light.kind {
+        LightKind::Spot { inner, outer } => (Some(inner), Some(outer)),
+        _ => (None, None),
+    };
+    let ((old_inner, old_outer), (inner, outer)) = (cones(old), cones(new));
+    let light = LightSpec {
+        color: differing(old.color, new.color),
+        intensity: differing(old.intensity, new.intensity),
+        range: differing(old.range, new.range).flatten(),
+        inner: differing(old_inner, inner).flatten(),
+        outer: differing(old_outer, outer).flatten(),
+    };
+    Edit::SetLight { node, light }
+}
+
+fn material_change(material: MaterialId, old: &Material, new: &Material) -> Option<Edit> {
+    let change = MaterialChange {
+        base_color: differing(old.base_color, new.base_color),
+        metallic: differing(old.metallic, new.metallic),
+        roughness: differing(old.roughness, new.roughness),
+        emissive: differing(old.emissive, new.emissive),
+    };
+    (change != MaterialChange::default()).then_some(Edit::SetMaterial { material, change })
+}

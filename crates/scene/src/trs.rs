@@ -1,0 +1,71 @@
+//! Translation, rotation and scale of a node.
+
+use glam::{Affine3A, Mat4, Quat, Vec3};
+
+use crate::Transform;
+
+/// parent_from_node = translation · rotation · scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Trs {
+    pub(crate) translation: Vec3,
+    pub(crate) rotation: Quat,
+    pub(crate) scale: Vec3,
+}
+
+impl Default for Trs {
+    fn default() -> Self {
+        Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::ONE }
+    }
+}
+
+impl Trs {
+    pub(crate) fn affine(&self) -> Affine3A {
+        Affine3A::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        self.translation.is_finite() && self.rotation.is_finite() && self.scale.is_finite()
+    }
+
+    /// Takes a matrix apart as three.js does: a mirroring one gets a negative x scale. The flag
+    /// tells whether the parts make up the matrix again; they do not where it shears.
+    pub(crate) fn from_matrix(matrix: Mat4) -> (Self, bool) {
+        let affine = Affine3A::from_mat4(matrix);
+        let trs = if is_invertible(&affine) {
+            let (scale, rotation, translation) = affine.to_scale_rotation_translation();
+            Self { translation, rotation: rotation.normalize(), scale }
+        } else {
+            let m = affine.matrix3;
+            let scale = Vec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length());
+            Self { translation: affine.translation.into(), rotation: Quat::IDENTITY, scale }
+        };
+        let size = matrix.to_cols_array().into_iter().map(f32::abs).fold(0.0, f32::max);
+        let same = Mat4::from(trs.affine()).abs_diff_eq(matrix, 1e-3 * size);
+        (trs, same)
+    }
+
+    /// This, with the parts of an edit put in; their rotation is normalised.
+    pub(crate) fn with(self, edit: &Transform) -> Self {
+        Self {
+            translation: edit.translation.unwrap_or(self.translation),
+            rotation: edit.rotation.map_or(self.rotation, normalize),
+            scale: edit.scale.unwrap_or(self.scale),
+        }
+    }
+}
+
+/// Unit length; left alone where it is that already, so that what was normalised once stays as it is.
+fn normalize(q: Quat) -> Quat {
+    if q.is_normalized() { q } else { q.normalize() }
+}
+
+/// Whether a transform has a usable inverse: finite, and volumes do not vanish.
+pub(crate) fn is_invertible(affine: &Affine3A) -> bool {
+    let determinant = affine.matrix3.determinant();
+    affine.is_finite() && determinant.is_normal() && affine.inverse().is_finite()
+}
+
+/// Whether a place in the world can be reckoned with.
+pub(crate) fn is_in_world(world: &Affine3A) -> bool {
+    world.is_finite() && world.translation.abs().max_element() <= 1e15
+}
