@@ -37,11 +37,15 @@ mod broadcast;
 mod client;
 mod error;
 mod http;
+mod listen;
 mod origin_check;
 mod quic;
 mod reader;
 mod server;
+mod session;
+mod tcp;
 mod tls;
+mod websocket;
 
 use std::time::Duration;
 

@@ -220,6 +220,7 @@ async fn subscribe(
 pub struct RemoteBroadcast {
     path: Arc<str>,
     inner: broadcast::Consumer,
+    max_frame: usize,
 }
 
 impl RemoteBroadcast {
@@ -229,7 +230,8 @@ impl RemoteBroadcast {
     }
 
     /// Reads a track until the broadcast ends.
-    pub fn subscribe(&self, track: &str, options: ReadOptions) -> TrackReader {
+    pub fn subscribe(&self, track: &str, mut options: ReadOptions) -> TrackReader {
+        options.max_frame = options.max_frame.min(self.max_frame);
         TrackReader::new(Source::Broadcast(self.inner.clone()), track, options)
     }
 }
@@ -247,16 +249,17 @@ pub struct Announcements {
     origin: origin::Consumer,
     updates: announce::Consumer,
     appearing: Option<String>,
+    max_frame: usize,
 }
 
 impl Announcements {
-    pub(crate) fn new(origin: &origin::Consumer, prefix: &str) -> Result<Self> {
+    pub(crate) fn new(origin: &origin::Consumer, prefix: &str, max_frame: usize) -> Result<Self> {
         let refused = |reason: String| Error::Publish { path: prefix.to_owned(), reason };
         let pattern = Pattern::subtree(prefix).map_err(|err| refused(err.to_string()))?;
         let origin =
             origin.scope("", &Patterns::from(pattern)).map_err(|err| refused(err.to_string()))?;
         let updates = origin.announced();
-        Ok(Self { origin, updates, appearing: None })
+        Ok(Self { origin, updates, appearing: None, max_frame })
     }
 
     /// The next change; `None` once the server or client is closed. Dropping the future loses
@@ -269,7 +272,9 @@ impl Announcements {
                 self.appearing = None;
                 match found {
                     Ok(inner) => {
-                        return Some(Announcement::Appeared(RemoteBroadcast { path, inner }));
+                        let max_frame = self.max_frame;
+                        let appeared = RemoteBroadcast { path, inner, max_frame };
+                        return Some(Announcement::Appeared(appeared));
                     }
                     Err(err) => tracing::debug!(%path, %err, "announced broadcast not found"),
                 }

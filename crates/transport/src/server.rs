@@ -1,27 +1,28 @@
 //! The server: an embedded relay on one port, QUIC on UDP and HTTP with WebSocket on TCP.
 
-use std::net::{Ipv6Addr, SocketAddr, UdpSocket};
+use std::net::{SocketAddr, UdpSocket};
 use std::sync::{Arc, RwLock};
 use std::time::Duration;
 
 use axum::Router;
 use moq_net::origin;
-use moq_relay::{auth, cache, cluster, shutdown, web};
-use moq_tokio::tls::Certificates;
+use moq_relay::{auth, cache, cluster, shutdown};
+use moq_tokio::tls::ReloadingServerConfig;
 use tokio::task::JoinHandle;
 use web_transport_moq::noq;
 
 use crate::access::{self, Access, Sessions};
+use crate::http::Front;
 use crate::origin_check::OriginCheck;
-use crate::quic::{self, Backend};
+use crate::session::{Backend, Failure};
 use crate::tls::{self, Fingerprint, Identified, Tls};
-use crate::{Announcements, Broadcast, Error, Result, http};
+use crate::{Announcements, Broadcast, Error, Result, listen, quic, tcp};
+
+/// The largest frame accepted from a client, in bytes.
+const CLIENT_FRAME: usize = 1 << 20;
 
 /// Bytes of past groups kept for late readers, over all tracks; above it, the oldest go first.
 const CACHE: &str = "512MiB";
-
-/// Attempts to find a port that is free for both protocols, where the caller leaves the choice.
-const PORT_ATTEMPTS: usize = 16;
 
 /// How a server is set up.
 #[derive(Debug, Clone)]
@@ -56,7 +57,7 @@ impl ServerConfig {
     }
 }
 
-/// A running server. Dropping it stops it at once; [`Server::shutdown`] lets sessions end.
+/// A running server. Dropping it stops it at once; [`Server::shutdown`] waits for that.
 pub struct Server {
     address: SocketAddr,
     origin: origin::Producer,
@@ -64,6 +65,8 @@ pub struct Server {
     shutdown: shutdown::Trigger,
     endpoints: Vec<noq::Endpoint>,
     tasks: Vec<JoinHandle<()>>,
+    /// Watches the files of the HTTPS certificate.
+    _watching: Option<ReloadingServerConfig>,
 }
 
 impl Server {
@@ -84,49 +87,39 @@ impl Server {
         let cluster = cluster().map_err(setup_error)?;
         let identified = config.tls.for_quic()?;
         let fingerprint: Fingerprint = Arc::new(RwLock::new(identified.fingerprint.clone()));
+        let https = config.tls.for_http()?;
 
-        let (udp, web) = bind(config.listen, |listen| {
-            let listen = config.tls.for_http(listen);
-            let web = web::Web::new(auth.clone(), cluster.clone(), no_certificates()?, listen);
-            Ok(web.with_shutdown(observer.clone()).bind()?)
-        })?;
-        let address = udp.local_addr().map_err(setup_error)?;
+        let sockets = listen::listen(config.listen)?;
+        let address = sockets.address;
         let quic_config = tls::quic_config(&identified)?;
-        let mut endpoints = vec![endpoint(udp, &quic_config).map_err(setup_error)?];
-        if let Some(udp) = other_loopback(address) {
-            endpoints.push(endpoint(udp, &quic_config).map_err(setup_error)?);
-        }
+        let endpoints = sockets.udp.into_iter().map(|udp| endpoint(udp, &quic_config));
+        let endpoints: Vec<_> = endpoints.collect::<Result<_, _>>().map_err(setup_error)?;
 
         let sessions = Sessions::new(config.max_sessions);
         let check = OriginCheck::new(address, &config.allowed_hosts, &config.allowed_origins);
-        let check = Arc::new(check);
-        let front = http::router(
-            check.clone(),
-            sessions.clone(),
-            fingerprint.clone(),
-            web.routes(),
-            application,
-        );
+        let origin = cluster.origin.clone();
         let backend = Backend {
             auth,
-            cluster: cluster.clone(),
-            check,
+            cluster,
+            check: Arc::new(check),
             sessions: sessions.clone(),
             shutdown: observer,
         };
+        let front =
+            Front { backend: backend.clone(), fingerprint: fingerprint.clone(), application };
+
         let mut tasks = vec![
             tokio::spawn(access::decide(admissions, config.access, sessions.clone())),
-            tokio::spawn(async move {
-                if let Err(err) = web.serve(front).await {
-                    tracing::error!(%err, "the HTTP server stopped");
-                }
-            }),
             tokio::spawn(renew(config.tls, identified, endpoints.clone(), fingerprint)),
         ];
+        let (acceptor, watching) = https.unzip();
+        for listener in sockets.tcp {
+            tasks.push(tokio::spawn(tcp::serve(listener, acceptor.clone(), front.clone())));
+        }
         for endpoint in &endpoints {
             tasks.push(tokio::spawn(quic::serve(endpoint.clone(), backend.clone())));
         }
-        Ok(Self { address, origin: cluster.origin, sessions, shutdown, endpoints, tasks })
+        Ok(Self { address, origin, sessions, shutdown, endpoints, tasks, _watching: watching })
     }
 
     /// The address, with the port that was chosen.
@@ -139,6 +132,12 @@ impl Server {
         self.sessions.count()
     }
 
+    /// How many requests and sessions have been refused since the start: for their host, origin or
+    /// token, or because too many sessions were open.
+    pub fn refusals(&self) -> u64 {
+        self.sessions.refusals()
+    }
+
     /// Makes a broadcast under this path, the name of a scene. It is known to readers once it is
     /// [announced](Broadcast::announce).
     pub fn publish(&self, path: &str) -> Result<Broadcast> {
@@ -146,8 +145,9 @@ impl Server {
     }
 
     /// The broadcasts under this path, such as `sponza/edits`: the clients' own, as they come and go.
+    /// Of their frames, those above 1 MiB are refused.
     pub fn announced(&self, prefix: &str) -> Result<Announcements> {
-        Announcements::new(&self.origin.consume(), prefix)
+        Announcements::new(&self.origin.consume(), prefix, CLIENT_FRAME)
     }
 
     /// Closes every session, so that clients know at once, and stops; takes at most `grace`. After
@@ -197,78 +197,9 @@ fn cluster() -> Result<cluster::Cluster, Failure> {
     Ok(cluster::Cluster::new(options)?)
 }
 
-/// The relay's routes want to serve a fingerprint; ours serve it instead, and a set of none cannot
-/// be made from outside.
-fn no_certificates() -> Result<Certificates, moq_tokio::tls::Error> {
-    Certificates::from_pem(b"-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n")
-}
-
-/// Binds UDP, and TCP by `bind_tcp`, to the same port.
-fn bind(
-    listen: SocketAddr,
-    bind_tcp: impl Fn(SocketAddr) -> Result<web::Web, Failure>,
-) -> Result<(UdpSocket, web::Web)> {
-    let attempts = if listen.port() == 0 { PORT_ATTEMPTS } else { 1 };
-    let mut attempt = 0;
-    loop {
-        attempt += 1;
-        let udp = moq_tokio::bind::udp(moq_tokio::bind::Udp::new(listen))
-            .map_err(|err| listen_error(listen, "UDP", err))?;
-        let address = udp.local_addr().map_err(setup_error)?;
-        match bind_tcp(address) {
-            Ok(web) => return Ok((udp, web)),
-            Err(err) => {
-                let Some(source) = io_error(&*err) else {
-                    return Err(Error::Tls(err.to_string()));
-                };
-                if attempt == attempts {
-                    let source = std::io::Error::new(source.kind(), source.to_string());
-                    return Err(listen_error(address, "TCP", source));
-                }
-            }
-        }
-    }
-}
-
-/// The system's error at the root of another.
-fn io_error<'a>(err: &'a (dyn std::error::Error + 'static)) -> Option<&'a std::io::Error> {
-    std::iter::successors(Some(err), |err| err.source()).find_map(|err| err.downcast_ref())
-}
-
-fn listen_error(address: SocketAddr, protocol: &'static str, source: std::io::Error) -> Error {
-    let port = address.port();
-    let advice = match source.kind() {
-        std::io::ErrorKind::AddrInUse => {
-            format!("another program uses port {port}: stop it, or choose another port")
-        }
-        std::io::ErrorKind::PermissionDenied => {
-            format!("port {port} needs more rights: choose one above 1023")
-        }
-        _ => "choose an address of this machine".to_owned(),
-    };
-    Error::Listen { address, protocol, source, advice }
-}
-
 fn endpoint(udp: UdpSocket, config: &noq::ServerConfig) -> Result<noq::Endpoint, Failure> {
     let runtime = noq::default_runtime().ok_or("no Tokio runtime")?;
     Ok(noq::Endpoint::new(noq::EndpointConfig::default(), Some(config.clone()), udp, runtime)?)
-}
-
-/// `localhost` is `::1` before it is `127.0.0.1`. Over TCP clients try both, but browsers dial QUIC
-/// to the first only; so a server on IPv4 that `localhost` means listens there too, if it can.
-fn other_loopback(address: SocketAddr) -> Option<UdpSocket> {
-    let ip = address.ip();
-    if !ip.is_ipv4() || !(ip.is_loopback() || ip.is_unspecified()) {
-        return None;
-    }
-    let other = SocketAddr::from((Ipv6Addr::LOCALHOST, address.port()));
-    match moq_tokio::bind::udp(moq_tokio::bind::Udp::new(other)) {
-        Ok(udp) => Some(udp),
-        Err(err) => {
-            tracing::debug!(%other, %err, "not reachable over IPv6 loopback");
-            None
-        }
-    }
 }
 
 /// Replaces a development certificate before it expires; files are watched by `identified`.
@@ -296,8 +227,6 @@ async fn renew(
     }
     std::future::pending::<()>().await;
 }
-
-type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 fn setup_error(err: impl std::fmt::Display) -> Error {
     Error::Setup(format!("{err:#}"))

@@ -1,13 +1,12 @@
 //! The server's certificate: from files, or made for development.
 
-use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Once, RwLock};
 use std::time::Duration;
 
-use moq_relay::web;
 use moq_tokio::rustls::ServerConfig as RustlsConfig;
 use moq_tokio::tls::{Identity, Listen, ReloadingServerConfig};
+use tokio_rustls::TlsAcceptor;
 use web_transport_moq::noq;
 
 use crate::{Error, Result};
@@ -59,39 +58,42 @@ pub(crate) fn install_provider() {
 impl Tls {
     /// The configuration for QUIC. Call inside a Tokio runtime.
     pub(crate) fn for_quic(&self) -> Result<Identified> {
-        let mut listen = Listen::default();
         let alpn = vec![web_transport_moq::ALPN.as_bytes().to_vec()];
         match self {
             Self::SelfSigned => {
                 let identity = Identity::generate(["localhost"]).map_err(tls_error)?;
                 let fingerprint = Some(identity.fingerprint().to_owned());
+                let mut listen = Listen::default();
                 listen.identity = Some(identity);
                 let config = listen.server_config(alpn).map_err(tls_error)?;
                 Ok(Identified { config, fingerprint, _reloading: None })
             }
             Self::Files { cert, key } => {
-                listen.cert = vec![cert.clone()];
-                listen.key = vec![key.clone()];
-                let reloading = listen.server_config_reloading(alpn).map_err(tls_error)?;
+                let reloading = reloading(cert, key, alpn)?;
                 let config = reloading.config();
                 Ok(Identified { config, fingerprint: None, _reloading: Some(reloading) })
             }
         }
     }
 
-    /// The configuration of the TCP side: HTTPS with files, else plain HTTP.
-    pub(crate) fn for_http(&self, listen: SocketAddr) -> web::Config {
-        let mut config = web::Config::default();
-        match self {
-            Self::SelfSigned => config.http.listen = Some(listen),
-            Self::Files { cert, key } => {
-                config.https.listen = Some(listen);
-                config.https.cert = vec![cert.clone()];
-                config.https.key = vec![key.clone()];
-            }
-        }
-        config
+    /// The configuration of the TCP side: HTTPS with files, else none, for plain HTTP. The second
+    /// part watches the files for as long as it lives.
+    pub(crate) fn for_http(&self) -> Result<Option<(TlsAcceptor, ReloadingServerConfig)>> {
+        let Self::Files { cert, key } = self else { return Ok(None) };
+        let alpn = vec![b"h2".to_vec(), b"http/1.1".to_vec()];
+        let reloading = reloading(cert, key, alpn)?;
+        Ok(Some((TlsAcceptor::from(reloading.config()), reloading)))
     }
+}
+
+/// A configuration that follows its files.
+fn reloading(cert: &Path, key: &Path, alpn: Vec<Vec<u8>>) -> Result<ReloadingServerConfig> {
+    let mut listen = Listen::default();
+    listen.cert = vec![cert.to_owned()];
+    listen.key = vec![key.to_owned()];
+    listen.server_config_reloading(alpn).map_err(|err| {
+        Error::Tls(format!("certificate {}, key {}: {err}", cert.display(), key.display()))
+    })
 }
 
 /// A QUIC configuration that closes a silent connection after three seconds, so that both ends
@@ -103,8 +105,7 @@ pub(crate) fn quic_config(identified: &Identified) -> Result<noq::ServerConfig> 
     let idle = noq::IdleTimeout::try_from(crate::IDLE_TIMEOUT).map_err(tls_error)?;
     transport.max_idle_timeout(Some(idle));
     transport.keep_alive_interval(Some(crate::KEEP_ALIVE));
-    // Every subscription holds a stream, and every group being sent another.
-    let streams = noq::VarInt::from_u32(MAX_STREAMS);
+    let streams = noq::VarInt::from_u32(crate::session::MAX_STREAMS);
     transport.max_concurrent_bidi_streams(streams);
     transport.max_concurrent_uni_streams(streams);
     transport.receive_window(noq::VarInt::from_u32(RECEIVE_WINDOW));
@@ -116,8 +117,6 @@ pub(crate) fn quic_config(identified: &Identified) -> Result<noq::ServerConfig> 
     Ok(config)
 }
 
-/// Streams that a client may have open at once, of each kind.
-const MAX_STREAMS: u32 = 1024;
 /// Bytes that a client may have on the way, over all its streams.
 const RECEIVE_WINDOW: u32 = 8 << 20;
 

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use base64::Engine as _;
 use lumencast_transport::{
-    Access, Announcement, Client, Error, Key, ReadOptions, Server, ServerConfig, Transport,
+    Access, Announcement, Client, Error, Key, ReadOptions, Server, ServerConfig, Tls, Transport,
 };
 use tokio::io::AsyncWriteExt;
 use tokio::net::{TcpStream, UdpSocket};
@@ -16,7 +17,8 @@ use crate::common::{
 };
 
 const UPGRADE: &str = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
-    Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+    Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\
+    Sec-WebSocket-Protocol: webtransport, qmux-01.moq-lite-05\r\n";
 
 fn get(path: &str, headers: &str) -> String {
     format!("GET {path} HTTP/1.1\r\nConnection: close\r\n{headers}\r\n")
@@ -45,9 +47,7 @@ async fn foreign_hosts_and_origins_are_refused_on_http() {
     }
     let fingerprint = get("/certificate.sha256", &format!("{own}Origin: https://evil.example\r\n"));
     assert_eq!(status(&server, &fingerprint).await, "HTTP/1.1 403 Forbidden");
-    // Pages of another path, method or protocol pass no other way.
-    let landing = get("/", &own);
-    assert_eq!(status(&server, &landing).await, "HTTP/1.1 404 Not Found");
+    assert_eq!(status(&server, &get("/elsewhere", &own)).await, "HTTP/1.1 404 Not Found");
 }
 
 #[tokio::test]
@@ -68,6 +68,10 @@ async fn foreign_hosts_and_origins_are_refused_on_websocket() {
     {
         assert_eq!(upgrade(&headers).await, "HTTP/1.1 403 Forbidden", "{headers}");
     }
+    assert_eq!(server.refusals(), 2);
+    let keyless =
+        format!("GET / HTTP/1.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n{own}\r\n");
+    assert_eq!(status(&server, &keyless).await, "HTTP/1.1 400 Bad Request");
 }
 
 /// What a browser's WebTransport gets that names this host and origin.
@@ -251,6 +255,52 @@ async fn open_access_beyond_loopback_has_to_be_said() {
     let refused = Server::bind(config, axum::Router::new()).await;
     let Err(err) = refused else { panic!("a server for everyone, unasked") };
     assert!(err.to_string().contains("loopback"), "{err}");
+}
+
+fn pem(label: &str, der: &[u8]) -> String {
+    let base64 = base64::engine::general_purpose::STANDARD.encode(der);
+    format!("-----BEGIN {label}-----\n{base64}\n-----END {label}-----\n")
+}
+
+#[tokio::test]
+async fn certificate_files_serve_quic_and_https() {
+    let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).expect("a certificate");
+    let pem = pem("CERTIFICATE", made.cert.der());
+    let folder = std::env::temp_dir().join(format!("lumencast-transport-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let (cert, key) = (folder.join("cert.pem"), folder.join("key.pem"));
+    std::fs::write(&cert, &pem).expect("written");
+    let secret = made.signing_key.serialize_der();
+    std::fs::write(&key, self::pem("PRIVATE KEY", &secret)).expect("written");
+
+    let mut config = loopback();
+    config.tls = Tls::Files { cert, key };
+    let server = serve(config).await;
+    let broadcast = server.publish("scene").expect("published");
+    let mut track = broadcast.track("light", 0).expect("a track");
+    broadcast.announce().expect("announced");
+    track.write(text("light"), true).expect("written");
+
+    let url = address(&server, "https");
+    let served = moq_tokio::tls::Certificates::from_pem(pem.as_bytes()).expect("a certificate");
+    for transport in [Transport::Quic, Transport::WebSocket] {
+        let mut options = over(transport);
+        options.fingerprint = served.fingerprints().pop();
+        let client = step("connect", Client::connect(&url, options)).await.expect("connected");
+        let mut reader = client.subscribe("scene", "light", ReadOptions::default());
+        assert_eq!(read(&mut reader).await.bytes, text("light"));
+    }
+    let mut stranger = over(Transport::Quic);
+    stranger.timeout = Duration::from_millis(500);
+    let untrusted = step("refused", Client::connect(&url, stranger)).await;
+    assert!(matches!(untrusted, Err(Error::Connect { .. })));
+    std::fs::remove_dir_all(&folder).expect("removed");
+
+    let mut config = loopback();
+    config.tls = Tls::Files { cert: folder.join("cert.pem"), key: folder.join("key.pem") };
+    let missing = Server::bind(config, axum::Router::new()).await;
+    let Err(Error::Tls(message)) = missing else { panic!("a server without certificate") };
+    assert!(message.contains("cert.pem"), "{message}");
 }
 
 #[tokio::test]
