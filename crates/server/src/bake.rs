@@ -1,0 +1,48 @@
+//! Converged light, without a clock: the same fields as a running server's, averaged to the end.
+
+use std::sync::Arc;
+
+use lumencast_gather::Gather;
+use lumencast_gather::blend::BlendSettings;
+use lumencast_light::{ProbeVolume, VolumeId};
+use lumencast_scene::{Snapshot, VolumeSpec};
+
+use crate::field::Field;
+use crate::tick::GatherOptions;
+
+/// Samples of a probe in one job: enough to keep every core busy, few enough to show progress.
+const SAMPLES_A_PASS: u32 = 64;
+
+/// Gathers `samples` samples for every probe of `volumes` and averages them; `options.blend` plays no
+/// part. `progress` is told the share done, 0 to 1, after every pass.
+///
+/// The error falls with the root of `samples`: four times the samples, half the noise.
+pub fn bake(
+    scene: &Arc<Snapshot>,
+    volumes: &[VolumeSpec],
+    gatherer: &mut dyn Gather,
+    samples: u32,
+    options: GatherOptions,
+    mut progress: impl FnMut(f32),
+) -> Vec<ProbeVolume> {
+    let mean = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
+    let mut fields: Vec<Field> = (0..)
+        .zip(volumes)
+        .map(|(id, spec)| Field::new(VolumeId(id), spec.grid, spec.order, mean))
+        .collect();
+    let passes = samples.div_ceil(SAMPLES_A_PASS).max(1);
+    for pass in 0..passes {
+        let first = u64::from(samples) * u64::from(pass) / u64::from(passes);
+        let last = u64::from(samples) * u64::from(pass + 1) / u64::from(passes);
+        let samples = (last - first).max(1) as u32;
+        for field in &mut fields {
+            let seed = u64::from(pass) << 8 | u64::from(field.id().0);
+            let ticket = gatherer.submit(field.job(scene.clone(), samples, options, seed));
+            if let Some(gathered) = gatherer.wait(ticket) {
+                field.blend(&gathered);
+            }
+        }
+        progress((pass + 1) as f32 / passes as f32);
+    }
+    fields.into_iter().map(Field::into_volume).collect()
+}

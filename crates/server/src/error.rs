@@ -1,0 +1,36 @@
+//! What keeps a server from running.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// What keeps a server from running.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ServerError {
+    /// A volume of probes that the wire format cannot carry.
+    #[error("volume {volume}: {reason}")]
+    Volume {
+        /// Its number among the scene's volumes.
+        volume: u32,
+        /// What is wrong with it, and what to do.
+        reason: String,
+    },
+    /// More fields than a catalog holds.
+    #[error("{0} volumes; a scene has at most {max}", max = lumencast_codec::limits::FIELDS)]
+    TooManyVolumes(usize),
+    /// The folder of the page cannot be read.
+    #[error("cannot read the page in {folder}: {source}")]
+    Page {
+        /// The folder.
+        folder: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The network does not allow what was asked for.
+    #[error(transparent)]
+    Network(#[from] lumencast_transport::Error),
+    /// The thread of the tick cannot be started, or has died.
+    #[error("the tick has stopped: {0}")]
+    Stopped(String),
+}

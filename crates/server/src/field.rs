@@ -1,0 +1,116 @@
+//! One volume of probes as the server keeps it: history, walls, encoder.
+
+use std::sync::Arc;
+
+use glam::{IVec3, Vec3};
+use lumencast_codec::{self as codec, EncodedRegion, ProbeEncoder, UpdateInfo};
+use lumencast_gather::blend::{BlendSettings, History};
+use lumencast_gather::{Gathered, Job, Receiver};
+use lumencast_light::{Grid, Order, ProbeVolume, VolumeId};
+use lumencast_scene::Snapshot;
+
+use crate::tick::GatherOptions;
+use crate::walls::Buried;
+
+/// A volume with all that turns sums into frames.
+///
+/// Costs, in memory, for a probe of L2: 108 bytes of published light, twice that of
+/// reconstructions, and 432 of history.
+pub(crate) struct Field {
+    /// What is published: the history's estimates, with probes inside walls filled in.
+    volume: ProbeVolume,
+    positions: Vec<Vec3>,
+    history: History,
+    buried: Buried,
+    encoder: ProbeEncoder,
+    /// Number of the next update.
+    update: u64,
+}
+
+impl Field {
+    pub(crate) fn new(id: VolumeId, grid: Grid, order: Order, blend: BlendSettings) -> Self {
+        Self {
+            volume: ProbeVolume::dark(id, grid, order),
+            positions: grid.positions().collect(),
+            history: History::new(blend, grid.probe_count(), order),
+            buried: Buried::new(grid.probe_count()),
+            encoder: ProbeEncoder::new(grid.resolution, order),
+            update: 0,
+        }
+    }
+
+    pub(crate) fn id(&self) -> VolumeId {
+        self.volume.id
+    }
+
+    pub(crate) fn volume(&self) -> &ProbeVolume {
+        &self.volume
+    }
+
+    pub(crate) fn into_volume(self) -> ProbeVolume {
+        self.volume
+    }
+
+    /// The field as the catalog lists it.
+    pub(crate) fn describe(&self) -> codec::Field {
+        codec::Field {
+            id: self.volume.id.0,
+            order: self.volume.order,
+            usage: codec::Use::All,
+            grid: self.volume.grid,
+            cells_min: IVec3::ZERO,
+            regions: self.encoder.regions().collect(),
+            layers: 3,
+        }
+    }
+
+    pub(crate) fn probe_count(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Number of probes inside walls.
+    pub(crate) fn buried_count(&self) -> usize {
+        self.buried.count()
+    }
+
+    /// What to gather for every probe.
+    pub(crate) fn job(
+        &self,
+        scene: Arc<Snapshot>,
+        samples: u32,
+        options: GatherOptions,
+        seed: u64,
+    ) -> Job {
+        let receivers =
+            self.positions.iter().map(|&position| Receiver { position, samples }).collect();
+        let GatherOptions { bounces, clamp, .. } = options;
+        Job { scene, receivers, order: self.volume.order, bounces, clamp, seed }
+    }
+
+    /// Blends new light into the history and brings up to date what is to be published.
+    pub(crate) fn blend(&mut self, gathered: &Gathered) {
+        self.history.update(&gathered.sums);
+        for probe in 0..self.history.len() {
+            self.volume.probe_mut(probe).copy_from_slice(self.history.coefficients(probe));
+        }
+        self.buried.record(gathered.sums.iter().map(|sums| sums.back_face_fraction));
+        self.buried.fill(&mut self.volume);
+    }
+
+    /// The frames of the regions that somebody watches.
+    pub(crate) fn encode(
+        &mut self,
+        tick: u64,
+        scene: &Snapshot,
+        watched: impl Fn(u32) -> bool,
+    ) -> Vec<EncodedRegion> {
+        let info = UpdateInfo {
+            update: self.update,
+            tick,
+            time: scene.time,
+            scene_version: scene.version,
+        };
+        self.update += 1;
+        self.encoder.encode(&self.volume, info, watched)
+    }
+}

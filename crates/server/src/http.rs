@@ -1,0 +1,111 @@
+//! What the server says over HTTP: the page, the scene's files, its health and its counters.
+
+use std::sync::{Arc, PoisonError, RwLock};
+use std::time::{Duration, Instant};
+
+use axum::Router;
+use axum::extract::{Path, State};
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::middleware::map_response;
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+
+use crate::files::{FileSet, respond};
+use crate::metrics::Metrics;
+use crate::page;
+
+/// Seconds without a tick after which the server calls itself ill.
+const STALLED_AFTER: Duration = Duration::from_secs(5);
+
+/// Scripts, styles and connections from this server only; blobs because glTF loaders hand embedded
+/// pictures on as such.
+const CONTENT_SECURITY_POLICY: &str = "default-src 'self'; script-src 'self'; \
+     style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; worker-src 'self' blob:; \
+     connect-src 'self' data: blob:; object-src 'none'; base-uri 'none'; form-action 'none'; \
+     frame-ancestors 'none'";
+
+/// What the tick and the router share.
+#[derive(Debug)]
+pub(crate) struct Shared {
+    pub(crate) metrics: Metrics,
+    /// The page's files.
+    pub(crate) page: FileSet,
+    /// The scene's files; grows when an edit adds another glTF.
+    pub(crate) scene_files: RwLock<FileSet>,
+    /// Name of the scene and of its broadcast.
+    pub(crate) scene: String,
+    /// The scene's glTF file under `/scene/`.
+    pub(crate) root: String,
+    /// When the last tick ended.
+    pub(crate) last_tick: RwLock<Instant>,
+}
+
+/// The routes.
+pub(crate) fn router(shared: Arc<Shared>) -> Router {
+    Router::new()
+        .route("/", get(|state: State<Arc<Shared>>| page_file(state, Path("index.html".into()))))
+        .route("/lumencast.json", get(start))
+        .route("/scene/{*name}", get(scene_file))
+        .route("/healthz", get(health))
+        .route("/metrics", get(metrics))
+        .route("/{*name}", get(page_file))
+        .with_state(shared)
+        .layer(map_response(secured))
+}
+
+/// What a page needs to know to begin.
+async fn start(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
+    let start = serde_json::json!({
+        "scene": shared.scene, "root": shared.root, "broadcast": shared.scene,
+    });
+    ([(header::CONTENT_TYPE, "application/json")], start.to_string())
+}
+
+async fn page_file(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Response {
+    if name == "index.html" && !shared.page.contains(&name) {
+        return axum::response::Html(page::MISSING).into_response();
+    }
+    let mut response = respond(&name, shared.page.get(&name).cloned()).await;
+    // Vite puts a hash of the contents into the names of these.
+    if name.starts_with("assets/") && response.status() == StatusCode::OK {
+        let forever = HeaderValue::from_static("public, max-age=31536000, immutable");
+        response.headers_mut().insert(header::CACHE_CONTROL, forever);
+    }
+    response
+}
+
+async fn scene_file(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Response {
+    let contents = {
+        let files = shared.scene_files.read().unwrap_or_else(PoisonError::into_inner);
+        files.get(&name).cloned()
+    };
+    respond(&name, contents).await
+}
+
+async fn health(State(shared): State<Arc<Shared>>) -> Response {
+    let ended = *shared.last_tick.read().unwrap_or_else(PoisonError::into_inner);
+    let since = ended.elapsed();
+    if since > STALLED_AFTER {
+        let text = format!("the last tick ended {:.1} s ago\n", since.as_secs_f64());
+        return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
+    }
+    "ok\n".into_response()
+}
+
+async fn metrics(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
+    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], shared.metrics.render())
+}
+
+/// Adds to every answer what tells browsers to be strict with it.
+async fn secured(mut response: Response) -> Response {
+    let headers = response.headers_mut();
+    for (name, value) in [
+        (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-cache"));
+    response
+}

@@ -1,0 +1,187 @@
+//! Keeping time: when the next tick is due, and how many samples fit into it.
+
+/// The beat of a fixed rate that is never made up for: a tick that ends after the next one was due
+/// is followed at once, and the beat goes on from there.
+#[derive(Clone, Copy, Debug)]
+pub struct Beat {
+    period: f64,
+    due: f64,
+}
+
+impl Beat {
+    /// A beat of `period` seconds whose first tick is due at `now`.
+    pub fn new(period: f64, now: f64) -> Self {
+        Self { period, due: now }
+    }
+
+    /// Marks the start of a tick at `now` and sets when the following one is due: a period after
+    /// this one was due, so that small delays do not add up, or, when this one began more than half
+    /// a period late, a period from now.
+    pub fn start(&mut self, now: f64) {
+        let kept = if now - self.due < 0.5 * self.period { self.due } else { now };
+        self.due = kept + self.period;
+    }
+
+    /// Seconds from `now` until the next tick is due; 0 when it is overdue.
+    pub fn wait(&self, now: f64) -> f64 {
+        (self.due - now).max(0.0)
+    }
+}
+
+/// How many samples a probe takes in a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SampleRange {
+    /// At least this many, however long the tick takes; ≥ 1.
+    pub min: u32,
+    /// At most this many, however much time is left.
+    pub max: u32,
+}
+
+impl SampleRange {
+    /// Always the same number.
+    pub fn fixed(samples: u32) -> Self {
+        Self { min: samples, max: samples }
+    }
+}
+
+impl Default for SampleRange {
+    fn default() -> Self {
+        Self { min: 4, max: 256 }
+    }
+}
+
+/// Chooses the samples of the next tick from what the last ones took, so that a tick fills
+/// [`Budget::SHARE`] of its period. It falls at once and rises slowly: a late tick is seen, an
+/// unused millisecond is not.
+#[derive(Clone, Copy, Debug)]
+pub struct Budget {
+    period: f64,
+    range: SampleRange,
+    samples: u32,
+    /// Seconds of gathering for one sample of every probe, smoothed.
+    cost: Option<f64>,
+}
+
+impl Budget {
+    /// Share of the period that a tick aims to fill. The rest takes up the jitter of the machine.
+    pub const SHARE: f64 = 0.85;
+    /// Largest growth of the number of samples from one tick to the next.
+    const RISE: f64 = 1.25;
+    /// Smallest cut after a late tick.
+    const CUT: f64 = 0.8;
+    /// Weight of a new, lower measurement of the cost; higher ones count at once.
+    const SMOOTHING: f64 = 0.2;
+
+    /// Begins with the fewest samples.
+    pub fn new(period: f64, range: SampleRange) -> Self {
+        let range = SampleRange { min: range.min.max(1), max: range.max.max(range.min).max(1) };
+        Self { period, range, samples: range.min, cost: None }
+    }
+
+    /// Samples a probe for the next tick.
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// Goes back to the fewest samples, while nobody watches.
+    pub fn rest(&mut self) {
+        self.samples = self.range.min;
+    }
+
+    /// Takes note of a tick: `gather` seconds spent on tracing [`Budget::samples`] samples a probe,
+    /// out of `total` seconds. Returns whether the tick was late.
+    pub fn record(&mut self, gather: f64, total: f64) -> bool {
+        let late = total > self.period;
+        let measured = gather / f64::from(self.samples);
+        let cost = match self.cost {
+            Some(cost) if measured < cost => cost + (measured - cost) * Self::SMOOTHING,
+            _ => measured,
+        };
+        self.cost = Some(cost);
+
+        let room = Self::SHARE * self.period - (total - gather).max(0.0);
+        let fitting = (room / cost.max(1e-9)).max(0.0);
+        let samples = f64::from(self.samples);
+        let mut next = fitting.min(samples * Self::RISE + 1.0);
+        if late {
+            next = next.min(samples * Self::CUT);
+        }
+        // `as` saturates, and NaN becomes 0: both are then brought into the range.
+        self.samples = (next as u32).clamp(self.range.min, self.range.max);
+        late
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: f64 = 0.04;
+
+    /// Runs `ticks` ticks on a machine that needs `cost` seconds a sample and `other` besides.
+    fn run(budget: &mut Budget, ticks: usize, cost: f64, other: f64) -> usize {
+        (0..ticks)
+            .filter(|_| {
+                let gather = cost * f64::from(budget.samples());
+                budget.record(gather, gather + other)
+            })
+            .count()
+    }
+
+    #[test]
+    fn fills_its_share_of_the_period() {
+        let mut budget = Budget::new(PERIOD, SampleRange { min: 1, max: 1000 });
+        assert_eq!(run(&mut budget, 60, 0.001, 0.004), 0, "never late on the way up");
+        assert_eq!(budget.samples(), 30, "(0.85 · 40 − 4) ms at 1 ms a sample");
+    }
+
+    #[test]
+    fn late_tick_takes_fewer_samples_next_time() {
+        let mut budget = Budget::new(PERIOD, SampleRange { min: 1, max: 1000 });
+        run(&mut budget, 60, 0.001, 0.004);
+        let before = budget.samples();
+        assert_eq!(run(&mut budget, 1, 0.002, 0.004), 1, "twice as slow is late");
+        assert!(f64::from(budget.samples()) <= 0.8 * f64::from(before));
+        assert_eq!(run(&mut budget, 20, 0.002, 0.004), 0, "and then it fits");
+        // Late for another reason than gathering: still fewer.
+        let before = budget.samples();
+        assert!(budget.record(0.001, 0.06));
+        assert!(budget.samples() < before);
+    }
+
+    #[test]
+    fn stays_within_its_range() {
+        let mut budget = Budget::new(PERIOD, SampleRange { min: 8, max: 16 });
+        run(&mut budget, 50, 1e-6, 0.0);
+        assert_eq!(budget.samples(), 16);
+        run(&mut budget, 50, 1.0, 1.0);
+        assert_eq!(budget.samples(), 8);
+        let mut fixed = Budget::new(PERIOD, SampleRange::fixed(16));
+        run(&mut fixed, 10, 1.0, 0.0);
+        assert_eq!(fixed.samples(), 16);
+        assert!(!Budget::new(PERIOD, SampleRange { min: 0, max: 0 }).record(0.0, 0.0));
+    }
+
+    #[test]
+    fn rises_slowly() {
+        let mut budget = Budget::new(PERIOD, SampleRange { min: 4, max: 1000 });
+        let before = budget.samples();
+        run(&mut budget, 1, 1e-5, 0.0);
+        assert!(budget.samples() <= before + before / 4 + 1);
+    }
+
+    #[test]
+    fn beat_is_kept_and_never_made_up_for() {
+        let mut beat = Beat::new(PERIOD, 0.0);
+        assert_eq!(beat.wait(0.0), 0.0);
+        beat.start(0.0);
+        assert!((beat.wait(0.01) - 0.03).abs() < 1e-12);
+        // Woken 1 ms late: the beat stays at 80 ms.
+        beat.start(0.041);
+        assert!((beat.wait(0.041) - 0.039).abs() < 1e-12);
+        // A tick of 150 ms: the next one follows at once, then one a period, no burst.
+        assert_eq!(beat.wait(0.191), 0.0);
+        beat.start(0.191);
+        assert!((beat.wait(0.191) - PERIOD).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,204 @@
+//! The tick with the network around it.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use lumencast_codec::Epoch;
+use lumencast_gather::Gather;
+use lumencast_scene::{FileContents, Scene};
+
+use crate::edits;
+use crate::error::ServerError;
+use crate::files::{Contents, FileSet};
+use crate::http::{self, Shared};
+use crate::inbox::{Inbox, Limits};
+use crate::metrics::Metrics;
+use crate::pace::Beat;
+use crate::page;
+use crate::publish::Publisher;
+use crate::tick::{Tick, TickOptions};
+
+/// How long sessions may take to end when the server stops.
+const GRACE: Duration = Duration::from_secs(2);
+
+/// How a server is set up.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct ServerConfig {
+    /// Address, certificate, access.
+    pub network: lumencast_transport::ServerConfig,
+    /// How light is computed.
+    pub tick: TickOptions,
+    /// What one client may send.
+    pub limits: Limits,
+    /// The folder of the page's files, in place of those compiled in.
+    pub page: Option<PathBuf>,
+}
+
+impl ServerConfig {
+    /// A server with the defaults of everything but its network.
+    pub fn new(network: lumencast_transport::ServerConfig) -> Self {
+        let (tick, limits) = (TickOptions::default(), Limits::default());
+        Self { network, tick, limits, page: None }
+    }
+}
+
+/// A server that holds its port and is ready to run.
+pub struct Server {
+    network: lumencast_transport::Server,
+    tick: Tick,
+    publisher: Publisher,
+    shared: Arc<Shared>,
+    inbox: Arc<Mutex<Inbox>>,
+    clock: Instant,
+}
+
+impl Server {
+    /// Takes the port and publishes the scene's broadcast. Light begins to flow with
+    /// [`Server::run`].
+    ///
+    /// # Errors
+    /// A port in use, a page that cannot be read, a volume beyond the limits.
+    pub async fn bind(
+        scene: Scene,
+        gatherer: Box<dyn Gather>,
+        config: ServerConfig,
+    ) -> Result<Self, ServerError> {
+        let page = page::files(config.page.as_deref()).map_err(|source| ServerError::Page {
+            folder: config.page.clone().unwrap_or_default(),
+            source,
+        })?;
+        let tick = Tick::new(scene, gatherer, config.tick, random_epoch())?;
+        let shared = Arc::new(Shared {
+            metrics: Metrics::default(),
+            page,
+            scene_files: RwLock::new(scene_files(tick.scene())),
+            scene: tick.scene().name().to_owned(),
+            root: tick.scene().root_file().to_owned(),
+            last_tick: RwLock::new(Instant::now()),
+        });
+        let network =
+            lumencast_transport::Server::bind(config.network, http::router(shared.clone())).await?;
+        let broadcast = network.publish(&shared.scene)?;
+        let publisher = Publisher::new(broadcast, &tick.catalog(), shared.clone())?;
+        let inbox = Arc::new(Mutex::new(Inbox::new(config.limits)));
+        Ok(Self { network, tick, publisher, shared, inbox, clock: Instant::now() })
+    }
+
+    /// The address, with the port that was chosen.
+    pub fn local_addr(&self) -> SocketAddr {
+        self.network.local_addr()
+    }
+
+    /// The name of the scene and of its broadcast.
+    pub fn scene_name(&self) -> &str {
+        &self.shared.scene
+    }
+
+    /// The tick.
+    pub fn tick(&self) -> &Tick {
+        &self.tick
+    }
+
+    /// Runs until `stop` is done, then ends the tick in progress, closes every session and returns.
+    ///
+    /// # Errors
+    /// When the tick's thread dies.
+    pub async fn run(self, stop: impl Future<Output = ()>) -> Result<(), ServerError> {
+        let Self { network, tick, publisher, shared, inbox, clock } = self;
+        let prefix = format!("{}/edits", shared.scene);
+        let collector =
+            tokio::spawn(edits::collect(network.announced(&prefix)?, inbox.clone(), clock));
+
+        let stopping = Arc::new(AtomicBool::new(false));
+        let (ended, mut wait_ended) = tokio::sync::oneshot::channel();
+        let thread = {
+            let (stopping, shared) = (stopping.clone(), shared.clone());
+            let body = move || {
+                beat(tick, publisher, &shared, &inbox, clock, &stopping);
+                // Nobody listens any more if the server is stopping.
+                let _ = ended.send(());
+            };
+            thread::Builder::new()
+                .name("tick".into())
+                .spawn(body)
+                .map_err(|e| ServerError::Stopped(e.to_string()))?
+        };
+
+        let mut counting = tokio::time::interval(Duration::from_secs(1));
+        tokio::pin!(stop);
+        loop {
+            tokio::select! {
+                () = &mut stop => break,
+                _ = &mut wait_ended => break,
+                _ = counting.tick() => shared.metrics.set_clients(network.sessions()),
+            }
+        }
+        stopping.store(true, Ordering::Relaxed);
+        thread.thread().unpark();
+        let joined = tokio::task::spawn_blocking(|| thread.join()).await;
+        collector.abort();
+        network.shutdown(GRACE).await;
+        match joined {
+            Ok(Ok(())) => Ok(()),
+            _ => Err(ServerError::Stopped("its thread has panicked".into())),
+        }
+    }
+}
+
+/// Ticks at the rate set until told to stop.
+fn beat(
+    mut tick: Tick,
+    mut publisher: Publisher,
+    shared: &Shared,
+    inbox: &Mutex<Inbox>,
+    clock: Instant,
+    stopping: &AtomicBool,
+) {
+    let now = || clock.elapsed().as_secs_f64();
+    let mut beat = Beat::new(tick.period(), now());
+    while !stopping.load(Ordering::Relaxed) {
+        let wait = beat.wait(now());
+        if wait > 0.0 {
+            // Wakes early when the server stops, or for no reason at all.
+            thread::park_timeout(Duration::from_secs_f64(wait));
+            continue;
+        }
+        let started = now();
+        beat.start(started);
+        let mail = inbox.lock().unwrap_or_else(PoisonError::into_inner).take(started);
+        let report = tick.step(started, mail, &mut publisher);
+        if report.files_changed {
+            *shared.scene_files.write().unwrap_or_else(PoisonError::into_inner) =
+                scene_files(tick.scene());
+        }
+        shared.metrics.record(&report);
+        *shared.last_tick.write().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+    }
+}
+
+/// The files that make the scene up, as clients ask for them.
+fn scene_files(scene: &Scene) -> FileSet {
+    scene
+        .files()
+        .into_iter()
+        .map(|file| {
+            let contents = match file.contents {
+                FileContents::Path(path) => Contents::Path(path),
+                FileContents::Bytes(bytes) => Contents::Bytes(bytes.to_vec().into()),
+            };
+            (file.name, contents)
+        })
+        .collect()
+}
+
+/// Tells this run of the server from others: no secret, only unlikely to come twice.
+fn random_epoch() -> Epoch {
+    use std::hash::{BuildHasher, RandomState};
+    // Every state is seeded by the system's random numbers.
+    Epoch(RandomState::new().hash_one(std::process::id()))
+}

@@ -1,0 +1,339 @@
+//! The tick: edits → animation → acceleration structure → gather → encode → publish.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use lumencast_codec::{
+    AcceptedEdit, Catalog, EncodedRegion, Epoch, RefusedEdit, SceneInfo, SceneState, StateFrame,
+    limits,
+};
+use lumencast_gather::blend::BlendSettings;
+use lumencast_gather::{Gather, Gathered};
+use lumencast_light::{ProbeVolume, VolumeId};
+use lumencast_scene::{Edit, Environment, InstanceSource, Scene, Script, Snapshot, VolumeSpec};
+
+use crate::error::ServerError;
+use crate::field::Field;
+use crate::inbox::{Mail, Received};
+use crate::pace::{Budget, SampleRange};
+use crate::publish::Outlet;
+use crate::report::{Report, Stage, Stopwatch};
+
+/// How a server computes light.
+#[derive(Clone, Debug)]
+pub struct TickOptions {
+    /// Seconds from one tick to the next.
+    pub period: f64,
+    /// Samples a probe and tick.
+    pub samples: SampleRange,
+    /// How light is gathered and blended.
+    pub gather: GatherOptions,
+    /// Volumes in place of the scene's own.
+    pub volumes: Vec<VolumeSpec>,
+    /// Edits at set times.
+    pub script: Option<Script>,
+}
+
+impl Default for TickOptions {
+    /// 25 ticks a second.
+    fn default() -> Self {
+        Self {
+            period: 1.0 / 25.0,
+            samples: SampleRange::default(),
+            gather: GatherOptions::default(),
+            volumes: Vec::new(),
+            script: None,
+        }
+    }
+}
+
+/// How light is gathered and blended.
+#[derive(Clone, Copy, Debug)]
+pub struct GatherOptions {
+    /// Surface scattering events on a path seen from a probe.
+    pub bounces: u32,
+    /// Upper limit of one path vertex's contribution, cd/m².
+    pub clamp: f32,
+    /// How updates are blended over time.
+    pub blend: BlendSettings,
+}
+
+impl Default for GatherOptions {
+    fn default() -> Self {
+        Self { bounces: 3, clamp: f32::INFINITY, blend: BlendSettings::default() }
+    }
+}
+
+/// A snapshot of the scene goes out at least every so many ticks, for those who join.
+const SNAPSHOT_EVERY: u64 = 64;
+/// Scene time moves at most this much in a tick, seconds, however long the machine slept.
+const LONGEST_STEP: f64 = 0.5;
+
+/// A scene with its light, stepped by hand; it has no socket, no thread and no clock of its own.
+pub struct Tick {
+    scene: Scene,
+    gatherer: Box<dyn Gather>,
+    fields: Vec<Field>,
+    options: TickOptions,
+    budget: Budget,
+    epoch: Epoch,
+    number: u64,
+    last_now: Option<f64>,
+    last: Report,
+}
+
+impl Tick {
+    /// Prepares a scene. `epoch` tells this run of the server from others.
+    ///
+    /// # Errors
+    /// A volume beyond the limits of the wire format.
+    pub fn new(
+        scene: Scene,
+        gatherer: Box<dyn Gather>,
+        options: TickOptions,
+        epoch: Epoch,
+    ) -> Result<Self, ServerError> {
+        let volumes =
+            if options.volumes.is_empty() { scene.volumes() } else { options.volumes.clone() };
+        let fields: Vec<Field> = (0..)
+            .zip(volumes)
+            .map(|(id, spec)| Field::new(VolumeId(id), spec.grid, spec.order, options.gather.blend))
+            .collect();
+        check_limits(&fields)?;
+        let budget = Budget::new(options.period, options.samples);
+        let last = Report::default();
+        Ok(Self {
+            scene,
+            gatherer,
+            fields,
+            options,
+            budget,
+            epoch,
+            number: 0,
+            last_now: None,
+            last,
+        })
+    }
+
+    /// What this server offers: the scene and its fields.
+    pub fn catalog(&self) -> Catalog {
+        Catalog {
+            epoch: self.epoch,
+            scene: SceneInfo {
+                name: self.scene.name().to_owned(),
+                root: self.scene.root_file().to_owned(),
+            },
+            tick_seconds: self.options.period,
+            fields: self.fields.iter().map(Field::describe).collect(),
+        }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The light as it was last published, a volume each.
+    pub fn volumes(&self) -> impl Iterator<Item = &ProbeVolume> {
+        self.fields.iter().map(Field::volume)
+    }
+
+    /// Seconds from one tick to the next.
+    pub fn period(&self) -> f64 {
+        self.options.period
+    }
+
+    /// One tick at `now` seconds of the caller's clock, which must not run backwards. Everything
+    /// that depends on it is the scene's time, so equal calls give equal light.
+    pub fn step(&mut self, now: f64, mail: Mail, outlet: &mut dyn Outlet) -> Report {
+        let began = Instant::now();
+        let mut watch = Stopwatch::start();
+        let mut report = Report { tick: self.number, ..Report::default() };
+        let elapsed = self.last_now.map_or(0.0, |last| (now - last).clamp(0.0, LONGEST_STEP));
+
+        let edits = self.apply_edits(elapsed, mail);
+        report.seconds[Stage::Edits as usize] = watch.lap();
+
+        self.scene.advance(elapsed);
+        let scene = self.scene.snapshot();
+        report.seconds[Stage::Animation as usize] = watch.lap();
+
+        let (state, is_snapshot) =
+            self.state_frame(&scene, &edits, now + began.elapsed().as_secs_f64());
+        outlet.state(state, is_snapshot);
+        report.seconds[Stage::Publish as usize] = watch.lap();
+
+        let gathered = self.gather(&scene);
+        let build = gathered.iter().map(|g| g.build_seconds).fold(0.0, f64::max);
+        let gathering = watch.lap();
+        report.seconds[Stage::Accelerate as usize] = build.min(gathering);
+        report.seconds[Stage::Gather as usize] = gathering - build.min(gathering);
+
+        for (field, gathered) in self.fields.iter_mut().zip(&gathered) {
+            field.blend(gathered);
+        }
+        report.seconds[Stage::Blend as usize] = watch.lap();
+
+        let frames = self.encode(&scene, outlet);
+        report.seconds[Stage::Encode as usize] = watch.lap();
+
+        let watched = !frames.is_empty();
+        for (field, frame) in frames {
+            outlet.probes(field, frame);
+        }
+        report.seconds[Stage::Publish as usize] += watch.lap();
+
+        self.finish(now, &scene, &edits, &gathered, watched, report)
+    }
+
+    /// Applies the script's edits that are due and then the clients', each whole or not at all.
+    fn apply_edits(&mut self, elapsed: f64, mail: Mail) -> Edits {
+        let Mail { edits, refused, acks } = mail;
+        let mut outcome = Edits { accepted: Vec::new(), refused, acks };
+        let from = self.scene.time();
+        let scripted: Vec<Edit> = match &self.options.script {
+            Some(script) => script.due(from, from + elapsed).cloned().collect(),
+            None => Vec::new(),
+        };
+        for edit in scripted {
+            match self.scene.apply(&edit) {
+                Ok(edit) => outcome.accepted.push(AcceptedEdit { source: None, edit }),
+                Err(error) => tracing::warn!(%error, "an edit of the script is refused"),
+            }
+        }
+        for received in edits {
+            let Received { client, seq, edit } = received;
+            match self.scene.apply(&edit) {
+                Ok(edit) => {
+                    outcome.accepted.push(AcceptedEdit { source: Some((client, seq)), edit });
+                }
+                Err(error) => {
+                    let reason = error.to_string();
+                    outcome.refused.push(RefusedEdit { client, seq, reason });
+                }
+            }
+        }
+        outcome
+    }
+
+    /// Light for every field, all fields' jobs under way at once.
+    fn gather(&mut self, scene: &Arc<Snapshot>) -> Vec<Gathered> {
+        let samples = self.budget.samples();
+        let tickets: Vec<_> = self
+            .fields
+            .iter()
+            .map(|field| {
+                let seed = self.number << 8 | u64::from(field.id().0);
+                let job = field.job(scene.clone(), samples, self.options.gather, seed);
+                self.gatherer.submit(job)
+            })
+            .collect();
+        tickets.into_iter().filter_map(|ticket| self.gatherer.wait(ticket)).collect()
+    }
+
+    /// Frames of every field, for the regions that somebody watches.
+    fn encode(&mut self, scene: &Snapshot, outlet: &dyn Outlet) -> Vec<(u32, EncodedRegion)> {
+        let mut frames = Vec::new();
+        for field in &mut self.fields {
+            let id = field.id().0;
+            let encoded = field.encode(self.number, scene, |region| outlet.is_watched(id, region));
+            frames.extend(encoded.into_iter().map(|frame| (id, frame)));
+        }
+        frames
+    }
+
+    /// The state frame: a snapshot of the scene now and then, what changed otherwise.
+    fn state_frame(&self, scene: &Snapshot, edits: &Edits, clock: f64) -> (Vec<u8>, bool) {
+        let is_snapshot = self.number.is_multiple_of(SNAPSHOT_EVERY);
+        let snapshot = is_snapshot
+            .then(|| SceneState { edits: self.scene.edits_since_load(), acks: edits.acks.clone() });
+        let frame = StateFrame {
+            tick: self.number,
+            time: scene.time,
+            clock,
+            version: scene.version,
+            tick_ms: self.last.total_seconds() * 1e3,
+            samples: self.last.samples_a_probe.into(),
+            snapshot,
+            edits: edits.accepted.clone(),
+            refused: edits.refused.clone(),
+        };
+        (frame.encode(), is_snapshot)
+    }
+
+    /// Counts the tick and sets the samples of the next.
+    fn finish(
+        &mut self,
+        now: f64,
+        scene: &Snapshot,
+        edits: &Edits,
+        gathered: &[Gathered],
+        watched: bool,
+        mut report: Report,
+    ) -> Report {
+        let probes: usize = self.fields.iter().map(Field::probe_count).sum();
+        let buried: usize = self.fields.iter().map(Field::buried_count).sum();
+        report.samples_a_probe = self.budget.samples();
+        report.samples = probes as u64 * u64::from(report.samples_a_probe);
+        report.rays = gathered.iter().map(|g| g.rays).sum();
+        report.accepted = edits.accepted.len() as u64;
+        report.refused = edits.refused.len() as u64;
+        report.probes = probes as u64;
+        report.buried = buried as u64;
+        report.scene_version = scene.version;
+        report.scene_time = scene.time;
+        report.files_changed = edits.accepted.iter().any(|accepted| brings_files(&accepted.edit));
+        report.late = self.budget.record(report.stage(Stage::Gather), report.total_seconds());
+        if report.late {
+            tracing::debug!(tick = self.number, seconds = report.total_seconds(), "late");
+        }
+        if !watched {
+            self.budget.rest();
+        }
+        self.number += 1;
+        self.last_now = Some(now);
+        self.last = report.clone();
+        report
+    }
+}
+
+/// What the wire format can carry.
+fn check_limits(fields: &[Field]) -> Result<(), ServerError> {
+    if fields.len() > limits::FIELDS {
+        return Err(ServerError::TooManyVolumes(fields.len()));
+    }
+    let mut total = 0;
+    for field in fields {
+        total += field.probe_count();
+        let regions = field.describe().regions.len();
+        let reason = if field.probe_count() > limits::FIELD_PROBES {
+            format!("{} probes; at most {}", field.probe_count(), limits::FIELD_PROBES)
+        } else if total > limits::CATALOG_PROBES {
+            format!("{total} probes with those before it; at most {}", limits::CATALOG_PROBES)
+        } else if regions > limits::REGIONS {
+            format!("{regions} regions; at most {}", limits::REGIONS)
+        } else {
+            continue;
+        };
+        let volume = field.id().0;
+        return Err(ServerError::Volume { volume, reason: reason + ": give it fewer cells" });
+    }
+    Ok(())
+}
+
+/// What became of a tick's edits.
+struct Edits {
+    accepted: Vec<AcceptedEdit>,
+    refused: Vec<RefusedEdit>,
+    acks: BTreeMap<String, u64>,
+}
+
+/// Whether an edit makes clients ask for files that they did not need before.
+fn brings_files(edit: &Edit) -> bool {
+    matches!(
+        edit,
+        Edit::AddInstance { source: InstanceSource::File(_), .. }
+            | Edit::SetEnvironment { environment: Environment::Image { .. } }
+    )
+}

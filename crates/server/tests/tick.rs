@@ -1,0 +1,350 @@
+//! The tick, stepped by hand: no network, no clock but the test's own.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use glam::Vec3;
+use lumencast_codec::{EncodedRegion, Epoch, ProbeDecoder, StateFrame};
+use lumencast_gather::path_trace::{CpuPathTracer, Options};
+use lumencast_gather::{Gather, Gathered, Job, Progress, Ticket};
+use lumencast_light::ProbeVolume;
+use lumencast_scene::{Edit, LightSpec, NodeId, Scene, Script, Transform, VolumeSpec};
+use lumencast_server::{
+    Inbox, Limits, Mail, Outlet, Received, Report, SampleRange, Tick, TickOptions,
+};
+
+const PERIOD: f64 = 0.04;
+
+/// Keeps what a tick sends.
+#[derive(Default)]
+struct Kept {
+    states: Vec<StateFrame>,
+    frames: Vec<(u32, EncodedRegion)>,
+    unwatched: bool,
+}
+
+impl Outlet for Kept {
+    fn is_watched(&self, _: u32, _: u32) -> bool {
+        !self.unwatched
+    }
+
+    fn state(&mut self, frame: Vec<u8>, new_group: bool) {
+        let state = StateFrame::decode(&frame).expect("a state frame");
+        assert_eq!(new_group, state.snapshot.is_some(), "a snapshot begins a group");
+        self.states.push(state);
+    }
+
+    fn probes(&mut self, field: u32, frame: EncodedRegion) {
+        self.frames.push((field, frame));
+    }
+}
+
+/// A cornell with few probes, and the kept frames.
+struct Stepped {
+    tick: Tick,
+    kept: Kept,
+    now: f64,
+}
+
+impl Stepped {
+    fn new(options: TickOptions) -> Self {
+        let tracer = CpuPathTracer::new(Options::default()).expect("threads");
+        Self::with(options, Box::new(tracer))
+    }
+
+    fn with(options: TickOptions, gatherer: Box<dyn Gather>) -> Self {
+        let scene = Scene::builtin("cornell").expect("a built-in scene");
+        let tick = Tick::new(scene, gatherer, options, Epoch(7)).expect("a tick");
+        Self { tick, kept: Kept::default(), now: 0.0 }
+    }
+
+    fn step(&mut self, mail: Mail) -> Report {
+        let report = self.tick.step(self.now, mail, &mut self.kept);
+        self.now += PERIOD;
+        report
+    }
+
+    fn steps(&mut self, n: usize) {
+        for _ in 0..n {
+            self.step(Mail::default());
+        }
+    }
+
+    fn node(&self, name: &str) -> NodeId {
+        self.tick.scene().nodes().find(|node| node.name == name).expect(name).id
+    }
+
+    fn volume(&self) -> &ProbeVolume {
+        self.tick.volumes().next().expect("a volume")
+    }
+
+    fn mean_c0(&self) -> f32 {
+        let volume = self.volume();
+        let sum: Vec3 = (0..volume.grid.probe_count()).map(|i| volume.probe(i)[0]).sum();
+        sum.element_sum() / volume.grid.probe_count() as f32
+    }
+}
+
+fn options() -> TickOptions {
+    let scene = Scene::builtin("cornell").expect("a built-in scene");
+    let mut volume: VolumeSpec = scene.volumes()[0];
+    volume.grid.resolution = glam::UVec3::splat(3);
+    TickOptions {
+        period: PERIOD,
+        samples: SampleRange::fixed(64),
+        volumes: vec![volume],
+        ..TickOptions::default()
+    }
+}
+
+fn mail(seq: u64, edit: Edit) -> Mail {
+    let received = Received { client: "a".into(), seq, edit };
+    Mail { edits: vec![received], acks: BTreeMap::from([("a".into(), seq)]), ..Mail::default() }
+}
+
+fn dim(node: NodeId, intensity: f32) -> Edit {
+    Edit::SetLight { node, light: LightSpec { intensity: Some(intensity), ..LightSpec::default() } }
+}
+
+#[test]
+fn light_follows_an_edit() {
+    let mut stepped = Stepped::new(options());
+    stepped.steps(10);
+    let before = stepped.mean_c0();
+    assert!(before > 0.0);
+    let lamp = stepped.node("lamp");
+    let report = stepped.step(mail(1, dim(lamp, 300.0)));
+    assert_eq!((report.accepted, report.refused), (1, 0));
+    stepped.steps(5);
+    let after = stepped.mean_c0();
+    assert!(after > 3.0 * before, "{before} before, {after} with a hundred times the lamp");
+
+    // Moved out of the box, to the far side of its back wall, it lights nothing inside.
+    let away = Transform { translation: Some(Vec3::new(0.0, 1.0, -50.0)), ..Transform::default() };
+    stepped.step(mail(2, Edit::MoveNode { node: lamp, transform: away }));
+    stepped.steps(15);
+    assert!(stepped.mean_c0() < 0.5 * after, "{after}, then {}", stepped.mean_c0());
+}
+
+#[test]
+fn state_tells_of_edits_and_the_version_of_the_light() {
+    let mut stepped = Stepped::new(options());
+    let lamp = stepped.node("lamp");
+    stepped.steps(2);
+    stepped.step(mail(5, dim(lamp, 2.0)));
+    let state = stepped.kept.states.last().expect("a frame a tick");
+    assert_eq!(state.edits.len(), 1);
+    assert_eq!(state.edits[0].source, Some(("a".into(), 5)));
+    assert_eq!(state.edits[0].edit, dim(lamp, 2.0));
+    assert_eq!(state.tick, 2);
+    assert!((state.time - 2.0 * PERIOD).abs() < 1e-9, "{}", state.time);
+    let (_, frame) = stepped.kept.frames.last().expect("light");
+    let header = lumencast_codec::ProbeHeader::read(&frame.bytes).expect("a header");
+    assert_eq!((header.info.scene_version, header.info.tick), (state.version, 2));
+
+    // Those who join later learn of it from a snapshot.
+    stepped.steps(70);
+    let snapshots: Vec<_> =
+        stepped.kept.states.iter().filter_map(|state| state.snapshot.as_ref()).collect();
+    assert_eq!(snapshots.len(), 2, "at the first tick and after 64");
+    let told = snapshots[1].edits.iter().any(|edit| {
+        matches!(edit, Edit::SetLight { node, light }
+        if *node == lamp && light.intensity == Some(2.0))
+    });
+    assert!(told, "{:?}", snapshots[1].edits);
+}
+
+#[test]
+fn a_refused_edit_changes_nothing() {
+    let mut still = options();
+    still.samples = SampleRange::fixed(16);
+    let (mut edited, mut untouched) = (Stepped::new(still.clone()), Stepped::new(still));
+    edited.steps(3);
+    untouched.steps(4);
+    let report = edited.step(mail(1, Edit::RemoveNode { node: NodeId(999) }));
+    assert_eq!((report.accepted, report.refused), (0, 1));
+    let state = edited.kept.states.last().expect("a frame");
+    assert!(state.edits.is_empty());
+    assert_eq!((state.refused[0].client.as_str(), state.refused[0].seq), ("a", 1));
+    assert!(state.refused[0].reason.contains("999"), "{}", state.refused[0].reason);
+    assert_eq!(edited.volume(), untouched.volume());
+    assert_eq!(state.version, untouched.kept.states[3].version);
+}
+
+#[test]
+fn a_script_gives_the_same_light_every_time() {
+    let run = || {
+        let mut scripted = options();
+        scripted.samples = SampleRange::fixed(8);
+        scripted.script = Some(script());
+        let mut stepped = Stepped::new(scripted);
+        stepped.steps(12);
+        stepped
+    };
+    let (first, second) = (run(), run());
+    let edits: usize = first.kept.states.iter().map(|state| state.edits.len()).sum();
+    assert_eq!(edits, 2, "both edits of the script were due");
+    assert!(first.kept.states.iter().flat_map(|s| &s.edits).all(|edit| edit.source.is_none()));
+    assert_eq!(first.volume(), second.volume());
+    assert!(first.kept.frames.iter().zip(&second.kept.frames).all(|(a, b)| a == b));
+    assert_eq!(first.kept.frames.len(), second.kept.frames.len());
+
+    let mut unscripted = options();
+    unscripted.samples = SampleRange::fixed(8);
+    let mut other = Stepped::new(unscripted);
+    other.steps(12);
+    assert_ne!(first.volume(), other.volume(), "the script does something");
+}
+
+fn script() -> Script {
+    let scene = Scene::builtin("cornell").expect("a built-in scene");
+    let lamp = scene.nodes().find(|node| node.name == "lamp").expect("a lamp").id;
+    let line = |at: f64, intensity: f32| {
+        let edit = serde_json::to_value(dim(lamp, intensity)).expect("JSON");
+        serde_json::json!({ "at": at, "edit": edit }).to_string()
+    };
+    Script::parse(&format!("{}\n{}\n", line(0.1, 30.0), line(0.3, 0.0))).expect("a script")
+}
+
+/// A gatherer that is as slow as the test wants.
+struct Slow {
+    inner: CpuPathTracer,
+    a_sample: Arc<Mutex<Duration>>,
+    samples: u32,
+}
+
+impl Gather for Slow {
+    fn submit(&mut self, job: Job) -> Ticket {
+        self.samples = job.receivers[0].samples;
+        self.inner.submit(job)
+    }
+
+    fn poll(&mut self, ticket: Ticket) -> Progress {
+        self.inner.poll(ticket)
+    }
+
+    fn wait(&mut self, ticket: Ticket) -> Option<Gathered> {
+        std::thread::sleep(*self.a_sample.lock().expect("no panic") * self.samples);
+        self.inner.wait(ticket)
+    }
+
+    fn cancel(&mut self, ticket: Ticket) {
+        self.inner.cancel(ticket);
+    }
+}
+
+#[test]
+fn a_late_tick_takes_fewer_samples_next_time() {
+    let mut slow = options();
+    slow.volumes[0].grid.resolution = glam::UVec3::ONE;
+    slow.period = 0.1;
+    slow.samples = SampleRange { min: 2, max: 20 };
+    let a_sample = Arc::new(Mutex::new(Duration::ZERO));
+    let inner = CpuPathTracer::new(Options::default()).expect("threads");
+    let gatherer = Slow { inner, a_sample: a_sample.clone(), samples: 0 };
+    let mut stepped = Stepped::with(slow, Box::new(gatherer));
+    stepped.steps(20);
+    assert_eq!(stepped.step(Mail::default()).samples_a_probe, 20, "there is time for all");
+
+    *a_sample.lock().expect("no panic") = Duration::from_millis(10);
+    let late = stepped.step(Mail::default());
+    assert!(late.late && late.samples_a_probe == 20, "20 samples of 10 ms in 100 ms");
+    let next = stepped.step(Mail::default());
+    assert!(next.samples_a_probe <= 10, "{}", next.samples_a_probe);
+    assert_eq!(stepped.kept.states.last().map(|s| s.samples), Some(20.0), "of the last tick");
+    stepped.steps(1);
+    assert_eq!(stepped.kept.states.last().map(|s| s.samples), Some(next.samples_a_probe.into()));
+}
+
+#[test]
+fn what_is_sent_decodes_to_the_light() {
+    let mut stepped = Stepped::new(options());
+    stepped.steps(9);
+    let catalog = stepped.tick.catalog();
+    let field = &catalog.fields[0];
+    let mut decoders: Vec<ProbeDecoder> =
+        field.regions.iter().map(|r| ProbeDecoder::new(r.size, field.order)).collect();
+    let mut last = None;
+    for (_, frame) in &stepped.kept.frames {
+        let light = decoders[frame.region as usize].decode(&frame.bytes).expect("a frame");
+        last = Some(light);
+    }
+    let light = last.expect("light");
+    assert_eq!(light.header.info.update, 8);
+    let volume = stepped.volume();
+    let n = field.order.coefficients();
+    for probe in 0..volume.grid.probe_count() {
+        let (sent, held) = (&light.coefficients[probe * n..][..n], volume.probe(probe));
+        let error: f32 = sent.iter().zip(held).map(|(a, b)| (*a - *b).length_squared()).sum();
+        let rms = (error / (3 * n) as f32).sqrt();
+        assert!(rms < 0.02 * held[0].length(), "probe {probe}: {rms} of {}", held[0]);
+    }
+}
+
+#[test]
+fn what_nobody_watches_is_not_encoded() {
+    let mut stepped = Stepped::new(options());
+    stepped.kept.unwatched = true;
+    stepped.steps(5);
+    assert!(stepped.kept.frames.is_empty());
+    assert_eq!(stepped.kept.states.len(), 5, "the state is");
+    stepped.kept.unwatched = false;
+    stepped.steps(8);
+    let (_, first) = stepped.kept.frames.first().expect("light");
+    assert!(first.new_group && first.layer == 0, "it begins with a keyframe");
+}
+
+#[test]
+fn edits_of_an_inbox_reach_the_scene_in_order() {
+    let mut stepped = Stepped::new(options());
+    let lamp = stepped.node("lamp");
+    let mut inbox = Inbox::new(Limits::default());
+    for (seq, intensity) in [(1, 5.0), (2, 7.0), (3, -1.0)] {
+        let edit = lumencast_codec::ClientEdit { seq, edit: dim(lamp, intensity) };
+        inbox.receive("a", &edit.encode(), 0.0);
+    }
+    let report = stepped.step(inbox.take(0.0));
+    assert_eq!((report.accepted, report.refused), (2, 1));
+    let light = stepped.tick.scene().nodes().find(|n| n.id == lamp).and_then(|n| n.light);
+    assert_eq!(light.map(|l| l.intensity), Some(7.0));
+}
+
+#[test]
+fn too_many_probes_are_refused_in_words() {
+    let mut huge = options();
+    huge.volumes[0].grid.resolution = glam::UVec3::new(128, 128, 34);
+    let scene = Scene::builtin("cornell").expect("a built-in scene");
+    let tracer = Box::new(CpuPathTracer::new(Options::default()).expect("threads"));
+    let error = Tick::new(scene, tracer, huge, Epoch(0)).err().expect("refused").to_string();
+    assert!(error.contains("volume 0") && error.contains("557056"), "{error}");
+}
+
+#[test]
+fn light_at_both_ends_of_the_scale_is_carried() {
+    for (intensity, low, high) in [(1e-3, 1e-6, 1.0), (1e6, 1e3, 1e9)] {
+        let mut stepped = Stepped::new(options());
+        let lamp = stepped.node("lamp");
+        let dark = Edit::SetMaterial {
+            material: emissive(&stepped),
+            change: lumencast_scene::MaterialChange {
+                emissive: Some(Vec3::ZERO),
+                ..Default::default()
+            },
+        };
+        stepped.step(mail(1, dark));
+        stepped.step(mail(2, dim(lamp, intensity)));
+        stepped.steps(10);
+        let c0 = stepped.mean_c0();
+        assert!(c0 > low && c0 < high, "{intensity} cd: {c0}");
+        let (_, frame) = stepped.kept.frames.iter().rfind(|(_, f)| f.layer == 0).expect("light");
+        assert!(frame.error < 0.01, "{intensity} cd: {}", frame.error);
+    }
+}
+
+/// The material of the ceiling light.
+fn emissive(stepped: &Stepped) -> lumencast_scene::MaterialId {
+    let materials = stepped.tick.scene().materials();
+    let index = materials.iter().position(|m| m.emissive != Vec3::ZERO).expect("one shines");
+    lumencast_scene::MaterialId(index as u32)
+}
