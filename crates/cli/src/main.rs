@@ -1,2 +1,72 @@
 //! The `lumencast` program.
-fn main() {}
+
+#![expect(clippy::print_stdout, reason = "printing is what a program at a terminal does")]
+
+mod arguments;
+mod bake;
+mod bench;
+mod doctor;
+mod inspect;
+mod output;
+mod probe;
+mod remote;
+mod serve;
+mod token;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use tracing_subscriber::EnvFilter;
+
+/// Computes the indirect light of a 3D scene and casts it, live, to any number of clients.
+#[derive(Debug, Parser)]
+#[command(name = "lumencast", version, arg_required_else_help = true, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  lumencast serve cornell                 a built-in scene; prints the page's address
+  lumencast serve sponza.glb              a scene of your own
+  lumencast bake sponza.glb -o sponza.light
+  lumencast doctor                        when something does not work
+
+Log messages go to standard error; RUST_LOG=debug shows more of them.
+Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Serve(serve::Serve),
+    Bake(bake::Bake),
+    Inspect(inspect::Inspect),
+    Probe(probe::Probe),
+    Doctor(doctor::Doctor),
+    Token(token::Token),
+    #[command(subcommand)]
+    Bench(bench::Bench),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+
+    let result = match cli.command {
+        Command::Serve(command) => command.run(),
+        Command::Bake(command) => command.run(),
+        Command::Inspect(command) => command.run(),
+        Command::Probe(command) => command.run(),
+        Command::Doctor(command) => command.run(),
+        Command::Token(command) => command.run(),
+        Command::Bench(command) => command.run(),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

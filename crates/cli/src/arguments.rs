@@ -1,0 +1,297 @@
+//! Arguments that several commands share.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use anyhow::{Context, Result, anyhow, ensure};
+use clap::{Args, ValueEnum};
+use glam::{Quat, UVec3, Vec3};
+use lumencast_gather::Gather;
+use lumencast_gather::blend::BlendSettings;
+use lumencast_gather::path_trace::{CpuPathTracer, MaterialModel, Options};
+use lumencast_light::{Grid, Order};
+use lumencast_scene::{Scene, Script, VolumeSpec};
+use lumencast_server::{GatherOptions, SampleRange, TickOptions};
+
+/// The port of `serve` unless told otherwise.
+pub(crate) const DEFAULT_PORT: u16 = 4443;
+
+/// Which scene.
+#[derive(Debug, Args)]
+pub(crate) struct SceneSource {
+    /// A glTF file (.gltf or .glb), or a built-in scene: cornell, door, tomb.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: String,
+}
+
+impl SceneSource {
+    pub(crate) fn open(&self) -> Result<Scene> {
+        Ok(Scene::open(&self.scene)?)
+    }
+}
+
+/// Which scene, and where its probes are.
+#[derive(Debug, Args)]
+pub(crate) struct SceneArguments {
+    #[command(flatten)]
+    pub(crate) source: SceneSource,
+    /// A volume of probes in place of the scene's own: its cells, and, if it is not to span the
+    /// scene, its centre and size in metres. May be given several times.
+    #[arg(long = "volume", value_name = "NXxNYxNZ[@X,Y,Z:SX,SY,SZ]")]
+    pub(crate) volumes: Vec<VolumeArgument>,
+    /// Highest band of the spherical harmonics, 1 to 4, in place of the volumes' own.
+    #[arg(long, value_parser = parse_order)]
+    pub(crate) order: Option<Order>,
+}
+
+impl SceneArguments {
+    /// The volumes given, or else the scene's own, in the order given.
+    pub(crate) fn volumes(&self, scene: &Scene) -> Result<Vec<VolumeSpec>> {
+        let mut volumes = Vec::new();
+        for volume in &self.volumes {
+            volumes.push(volume.in_scene(scene));
+        }
+        if volumes.is_empty() {
+            volumes = scene.volumes();
+        }
+        for volume in &mut volumes {
+            volume.order = self.order.unwrap_or(volume.order);
+        }
+        Ok(volumes)
+    }
+}
+
+/// How light is gathered.
+#[derive(Debug, Args)]
+pub(crate) struct GatherArguments {
+    /// Surface scattering events on a path, seen from a probe.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=64))]
+    pub(crate) bounces: u32,
+    /// Upper limit of one path vertex's contribution, cd/m², against bright speckles.
+    #[arg(long, value_name = "CD/M2", default_value = "inf", value_parser = parse_positive)]
+    pub(crate) clamp: f32,
+    /// How surfaces reflect: as their materials say, or all as opaque two-sided Lambert.
+    #[arg(long, value_enum, default_value_t = Materials::Full)]
+    pub(crate) materials: Materials,
+}
+
+impl GatherArguments {
+    pub(crate) fn options(&self, blend: BlendSettings) -> GatherOptions {
+        GatherOptions { bounces: self.bounces, clamp: self.clamp, blend }
+    }
+
+    pub(crate) fn gatherer(&self) -> Result<Box<dyn Gather>> {
+        let options = Options { materials: self.materials.model(), threads: None };
+        let tracer = CpuPathTracer::new(options).context("cannot start the threads that trace")?;
+        Ok(Box::new(tracer))
+    }
+}
+
+/// How ticks follow one another.
+#[derive(Debug, Args)]
+pub(crate) struct TickArguments {
+    /// Ticks a second.
+    #[arg(long, default_value = "25", value_name = "HZ", value_parser = parse_rate)]
+    pub(crate) rate: f64,
+    /// Samples a probe and tick: fixed, or between two bounds so that the tick fits its period.
+    #[arg(long, default_value = "4..256", value_name = "N|MIN..MAX", value_parser = parse_samples)]
+    samples: SampleRange,
+    /// Least weight of a new update: lower is calmer, higher follows small changes sooner.
+    #[arg(long, default_value = "0.01", value_parser = parse_share)]
+    ratio: f32,
+    /// Standard deviations by which a change stands out to be followed at once; inf to follow by
+    /// the ratio alone.
+    #[arg(long, default_value = "5", value_parser = parse_positive)]
+    significance: f32,
+    /// A script of edits (JSON lines, {"at": seconds, "edit": …}), played by scene time.
+    #[arg(long, value_name = "FILE")]
+    edits: Option<PathBuf>,
+}
+
+impl TickArguments {
+    /// All that a tick needs to know.
+    pub(crate) fn options(
+        &self,
+        scene: &Scene,
+        volumes: &SceneArguments,
+        gather: &GatherArguments,
+    ) -> Result<TickOptions> {
+        let blend = BlendSettings { ratio: self.ratio, significance: self.significance };
+        Ok(TickOptions {
+            period: 1.0 / self.rate,
+            samples: self.samples,
+            gather: gather.options(blend),
+            volumes: volumes.volumes(scene)?,
+            script: self.edits.as_deref().map(read_script).transpose()?,
+        })
+    }
+}
+
+/// How surfaces reflect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Materials {
+    /// As their materials say.
+    Full,
+    /// As opaque two-sided Lambert with their base colour, for comparisons.
+    Lambert,
+}
+
+impl Materials {
+    pub(crate) fn model(self) -> MaterialModel {
+        match self {
+            Self::Full => MaterialModel::Full,
+            Self::Lambert => MaterialModel::Lambert,
+        }
+    }
+}
+
+impl fmt::Display for Materials {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Full => "full",
+            Self::Lambert => "lambert",
+        })
+    }
+}
+
+/// Reads a script of edits.
+fn read_script(path: &Path) -> Result<Script> {
+    let text = std::fs::read_to_string(path)
+        .with_context(|| format!("cannot read the edits in {}", path.display()))?;
+    Script::parse(&text).with_context(|| path.display().to_string())
+}
+
+/// A volume as given on the command line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct VolumeArgument {
+    /// Cells along each axis.
+    pub(crate) resolution: UVec3,
+    /// Centre and size; the scene's bounds if absent.
+    pub(crate) place: Option<(Vec3, Vec3)>,
+}
+
+impl VolumeArgument {
+    /// The volume in a scene: without a place of its own it spans the scene's bounds.
+    fn in_scene(&self, scene: &Scene) -> VolumeSpec {
+        let bounds = scene.bounds();
+        let (center, size) = self.place.unwrap_or((
+            0.5 * (bounds.min + bounds.max),
+            (bounds.max - bounds.min).max(Vec3::splat(1e-3)),
+        ));
+        let grid = Grid { center, rotation: Quat::IDENTITY, size, resolution: self.resolution };
+        VolumeSpec { grid, order: Order::default() }
+    }
+}
+
+impl FromStr for VolumeArgument {
+    type Err = anyhow::Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let (cells, place) = match text.split_once('@') {
+            Some((cells, place)) => (cells, Some(place)),
+            None => (text, None),
+        };
+        let resolution: [u32; 3] = parse_list(cells, 'x')
+            .with_context(|| format!("{cells:?}: cells are given as 10x6x7"))?;
+        ensure!(resolution.iter().all(|n| *n > 0), "{cells:?}: at least one cell along each axis");
+        let place = place.map(|place| -> Result<_> {
+            let (center, size) = place
+                .split_once(':')
+                .with_context(|| format!("{place:?}: a place is given as X,Y,Z:SX,SY,SZ"))?;
+            let (center, size) = (parse_point(center)?, parse_point(size)?);
+            ensure!(size.cmpgt(Vec3::ZERO).all(), "a volume's size is more than 0 along each axis");
+            Ok((center, size))
+        });
+        Ok(Self { resolution: resolution.into(), place: place.transpose()? })
+    }
+}
+
+/// `X,Y,Z`
+pub(crate) fn parse_point(text: &str) -> Result<Vec3> {
+    let point: [f32; 3] =
+        parse_list(text, ',').with_context(|| format!("{text:?}: a point is given as X,Y,Z"))?;
+    let point = Vec3::from(point);
+    ensure!(point.is_finite(), "{text:?}: coordinates are finite");
+    Ok(point)
+}
+
+fn parse_list<T: FromStr>(text: &str, separator: char) -> Result<[T; 3]>
+where
+    T::Err: std::error::Error + Send + Sync + 'static,
+{
+    let numbers = text.split(separator).map(|n| n.trim().parse()).collect::<Result<Vec<T>, _>>()?;
+    numbers.try_into().map_err(|n: Vec<T>| anyhow!("3 numbers are needed, not {}", n.len()))
+}
+
+/// `1` to `4`
+pub(crate) fn parse_order(text: &str) -> Result<Order, String> {
+    let band: u8 = text.parse().map_err(|e| format!("{e}"))?;
+    Order::try_from(band)
+}
+
+/// `N` or `MIN..MAX`
+fn parse_samples(text: &str) -> Result<SampleRange> {
+    let number = |text: &str| -> Result<u32> {
+        let n = text.parse().with_context(|| format!("{text:?}: N or MIN..MAX is needed"))?;
+        ensure!((1..=1_000_000).contains(&n), "1 to 1000000 samples");
+        Ok(n)
+    };
+    match text.split_once("..") {
+        None => Ok(SampleRange::fixed(number(text)?)),
+        Some((min, max)) => {
+            let (min, max) = (number(min)?, number(max)?);
+            ensure!(min <= max, "{min} is more than {max}");
+            Ok(SampleRange { min, max })
+        }
+    }
+}
+
+/// More than 0, at most 1.
+fn parse_share(text: &str) -> Result<f32> {
+    let share: f32 = text.parse()?;
+    ensure!(share > 0.0 && share <= 1.0, "more than 0, at most 1");
+    Ok(share)
+}
+
+/// A number above 0, or `inf`.
+fn parse_positive(text: &str) -> Result<f32> {
+    let number: f32 = text.parse()?;
+    ensure!(number > 0.0, "more than 0");
+    Ok(number)
+}
+
+/// Ticks a second.
+fn parse_rate(text: &str) -> Result<f64> {
+    let rate: f64 = text.parse()?;
+    ensure!((0.1..=1000.0).contains(&rate), "0.1 to 1000 ticks a second");
+    Ok(rate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn volumes() {
+        let v: VolumeArgument = "10x6x7".parse().expect("cells only");
+        assert_eq!(v, VolumeArgument { resolution: UVec3::new(10, 6, 7), place: None });
+        let v: VolumeArgument = "1x2x3@0,-1.5,2:4,5,6".parse().expect("cells and place");
+        assert_eq!(v.place, Some((Vec3::new(0.0, -1.5, 2.0), Vec3::new(4.0, 5.0, 6.0))));
+        for wrong in
+            ["", "8", "8x8", "0x1x1", "8x8x8@", "8x8x8@0,0,0", "8x8x8@0,0,0:1,1,0", "axbxc"]
+        {
+            assert!(wrong.parse::<VolumeArgument>().is_err(), "{wrong}");
+        }
+        assert!(parse_point("1,2,inf").is_err());
+    }
+
+    #[test]
+    fn samples() {
+        assert_eq!(parse_samples("16").expect("one number"), SampleRange { min: 16, max: 16 });
+        assert_eq!(parse_samples("4..64").expect("a range"), SampleRange { min: 4, max: 64 });
+        for wrong in ["", "0", "64..4", "..", "-1", "4..x", "99999999"] {
+            assert!(parse_samples(wrong).is_err(), "{wrong}");
+        }
+    }
+}

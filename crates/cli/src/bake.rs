@@ -1,0 +1,80 @@
+//! `lumencast bake`: a converged light field in a file.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use lumencast_codec::{Epoch, LightFile, SceneInfo, UpdateInfo};
+use lumencast_gather::blend::BlendSettings;
+use serde_json::json;
+
+use crate::arguments::{GatherArguments, SceneArguments};
+use crate::output;
+
+/// Computes a scene's light until it has converged and writes it to a file.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  lumencast bake cornell -o cornell.light
+  lumencast bake sponza.glb -o sponza.light --volume 20x12x14 --samples 16384
+
+The file holds the same bytes as the keyframes of a server's broadcast (docs/wire.md); a client can
+start from it when there is no server. `lumencast inspect FILE` says what is in it.")]
+pub(crate) struct Bake {
+    #[command(flatten)]
+    scene: SceneArguments,
+    #[command(flatten)]
+    gather: GatherArguments,
+    /// The file to write.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Samples a probe: four times as many halve the noise.
+    #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    samples: u32,
+    /// Prints JSON only.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Bake {
+    pub(crate) fn run(self) -> Result<()> {
+        let mut scene = self.scene.source.open()?;
+        let volumes = self.scene.volumes(&scene)?;
+        let snapshot = scene.snapshot();
+        let mut gatherer = self.gather.gatherer()?;
+        let bar = output::bar(1000, "Baking");
+        let light = lumencast_server::bake(
+            &snapshot,
+            &volumes,
+            &mut *gatherer,
+            self.samples,
+            self.gather.options(BlendSettings::default()),
+            |done| bar.set_position((done * 1000.0) as u64),
+        );
+        bar.finish_and_clear();
+
+        let info = SceneInfo { name: scene.name().into(), root: scene.root_file().into() };
+        let at = UpdateInfo {
+            time: snapshot.time,
+            scene_version: snapshot.version,
+            ..UpdateInfo::default()
+        };
+        let bytes = LightFile::of_volumes(Epoch(0), info, 1.0, &light, at).write();
+        std::fs::write(&self.output, &bytes)
+            .with_context(|| format!("cannot write {}", self.output.display()))?;
+        let probes: usize = light.iter().map(|volume| volume.grid.probe_count()).sum();
+        if self.json {
+            return output::json(&json!({
+                "file": self.output, "bytes": bytes.len(), "fields": light.len(),
+                "probes": probes, "samples": self.samples,
+            }));
+        }
+        println!(
+            "{}: {} fields, {probes} probes, {}",
+            self.output.display(),
+            light.len(),
+            output::bytes(bytes.len() as u64)
+        );
+        Ok(())
+    }
+}

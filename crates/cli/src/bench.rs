@@ -1,0 +1,239 @@
+//! `lumencast bench`: figures of this machine.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+use lumencast_codec::{EncodedRegion, Epoch, ProbeHeader};
+use lumencast_server::{Mail, Outlet, Report, Stage, Tick};
+use serde_json::{Value, json};
+
+use crate::arguments::{GatherArguments, SceneArguments, TickArguments};
+use crate::output;
+
+/// Measures what this machine does.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Bench {
+    Tick(BenchTick),
+}
+
+impl Bench {
+    pub(crate) fn run(self) -> Result<()> {
+        match self {
+            Self::Tick(command) => command.run(),
+        }
+    }
+}
+
+/// Runs the server's tick without network and prints its times, samples and bytes.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  lumencast bench tick cornell
+  lumencast bench tick cornell --seconds 60 --edits benches/minute.jsonl --json
+
+One tick follows another at once; the scene's time moves by a period each. Every region counts as
+watched. Times on a machine that does other things besides are not worth much.")]
+pub(crate) struct BenchTick {
+    #[command(flatten)]
+    scene: SceneArguments,
+    #[command(flatten)]
+    gather: GatherArguments,
+    /// Seconds of scene time to run.
+    #[arg(long, default_value_t = 20.0)]
+    seconds: f64,
+    #[command(flatten)]
+    tick: TickArguments,
+    /// Prints JSON only.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Ticks until the number of samples has settled; they are left out of the figures of time.
+const SETTLING: usize = 25;
+/// Bytes of a probe of L2 in half floats: the second paper's, and its published implementation's.
+const RAW_BYTES: [(&str, u64); 2] = [("paper", 56), ("implementation", 72)];
+
+impl BenchTick {
+    pub(crate) fn run(self) -> Result<()> {
+        let scene = self.scene.source.open()?;
+        let options = self.tick.options(&scene, &self.scene, &self.gather)?;
+        let period = options.period;
+        let mut tick = Tick::new(scene, self.gather.gatherer()?, options, Epoch(0))?;
+        let ticks = SETTLING + (self.seconds * self.tick.rate).ceil().clamp(1.0, 1e7) as usize;
+        let bar = output::bar(ticks as u64, "Ticks");
+        let mut sent = Sent::default();
+        let reports: Vec<Report> = (0..ticks)
+            .map(|number| {
+                bar.inc(1);
+                tick.step(number as f64 * period, Mail::default(), &mut sent)
+            })
+            .collect();
+        bar.finish_and_clear();
+        let figures = self.figures(&tick, &reports[SETTLING..], &sent, ticks as u64);
+        if self.json {
+            return output::json(&figures);
+        }
+        print_figures(&figures);
+        Ok(())
+    }
+
+    fn figures(&self, tick: &Tick, reports: &[Report], sent: &Sent, updates: u64) -> Value {
+        let milliseconds = |seconds: &dyn Fn(&Report) -> f64| {
+            let mut times: Vec<f64> = reports.iter().map(|r| seconds(r) * 1e3).collect();
+            times.sort_by(f64::total_cmp);
+            json!({ "median": quantile(&times, 0.5), "p99": quantile(&times, 0.99) })
+        };
+        let stages: BTreeMap<String, Value> = Stage::ALL
+            .iter()
+            .map(|&stage| (stage.to_string(), milliseconds(&|r| r.stage(stage))))
+            .collect();
+        let mut samples: Vec<f64> = reports.iter().map(|r| r.samples_a_probe.into()).collect();
+        samples.sort_by(f64::total_cmp);
+        let gathering: f64 = reports.iter().map(|r| r.stage(Stage::Gather)).sum();
+        let per_second = |n: &dyn Fn(&Report) -> u64| {
+            reports.iter().map(|r| n(r) as f64).sum::<f64>() / gathering.max(1e-9)
+        };
+        let in_time = reports.iter().filter(|r| !r.late).count();
+        let fields: Vec<Value> = tick
+            .volumes()
+            .map(|volume| {
+                let id = volume.id.0;
+                let probes = volume.grid.probe_count() as u64;
+                let bytes: Vec<u64> = (0..3).map(|l| sent.bytes(id, l)).collect();
+                let update = bytes.iter().sum::<u64>() as f64 / updates as f64;
+                let raw: BTreeMap<_, _> =
+                    RAW_BYTES.iter().map(|(name, bytes)| (*name, probes * bytes)).collect();
+                json!({
+                    "id": id,
+                    "resolution": volume.grid.resolution.to_array(),
+                    "order": volume.order,
+                    "probes": probes,
+                    "bytes_an_update": update,
+                    "bytes_a_probe_and_update": update / probes as f64,
+                    "bytes_by_layer": bytes,
+                    "raw_bytes_an_update": raw,
+                })
+            })
+            .collect();
+        json!({
+            "scene": tick.scene().name(),
+            "cores": std::thread::available_parallelism().map_or(1, |n| n.get()),
+            "rate": self.tick.rate,
+            "ticks": reports.len(),
+            "tick_ms": milliseconds(&Report::total_seconds),
+            "stages_ms": stages,
+            "share_in_time": in_time as f64 / reports.len() as f64,
+            "bounces": self.gather.bounces,
+            "samples_a_probe": {
+                "min": samples.first(), "median": quantile(&samples, 0.5), "max": samples.last(),
+            },
+            "samples_a_second": per_second(&|r| r.samples),
+            "rays_a_second": per_second(&|r| r.rays),
+            "fields": fields,
+            "codec_rms_error_of_c0": sent.rms_error(),
+            "edits_accepted": reports.iter().map(|r| r.accepted).sum::<u64>(),
+            "edits_refused": reports.iter().map(|r| r.refused).sum::<u64>(),
+            "state_bytes_a_tick": sent.state as f64 / updates as f64,
+        })
+    }
+}
+
+/// Counts what a tick sends.
+#[derive(Debug, Default)]
+struct Sent {
+    state: u64,
+    /// By field and layer.
+    probes: BTreeMap<(u32, u8), u64>,
+    /// Sum over probes of the squared error relative to c0, and how many.
+    squared_error: f64,
+    weight: f64,
+}
+
+impl Sent {
+    fn bytes(&self, field: u32, layer: u8) -> u64 {
+        self.probes.get(&(field, layer)).copied().unwrap_or(0)
+    }
+
+    fn rms_error(&self) -> f64 {
+        (self.squared_error / self.weight.max(1.0)).sqrt()
+    }
+}
+
+impl Outlet for Sent {
+    fn is_watched(&self, _: u32, _: u32) -> bool {
+        true
+    }
+
+    fn state(&mut self, frame: Vec<u8>, _: bool) {
+        self.state += frame.len() as u64;
+    }
+
+    fn probes(&mut self, field: u32, frame: EncodedRegion) {
+        *self.probes.entry((field, frame.layer)).or_default() += frame.bytes.len() as u64;
+        let probes = ProbeHeader::read(&frame.bytes).map_or(0, |header| header.probes()) as f64;
+        self.squared_error += f64::from(frame.error).powi(2) * probes;
+        self.weight += probes;
+    }
+}
+
+/// The value below which the share `q` of sorted values lies.
+fn quantile(sorted: &[f64], q: f64) -> f64 {
+    match sorted.len() {
+        0 => f64::NAN,
+        n => sorted[((n - 1) as f64 * q).round() as usize],
+    }
+}
+
+fn print_figures(figures: &Value) {
+    let number =
+        |pointer: &str| figures.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    println!(
+        "{}: {} ticks at {} Hz on {} cores, {} bounces",
+        figures["scene"].as_str().unwrap_or_default(),
+        figures["ticks"],
+        figures["rate"],
+        figures["cores"],
+        figures["bounces"],
+    );
+    println!(
+        "tick        median {:.2} ms, p99 {:.2} ms, {:.1} % in time",
+        number("/tick_ms/median"),
+        number("/tick_ms/p99"),
+        100.0 * number("/share_in_time"),
+    );
+    for stage in Stage::ALL {
+        let (median, p99) = (
+            number(&format!("/stages_ms/{stage}/median")),
+            number(&format!("/stages_ms/{stage}/p99")),
+        );
+        println!("  {:<10}median {median:.3} ms, p99 {p99:.3} ms", stage.to_string());
+    }
+    println!(
+        "samples     {} to {} a probe, median {}; {:.2} M a second, {:.2} M rays a second",
+        figures["samples_a_probe"]["min"],
+        figures["samples_a_probe"]["max"],
+        figures["samples_a_probe"]["median"],
+        number("/samples_a_second") / 1e6,
+        number("/rays_a_second") / 1e6,
+    );
+    for field in figures["fields"].as_array().into_iter().flatten() {
+        println!(
+            "field {}     {} probes: {:.0} bytes an update, {:.2} a probe (raw {} or {}); layers {}",
+            field["id"],
+            field["probes"],
+            field["bytes_an_update"].as_f64().unwrap_or(f64::NAN),
+            field["bytes_a_probe_and_update"].as_f64().unwrap_or(f64::NAN),
+            field["raw_bytes_an_update"]["paper"],
+            field["raw_bytes_an_update"]["implementation"],
+            field["bytes_by_layer"],
+        );
+    }
+    println!("codec       RMS error {:.3} % of c0", 100.0 * number("/codec_rms_error_of_c0"));
+    println!(
+        "edits       {} accepted, {} refused; state {:.0} bytes a tick",
+        figures["edits_accepted"],
+        figures["edits_refused"],
+        number("/state_bytes_a_tick"),
+    );
+}

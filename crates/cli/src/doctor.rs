@@ -1,0 +1,197 @@
+//! `lumencast doctor`: what this machine offers, and what is missing for what.
+
+use std::net::{Ipv4Addr, TcpListener, UdpSocket};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use std::{env, fs, thread};
+
+use anyhow::Result;
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::arguments::DEFAULT_PORT;
+use crate::output;
+
+/// Says what this machine offers: system, processor, Vulkan drivers, port, programs.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  lumencast doctor --json > doctor.json    to attach to a report")]
+pub(crate) struct Doctor {
+    /// Prints JSON only.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Programs that building and testing need, with what for.
+const PROGRAMS: [(&str, &str, &str); 6] = [
+    ("cargo", "--version", "builds the server"),
+    ("node", "--version", "builds the page"),
+    ("npm", "--version", "builds the page"),
+    ("cmake", "--version", "builds the TLS library"),
+    ("nasm", "--version", "makes the video encoder fast"),
+    ("chromium", "--version", "the browser tests"),
+];
+
+/// A program that says nothing for this long is taken to hang.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+impl Doctor {
+    pub(crate) fn run(self) -> Result<()> {
+        let report = json!({
+            "lumencast": env!("CARGO_PKG_VERSION"),
+            "page": lumencast_server::page_is_embedded(),
+            "system": system(),
+            "processor": processor(),
+            "vulkan": vulkan(),
+            "port": port(),
+            "programs": programs(),
+        });
+        if self.json {
+            return output::json(&report);
+        }
+        print_report(&report);
+        Ok(())
+    }
+}
+
+fn print_report(report: &Value) {
+    let text = |pointer: &str| match report.pointer(pointer) {
+        Some(Value::String(s)) => s.clone(),
+        Some(Value::Null) | None => "unknown".to_owned(),
+        Some(other) => other.to_string(),
+    };
+    let yes = |pointer: &str| report.pointer(pointer).and_then(Value::as_bool) == Some(true);
+
+    println!("lumencast   {}", text("/lumencast"));
+    let page = if yes("/page") { "compiled in" } else { "not compiled in: build web/viewer first" };
+    println!("page        {page}");
+    println!("system      {}, kernel {}", text("/system/name"), text("/system/kernel"));
+    println!(
+        "processor   {}, {} cores, AVX2 {}, FMA {}",
+        text("/processor/name"),
+        text("/processor/cores"),
+        if yes("/processor/avx2") { "yes" } else { "no" },
+        if yes("/processor/fma") { "yes" } else { "no" },
+    );
+    println!("memory      {} GiB", text("/system/memory_gib"));
+    let drivers = report.pointer("/vulkan/drivers").and_then(Value::as_array);
+    match drivers.filter(|d| !d.is_empty()) {
+        None => println!("Vulkan      no driver; light is computed on the processor without one"),
+        Some(drivers) => drivers.iter().for_each(|d| {
+            println!("Vulkan      {}", d.as_str().unwrap_or_default());
+        }),
+    }
+    println!("Mesa        {}", text("/vulkan/mesa"));
+    println!("port {DEFAULT_PORT}   {}", text("/port/state"));
+    for program in report["programs"].as_array().into_iter().flatten() {
+        let version = program["version"].as_str().unwrap_or("not found");
+        let name = program["name"].as_str().unwrap_or_default();
+        println!("{name:<11} {version} ({})", program["purpose"].as_str().unwrap_or_default());
+    }
+}
+
+fn system() -> Value {
+    let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
+    let name = release
+        .lines()
+        .find_map(|line| line.strip_prefix("PRETTY_NAME="))
+        .map_or_else(|| env::consts::OS.to_owned(), |name| name.trim_matches('"').to_owned());
+    let kernel = fs::read_to_string("/proc/sys/kernel/osrelease").ok();
+    let memory = fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
+        let line = text.lines().find(|line| line.starts_with("MemTotal:"))?;
+        line.split_whitespace().nth(1)?.parse::<f64>().ok()
+    });
+    json!({
+        "name": name,
+        "kernel": kernel.map(|k| k.trim().to_owned()),
+        "memory_gib": memory.map(|kib| (kib / 1024.0 / 1024.0 * 10.0).round() / 10.0),
+    })
+}
+
+fn processor() -> Value {
+    let info = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = info
+        .lines()
+        .find(|line| line.starts_with("model name"))
+        .and_then(|line| Some(line.split_once(':')?.1.trim().to_owned()))
+        .unwrap_or_else(|| env::consts::ARCH.to_owned());
+    #[cfg(target_arch = "x86_64")]
+    let (avx2, fma) = (is_x86_feature_detected!("avx2"), is_x86_feature_detected!("fma"));
+    #[cfg(not(target_arch = "x86_64"))]
+    let (avx2, fma) = (false, false);
+    let cores = thread::available_parallelism().map_or(1, |n| n.get());
+    json!({ "name": name, "cores": cores, "avx2": avx2, "fma": fma })
+}
+
+/// Driver manifests where the Vulkan loader looks for them, and what `vulkaninfo` says, if it is
+/// installed, of Mesa's version.
+fn vulkan() -> Value {
+    let mut drivers: Vec<PathBuf> = match env::var_os("VK_DRIVER_FILES") {
+        Some(files) => env::split_paths(&files).collect(),
+        None => ["/etc", "/usr/local/share", "/usr/share"]
+            .iter()
+            .map(|prefix| Path::new(prefix).join("vulkan/icd.d"))
+            .filter_map(|folder| fs::read_dir(folder).ok())
+            .flat_map(|entries| entries.filter_map(|entry| Some(entry.ok()?.path())))
+            .filter(|path| path.extension().is_some_and(|e| e == "json"))
+            .collect(),
+    };
+    drivers.sort();
+    let mesa = first_output("vulkaninfo", "--summary").and_then(|text| {
+        let at = text.find("Mesa ")?;
+        text[at + 5..].split_whitespace().next().map(str::to_owned)
+    });
+    json!({ "drivers": drivers, "mesa": mesa })
+}
+
+/// Whether the default port is free, for HTTP (TCP) and for QUIC (UDP).
+fn port() -> Value {
+    let address = (Ipv4Addr::LOCALHOST, DEFAULT_PORT);
+    let state = match (TcpListener::bind(address), UdpSocket::bind(address)) {
+        (Ok(_), Ok(_)) => "free".to_owned(),
+        (Err(error), _) | (_, Err(error)) => {
+            format!("not free ({error}): give serve another one, --listen 127.0.0.1:PORT")
+        }
+    };
+    json!({ "number": DEFAULT_PORT, "free": state == "free", "state": state })
+}
+
+fn programs() -> Vec<Value> {
+    PROGRAMS
+        .iter()
+        .map(|&(name, argument, purpose)| {
+            let version = first_output(name, argument)
+                .and_then(|text| text.lines().next().map(|line| line.trim().to_owned()));
+            json!({ "name": name, "version": version, "purpose": purpose })
+        })
+        .collect()
+}
+
+/// What a program prints, if there is such a program and it ends well in time.
+fn first_output(program: &str, argument: &str) -> Option<String> {
+    let mut child = Command::new(program)
+        .arg(argument)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .ok()?;
+    // Reading on a thread of its own: a full pipe must not keep the program from ending.
+    let mut stdout = child.stdout.take()?;
+    let reader = thread::spawn(move || std::io::read_to_string(&mut stdout).unwrap_or_default());
+    let began = Instant::now();
+    let status = loop {
+        match child.try_wait().ok()? {
+            Some(status) => break status,
+            None if began.elapsed() > PATIENCE => {
+                let _ = child.kill();
+                let _ = child.wait();
+                return None;
+            }
+            None => thread::sleep(Duration::from_millis(10)),
+        }
+    };
+    status.success().then(|| reader.join().unwrap_or_default())
+}

@@ -1,0 +1,217 @@
+//! `lumencast inspect`: what is in a saved light field, a running server or a scene.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use glam::Vec3;
+use lumencast_codec::{Catalog, LightFile, StateFrame};
+use lumencast_light::ProbeVolume;
+use lumencast_scene::Scene;
+use serde_json::{Map, Value, json};
+
+use crate::{output, remote};
+
+/// Says what is in a file (.light, .gltf, .glb), a built-in scene, or a running server.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  lumencast inspect sponza.light
+  lumencast inspect sponza.glb
+  lumencast inspect http://127.0.0.1:4443/cornell --json")]
+pub(crate) struct Inspect {
+    /// A file, the name of a built-in scene, or the address of a server's scene.
+    #[arg(value_name = "FILE|URL")]
+    what: String,
+    /// Prints JSON only.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Inspect {
+    pub(crate) fn run(self) -> Result<()> {
+        let report = if self.what.starts_with("http://") || self.what.starts_with("https://") {
+            let seen = remote::look(&self.what)?;
+            light_report(&seen.catalog, &seen.volumes, seen.bytes, seen.state.as_ref())
+        } else if let Some(bytes) = light_file(Path::new(&self.what))? {
+            let read = || -> Result<_> {
+                let file = LightFile::read(&bytes)?;
+                let volumes = file.volumes()?;
+                Ok((file, volumes))
+            };
+            let (file, volumes) = read().with_context(|| self.what.clone())?;
+            light_report(&file.catalog, &volumes, bytes.len() as u64, None)
+        } else {
+            scene_report(&Scene::open(&self.what)?)
+        };
+        if self.json {
+            return output::json(&report);
+        }
+        print_report(&report);
+        Ok(())
+    }
+}
+
+/// The bytes of a file that says it is a light field, or is called one.
+fn light_file(path: &Path) -> Result<Option<Vec<u8>>> {
+    let called = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("light"));
+    if !called && !path.is_file() {
+        return Ok(None);
+    }
+    let mut start = Vec::new();
+    let mut file =
+        std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+    std::io::Read::read_to_end(&mut std::io::Read::take(&mut file, 8), &mut start)?;
+    if !called && start != b"LUMENCST" {
+        return Ok(None);
+    }
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    Ok(Some(bytes))
+}
+
+fn light_report(
+    catalog: &Catalog,
+    volumes: &[ProbeVolume],
+    bytes: u64,
+    state: Option<&StateFrame>,
+) -> Value {
+    let fields: Vec<Value> = catalog
+        .fields
+        .iter()
+        .map(|field| {
+            let volume = volumes.iter().find(|volume| volume.id.0 == field.id);
+            json!({
+                "id": field.id,
+                "order": field.order,
+                "use": field.usage,
+                "grid": field.grid,
+                "probes": field.grid.probe_count(),
+                "regions": field.regions.len(),
+                "layers": field.layers,
+                "c0": volume.map(c0_statistics),
+            })
+        })
+        .collect();
+    let mut report = json!({
+        "epoch": catalog.epoch,
+        "scene": catalog.scene,
+        "tick_seconds": catalog.tick_seconds,
+        "bytes": bytes,
+        "fields": fields,
+    });
+    if let Some(state) = state {
+        report["state"] = json!({
+            "tick": state.tick,
+            "time": state.time,
+            "version": state.version,
+            "tick_ms": state.tick_ms,
+            "samples": state.samples,
+            "edits_since_load": state.snapshot.as_ref().map(|s| s.edits.len()),
+        });
+    }
+    report
+}
+
+/// Luminance of the first coefficient, cd/m²: 2√π ≈ 3.54 times the mean radiance at a probe.
+fn c0_statistics(volume: &ProbeVolume) -> Value {
+    let luminances: Vec<f64> = (0..volume.grid.probe_count())
+        .map(|probe| f64::from(volume.probe(probe)[0].dot(Vec3::new(0.2126, 0.7152, 0.0722))))
+        .collect();
+    let sum: f64 = luminances.iter().sum();
+    json!({
+        "min": luminances.iter().copied().fold(f64::INFINITY, f64::min),
+        "mean": sum / luminances.len() as f64,
+        "max": luminances.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+    })
+}
+
+fn scene_report(scene: &Scene) -> Value {
+    let nodes: Vec<Value> = scene
+        .nodes()
+        .map(|n| json!({ "node": n.id, "name": n.name, "parent": n.parent, "mesh": n.mesh }))
+        .collect();
+    let lights: Vec<Value> = scene
+        .nodes()
+        .filter_map(|node| {
+            let light = node.light?;
+            Some(json!({ "node": node.id, "name": node.name, "light": light }))
+        })
+        .collect();
+    let meshes: Vec<Value> = scene
+        .meshes()
+        .iter()
+        .map(|mesh| json!({ "name": mesh.name, "triangles": mesh.triangle_count() }))
+        .collect();
+    let cameras: Vec<Value> = scene
+        .cameras()
+        .iter()
+        .map(|camera| {
+            let position = camera.world_from_camera.transform_point3(Vec3::ZERO);
+            json!({
+                "node": camera.node, "name": camera.node_name, "position": position.to_array(),
+            })
+        })
+        .collect();
+    let animations: Vec<Value> = scene
+        .animations()
+        .map(|a| json!({ "animation": a.id, "name": a.name, "seconds": a.duration }))
+        .collect();
+    let triangles: usize = scene
+        .nodes()
+        .filter_map(|node| scene.meshes().get(node.mesh?.0 as usize))
+        .map(|mesh| mesh.triangle_count())
+        .sum();
+    let bounds = scene.bounds();
+    json!({
+        "scene": scene.name(),
+        "root": scene.root_file(),
+        "triangles": triangles,
+        "bounds": { "min": bounds.min, "max": bounds.max },
+        "nodes": nodes,
+        "meshes": meshes,
+        "materials": scene.materials().len(),
+        "lights": lights,
+        "cameras": cameras,
+        "animations": animations,
+        "environment": scene.environment(),
+        "volumes": scene.volumes(),
+        "files": scene.files().into_iter().map(|file| file.name).collect::<Vec<_>>(),
+        "warnings": scene.warnings(),
+    })
+}
+
+/// The report for people: a line for each plain value, a block for each list.
+fn print_report(report: &Value) {
+    for (key, value) in report.as_object().into_iter().flatten() {
+        match value {
+            Value::Array(entries) => {
+                println!("{key} ({})", entries.len());
+                const SHOWN: usize = 40;
+                for entry in entries.iter().take(SHOWN) {
+                    println!("  {}", in_words(entry));
+                }
+                if entries.len() > SHOWN {
+                    println!("  … and {} more (--json lists all)", entries.len() - SHOWN);
+                }
+            }
+            value => println!("{key}: {}", in_words(value)),
+        }
+    }
+}
+
+/// A value without the punctuation of JSON.
+fn in_words(value: &Value) -> String {
+    let pairs = |map: &Map<String, Value>| {
+        let known = map.iter().filter(|(_, value)| !value.is_null());
+        known.map(|(k, v)| format!("{k} {}", in_words(v))).collect::<Vec<_>>().join(", ")
+    };
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Object(map) => pairs(map),
+        Value::Array(list) => {
+            let words: Vec<_> = list.iter().map(in_words).collect();
+            format!("[{}]", words.join(" "))
+        }
+        other => other.to_string(),
+    }
+}

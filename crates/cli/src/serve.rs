@@ -1,0 +1,174 @@
+//! `lumencast serve`: the server.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use lumencast_server::{Server, ServerConfig};
+use lumencast_transport::{Access, Key, Tls};
+use serde_json::json;
+
+use crate::arguments::{DEFAULT_PORT, GatherArguments, SceneArguments, TickArguments};
+use crate::output;
+
+/// Loads a scene, computes its light continuously and casts it; serves the page that shows it.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  lumencast serve cornell
+  lumencast serve sponza.glb --volume 10x6x7 --samples 16..128
+  lumencast serve cornell --edits benches/minute.jsonl
+  lumencast serve sponza.glb --listen 0.0.0.0:4443 --token-key key.jwk \\
+      --tls-cert cert.pem --tls-key key.pem
+
+Ctrl-C stops it; a second Ctrl-C stops it at once.")]
+pub(crate) struct Serve {
+    #[command(flatten)]
+    scene: SceneArguments,
+    #[command(flatten)]
+    gather: GatherArguments,
+    /// Address for HTTP and WebSocket (TCP) and WebTransport (UDP). Other than on loopback, edits
+    /// need a token or --open.
+    #[arg(long, value_name = "ADDRESS:PORT", help_heading = "Network",
+          default_value_t = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), DEFAULT_PORT))]
+    listen: SocketAddr,
+    /// Lets everyone who reaches the server edit the scene.
+    #[arg(long, conflicts_with = "token_key", help_heading = "Network")]
+    open: bool,
+    /// Lets those edit who have a token signed with this key; see `lumencast token`.
+    #[arg(long, value_name = "FILE", help_heading = "Network")]
+    token_key: Option<PathBuf>,
+    /// Reading needs a token too.
+    #[arg(long, requires = "token_key", help_heading = "Network")]
+    token_to_read: bool,
+    /// Certificate chain (PEM); without it a development certificate is made.
+    #[arg(long, value_name = "FILE", requires = "tls_key", help_heading = "Network")]
+    tls_cert: Option<PathBuf>,
+    /// Key of the certificate (PEM).
+    #[arg(long, value_name = "FILE", requires = "tls_cert", help_heading = "Network")]
+    tls_key: Option<PathBuf>,
+    /// A name under which this server is reached, besides localhost and addresses; repeatable.
+    #[arg(long, value_name = "NAME", help_heading = "Network")]
+    allow_host: Vec<String>,
+    /// An origin (https://host[:port]) whose pages may connect, besides the server's own; repeatable.
+    #[arg(long, value_name = "ORIGIN", help_heading = "Network")]
+    allow_origin: Vec<String>,
+    #[command(flatten)]
+    tick: TickArguments,
+    /// The page's files, in place of those compiled in.
+    #[arg(long, value_name = "DIR", env = "LUMENCAST_PAGE")]
+    page: Option<PathBuf>,
+    /// Prints a line of JSON once it is ready, instead of words.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Serve {
+    pub(crate) fn run(self) -> Result<()> {
+        let network = self.network()?;
+        let spinner = output::spinner(format!("Loading {}", self.scene.source.scene));
+        let scene = self.scene.source.open()?;
+        let options = self.tick.options(&scene, &self.scene, &self.gather)?;
+        let mut config = ServerConfig::new(network);
+        config.tick = options;
+        config.page = self.page.clone();
+        let gatherer = self.gather.gatherer()?;
+        spinner.finish_and_clear();
+
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            // The network needs little; the processor is for the light.
+            .worker_threads(2)
+            .enable_all()
+            .build()
+            .context("cannot start the network threads")?;
+        runtime.block_on(async {
+            let server = Server::bind(scene, gatherer, config).await?;
+            self.announce(&server);
+            server.run(interrupted()).await?;
+            Ok(())
+        })
+    }
+
+    fn network(&self) -> Result<lumencast_transport::ServerConfig> {
+        let mut network = lumencast_transport::ServerConfig::new(self.listen);
+        network.access = match &self.token_key {
+            Some(path) => Access::Token { key: Key::read(path)?, to_read: self.token_to_read },
+            None if self.open => Access::Open,
+            None if self.listen.ip().is_loopback() => Access::Loopback,
+            None => bail!(
+                "{} is not a loopback address: say who may edit, with --token-key FILE \
+                 (see lumencast token) or with --open",
+                self.listen
+            ),
+        };
+        if let (Some(cert), Some(key)) = (&self.tls_cert, &self.tls_key) {
+            network.tls = Tls::Files { cert: cert.clone(), key: key.clone() };
+        }
+        network.allowed_hosts.clone_from(&self.allow_host);
+        network.allowed_origins.clone_from(&self.allow_origin);
+        Ok(network)
+    }
+
+    /// Says where the page is.
+    fn announce(&self, server: &Server) {
+        let scheme = if self.tls_cert.is_some() { "https" } else { "http" };
+        let address = server.local_addr();
+        let host = match address.ip() {
+            ip if ip.is_unspecified() => format!("THIS-MACHINE:{}", address.port()),
+            _ => address.to_string(),
+        };
+        let page = format!("{scheme}://{host}/");
+        let probes: usize = server.tick().volumes().map(|v| v.grid.probe_count()).sum();
+        if self.json {
+            let ready = json!({
+                "address": page, "scene": server.scene_name(), "port": address.port(),
+                "epoch": server.tick().catalog().epoch, "probes": probes,
+            });
+            println!("{ready}");
+            return;
+        }
+        let scene = server.tick().scene();
+        for warning in scene.warnings() {
+            eprintln!("warning: {warning}");
+        }
+        println!("{}: {probes} probes at {} Hz", server.scene_name(), self.tick.rate);
+        println!("{page}");
+        if !lumencast_server::page_is_embedded() && self.page.is_none() {
+            eprintln!(
+                "warning: compiled without its page; give --page DIR, or build web/viewer first"
+            );
+        }
+        println!("Ctrl-C stops the server.");
+    }
+}
+
+/// Ends at the first Ctrl-C (or SIGTERM); the second one ends the program.
+async fn interrupted() {
+    signal().await;
+    eprintln!("Stopping; Ctrl-C again stops at once.");
+    tokio::spawn(async {
+        signal().await;
+        std::process::exit(130);
+    });
+}
+
+#[cfg(unix)]
+async fn signal() {
+    use tokio::signal::unix::{SignalKind, signal};
+    let terminated = async {
+        match signal(SignalKind::terminate()) {
+            Ok(mut signal) => drop(signal.recv().await),
+            Err(_) => std::future::pending().await,
+        }
+    };
+    tokio::select! {
+        _ = tokio::signal::ctrl_c() => {}
+        () = terminated => {}
+    }
+}
+
+#[cfg(not(unix))]
+async fn signal() {
+    let _ = tokio::signal::ctrl_c().await;
+}

@@ -1,0 +1,223 @@
+//! The commands that run to their end: what they print, and how they fail.
+
+mod common;
+
+use common::{Folder, run};
+use serde_json::Value;
+
+#[test]
+fn help_shows_examples_and_the_version_is_told() {
+    for arguments in [
+        &["--help"][..],
+        &["serve", "--help"],
+        &["bake", "--help"],
+        &["inspect", "--help"],
+        &["probe", "--help"],
+        &["doctor", "--help"],
+        &["token", "--help"],
+        &["bench", "tick", "--help"],
+    ] {
+        let ran = run(arguments);
+        assert_eq!(ran.code, Some(0), "{arguments:?}: {ran:?}");
+        assert!(ran.stdout.contains("Example"), "{arguments:?}");
+    }
+    assert!(run(&["--version"]).stdout.contains(env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn wrong_usage_exits_with_2() {
+    for arguments in [
+        &["paint"][..],
+        &["serve"],
+        &["serve", "cornell", "--volume", "8x8"],
+        &["serve", "cornell", "--samples", "0"],
+        &["serve", "cornell", "--rate", "nan"],
+        &["serve", "cornell", "--ratio", "2"],
+        &["probe", "cornell"],
+        &["probe", "cornell", "--at", "0,0"],
+        &["probe", "cornell", "--at", "0,0,0", "--order", "5"],
+        &["serve", "cornell", "--tls-cert", "cert.pem"],
+    ] {
+        let ran = run(arguments);
+        assert_eq!(ran.code, Some(2), "{arguments:?}: {ran:?}");
+        assert!(ran.stdout.is_empty() && !ran.stderr.is_empty(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_missing_scene_is_named() {
+    for command in ["serve", "bake", "inspect", "probe"] {
+        let mut arguments = vec![command, "no/such/scene.glb"];
+        match command {
+            "bake" => arguments.extend(["-o", "never.light"]),
+            "probe" => arguments.extend(["--at", "0,0,0"]),
+            _ => {}
+        }
+        run(&arguments).failed_saying(&["no/such/scene.glb"]);
+    }
+}
+
+#[test]
+fn bad_scenes_are_refused_by_name() {
+    let folder = Folder::new("bad-scenes");
+    for (name, contents) in [
+        ("empty.glb", &b""[..]),
+        ("rubbish.glb", b"glTF\x02\x00\x00\x00\xff\xff\xff\xff rubbish"),
+        ("rubbish.gltf", b"{\"asset\": "),
+        ("nothing.gltf", br#"{"asset": {"version": "2.0"}}"#),
+        (
+            "unknown.gltf",
+            br#"{"asset": {"version": "2.0"}, "extensionsRequired": ["KHR_from_the_future"]}"#,
+        ),
+    ] {
+        let path = folder.file(name, contents);
+        run(&["inspect", &path]).failed_saying(&[name]);
+        run(&["probe", &path, "--at", "0,0,0"]).failed_saying(&[name]);
+    }
+    let path = folder.0.join("unknown.gltf");
+    run(&["inspect", path.to_str().expect("text")]).failed_saying(&["KHR_from_the_future"]);
+}
+
+#[test]
+fn an_address_for_all_needs_a_word_on_who_may_edit() {
+    run(&["serve", "cornell", "--listen", "0.0.0.0:0"]).failed_saying(&["--token-key", "--open"]);
+}
+
+#[test]
+fn a_script_that_is_none_is_named() {
+    let folder = Folder::new("bad-script");
+    let path = folder.file("edits.jsonl", b"{\"at\": 0, \"edit\": {\"edit\": \"explode\"}}\n");
+    run(&["serve", "cornell", "--listen", "127.0.0.1:0", "--edits", &path])
+        .failed_saying(&["edits.jsonl"]);
+    run(&["serve", "cornell", "--listen", "127.0.0.1:0", "--edits", "no/such.jsonl"])
+        .failed_saying(&["no/such.jsonl"]);
+}
+
+#[test]
+fn doctor_prints_json_only() {
+    let ran = run(&["doctor", "--json"]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let report = ran.json();
+    assert!(report["processor"]["cores"].as_u64().is_some_and(|n| n > 0));
+    assert!(report["programs"].as_array().is_some_and(|p| !p.is_empty()));
+    assert!(run(&["doctor"]).stdout.contains("processor"));
+}
+
+#[test]
+fn probe_prints_coefficients_with_their_errors() {
+    let ran = run(&[
+        "probe",
+        "cornell",
+        "--at",
+        "0,1,0",
+        "--at",
+        "-0.5,0.5,0.25",
+        "--order",
+        "3",
+        "--samples",
+        "1024",
+        "--bounces",
+        "2",
+        "--materials",
+        "lambert",
+        "--json",
+    ]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let report = ran.json();
+    let probes = report["probes"].as_array().expect("probes");
+    assert_eq!(probes.len(), 2);
+    for probe in probes {
+        for key in ["sh", "standard_error"] {
+            let values = probe[key].as_array().expect(key);
+            assert_eq!(values.len(), 16, "{key}");
+            assert!(values.iter().flat_map(|v| v.as_array().expect("rgb")).all(Value::is_number));
+        }
+        let c0 = probe["sh"][0][0].as_f64().expect("a number");
+        let error = probe["standard_error"][0][0].as_f64().expect("a number");
+        assert!(c0 > 0.0 && error > 0.0 && error < 0.2 * c0, "{c0} ± {error}");
+    }
+    assert!(report["probes"][1]["at"][0].as_f64().is_some_and(|x| (x + 0.5).abs() < 1e-6));
+}
+
+#[test]
+fn what_was_baked_can_be_inspected() {
+    let folder = Folder::new("bake");
+    let path = folder.0.join("cornell.light").to_str().expect("text").to_owned();
+    let baked = run(&[
+        "bake",
+        "cornell",
+        "-o",
+        &path,
+        "--volume",
+        "4x3x5",
+        "--order",
+        "1",
+        "--samples",
+        "128",
+        "--json",
+    ]);
+    assert_eq!(baked.code, Some(0), "{baked:?}");
+    let bytes = std::fs::read(&path).expect("the file");
+    assert_eq!(&bytes[..8], b"LUMENCST");
+    assert_eq!(baked.json()["bytes"], bytes.len());
+
+    let inspected = run(&["inspect", &path, "--json"]);
+    assert_eq!(inspected.code, Some(0), "{inspected:?}");
+    let report = inspected.json();
+    assert_eq!(report["scene"]["name"], "cornell");
+    let field = &report["fields"][0];
+    assert_eq!((&field["probes"], &field["order"]), (&60.into(), &1.into()));
+    let [min, mean, max] = ["min", "mean", "max"].map(|k| field["c0"][k].as_f64().expect(k));
+    assert!(0.0 <= min && min < mean && mean < max, "{min} {mean} {max}");
+
+    let cut = folder.file("cut.light", &bytes[..bytes.len() - 7]);
+    run(&["inspect", &cut]).failed_saying(&["cut.light"]);
+    let unwritable = "/no/such/folder/x.light";
+    run(&["bake", "cornell", "-o", unwritable, "--samples", "1", "--volume", "1x1x1"])
+        .failed_saying(&[unwritable]);
+}
+
+#[test]
+fn inspect_tells_what_is_in_a_scene() {
+    let ran = run(&["inspect", "cornell", "--json"]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let report = ran.json();
+    assert!(report["triangles"].as_u64().is_some_and(|n| (3_000..6_000).contains(&n)), "{report}");
+    for key in ["nodes", "meshes", "lights", "cameras", "volumes"] {
+        assert!(report[key].as_array().is_some_and(|a| !a.is_empty()), "{key}");
+    }
+}
+
+#[test]
+fn tokens_come_from_a_key() {
+    let folder = Folder::new("token");
+    let key = folder.0.join("key.jwk").to_str().expect("text").to_owned();
+    run(&["token", "cornell", "--token-key", &key]).failed_saying(&["key.jwk", "--generate"]);
+    let ran = run(&["token", "cornell", "--token-key", &key, "--generate"]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    assert_eq!(ran.stdout.trim().split('.').count(), 3, "a JWT");
+    run(&["token", "cornell", "--token-key", &key, "--generate"]).failed_saying(&["exists"]);
+}
+
+#[test]
+fn bench_prints_figures() {
+    let ran = run(&[
+        "bench",
+        "tick",
+        "cornell",
+        "--volume",
+        "2x2x2",
+        "--seconds",
+        "0.4",
+        "--samples",
+        "1..8",
+        "--json",
+    ]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let figures = ran.json();
+    assert_eq!(figures["ticks"], 10);
+    for pointer in ["/tick_ms/median", "/samples_a_second", "/fields/0/bytes_an_update"] {
+        let value = figures.pointer(pointer).and_then(Value::as_f64);
+        assert!(value.is_some_and(|v| v > 0.0), "{pointer}: {figures}");
+    }
+}

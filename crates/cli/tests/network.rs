@@ -1,0 +1,310 @@
+//! A running server as seen by its clients, over the real transport.
+
+mod common;
+
+use std::future::Future;
+use std::io::Write;
+use std::net::{TcpStream, UdpSocket};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use common::{PATIENCE, Serving, run};
+use glam::Vec3;
+use lumencast_codec::{Catalog, ClientEdit, ProbeDecoder, StateFrame};
+use lumencast_scene::{Edit, LightSpec, NodeId, Scene};
+use lumencast_transport::{
+    Broadcast, Client, ConnectOptions, ReadOptions, TrackReader, TrackWriter,
+};
+
+/// Small and quick: what matters here is the way.
+const SMALL: [&str; 4] = ["--volume", "3x3x3", "--samples", "8..64"];
+
+/// Runs a test on a runtime of its own, with a time limit.
+fn limited(test: impl Future<Output = ()>) {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .expect("a runtime");
+    runtime.block_on(async {
+        tokio::time::timeout(2 * PATIENCE, test).await.expect("the test takes too long");
+    });
+    runtime.shutdown_timeout(Duration::from_secs(1));
+}
+
+/// A client that follows the state and the light of the first region.
+struct Follower {
+    client: Client,
+    state: TrackReader,
+    light: TrackReader,
+    decoder: ProbeDecoder,
+    catalog: Catalog,
+}
+
+impl Follower {
+    async fn connect(server: &Serving) -> Self {
+        let client =
+            Client::connect(&server.url(), ConnectOptions::default()).await.expect("a connection");
+        let frame = client
+            .subscribe(client.scene(), "catalog", ReadOptions::default())
+            .next()
+            .await
+            .expect("a frame")
+            .expect("a catalog");
+        let catalog = Catalog::decode(&frame.bytes).expect("a catalog");
+        // Every frame of the state counts.
+        let options = ReadOptions::default().with_max_age(Duration::from_secs(5));
+        let state = client.subscribe(client.scene(), "state", options);
+        let light = client.subscribe(client.scene(), "f0/r0/l0", ReadOptions::default());
+        let field = &catalog.fields[0];
+        let decoder = ProbeDecoder::new(field.regions[0].size, field.order);
+        Self { client, state, light, decoder, catalog }
+    }
+
+    async fn next_state(&mut self) -> StateFrame {
+        let frame = self.state.next().await.expect("a frame").expect("the server goes on");
+        StateFrame::decode(&frame.bytes).expect("a state frame")
+    }
+
+    /// Follows the state until it says what is looked for.
+    async fn until<T>(&mut self, what: impl Fn(&StateFrame) -> Option<T>) -> T {
+        loop {
+            if let Some(found) = what(&self.next_state().await) {
+                return found;
+            }
+        }
+    }
+
+    /// Mean luminance of c0 over the probes of the next update of layer 0, and its scene version.
+    async fn next_light(&mut self) -> (f32, u64) {
+        loop {
+            let frame = self.light.next().await.expect("a frame").expect("the server goes on");
+            // A delta whose base came before this client is passed over.
+            let Ok(light) = self.decoder.decode(&frame.bytes) else { continue };
+            let n = self.catalog.fields[0].order.coefficients();
+            let sum: Vec3 = light.coefficients.iter().step_by(n).sum();
+            let probes = light.coefficients.len() / n;
+            let weights = Vec3::new(0.2126, 0.7152, 0.0722);
+            return (sum.dot(weights) / probes as f32, light.header.info.scene_version);
+        }
+    }
+
+    fn editor(&self, name: &str) -> Editor {
+        let path = format!("{}/edits/{name}", self.client.scene());
+        let broadcast = self.client.publish(&path).expect("a broadcast");
+        let track = broadcast.track("edits", 0).expect("a track");
+        broadcast.announce().expect("announced");
+        Editor { _broadcast: broadcast, track, seq: 0 }
+    }
+}
+
+/// A client's edits.
+struct Editor {
+    _broadcast: Broadcast,
+    track: TrackWriter,
+    seq: u64,
+}
+
+impl Editor {
+    fn send(&mut self, edit: Edit) -> u64 {
+        self.seq += 1;
+        let frame = ClientEdit { seq: self.seq, edit }.encode();
+        self.track.write(frame.into(), false).expect("written");
+        self.seq
+    }
+}
+
+fn lamp() -> NodeId {
+    let scene = Scene::builtin("cornell").expect("a built-in scene");
+    scene.nodes().find(|node| node.name == "lamp").expect("a lamp").id
+}
+
+fn dim(node: NodeId, intensity: f32) -> Edit {
+    Edit::SetLight { node, light: LightSpec { intensity: Some(intensity), ..LightSpec::default() } }
+}
+
+#[test]
+fn an_edit_of_one_client_changes_the_light_of_another() {
+    let server = Serving::start("cornell", &SMALL);
+    limited(async {
+        let mut watcher = Follower::connect(&server).await;
+        let author = Follower::connect(&server).await;
+        // The light of the first ticks is noisy.
+        let mut before = 0.0;
+        for _ in 0..5 {
+            before = watcher.next_light().await.0;
+        }
+        assert!(before > 0.0);
+        let mut editor = author.editor("author");
+        let seq = editor.send(dim(lamp(), 300.0));
+        let source = Some(("author".to_owned(), seq));
+        let version = watcher
+            .until(|state| {
+                let accepted = state.edits.iter().any(|edit| edit.source == source);
+                accepted.then_some(state.version)
+            })
+            .await;
+        let began = Instant::now();
+        loop {
+            let (light, from) = watcher.next_light().await;
+            if from >= version && light > 5.0 * before {
+                break;
+            }
+            assert!(began.elapsed() < Duration::from_secs(10), "{before}, still {light}");
+        }
+    });
+    assert_eq!(server.metric("lumencast_edits_accepted_total"), 1.0);
+}
+
+#[test]
+fn a_refused_edit_comes_back_with_its_reason() {
+    let server = Serving::start("cornell", &SMALL);
+    limited(async {
+        let mut follower = Follower::connect(&server).await;
+        let mut editor = follower.editor("a");
+        editor.send(Edit::RemoveNode { node: NodeId(99_999) });
+        editor.send(dim(lamp(), -1.0));
+        let mut reasons = Vec::new();
+        while reasons.len() < 2 {
+            let refused = follower.next_state().await.refused;
+            reasons.extend(refused.into_iter().map(|r| (r.client, r.seq, r.reason)));
+        }
+        for ((client, seq, reason), (number, word)) in
+            reasons.iter().zip([(1, "99999"), (2, "intensity")])
+        {
+            assert_eq!((client.as_str(), *seq), ("a", number));
+            assert!(reason.contains(word), "{reason}");
+        }
+    });
+    assert_eq!(server.metric("lumencast_edits_refused_total"), 2.0);
+}
+
+#[test]
+fn rubbish_of_one_client_disturbs_no_other() {
+    let server = Serving::start("cornell", &SMALL);
+    limited(async {
+        let mut good = Follower::connect(&server).await;
+        let bad = Follower::connect(&server).await;
+        let mut rubbish = bad.editor("rubbish");
+        for i in 0..100_u8 {
+            let frame = vec![i; 1 + usize::from(i) * 400];
+            rubbish.track.write(Bytes::from(frame), i % 7 == 0).expect("written");
+        }
+        throw_rubbish_at(&server);
+        // A client that is gone without a word.
+        drop(bad);
+        let mut editor = good.editor("good");
+        let seq = editor.send(dim(lamp(), 1.0));
+        let source = Some(("good".to_owned(), seq));
+        good.until(|state| state.edits.iter().any(|e| e.source == source).then_some(())).await;
+        let (light, _) = good.next_light().await;
+        assert!(light > 0.0);
+    });
+    assert_eq!(server.get("/healthz").status, 200);
+}
+
+/// Bytes that are no HTTP, no TLS and no QUIC.
+fn throw_rubbish_at(server: &Serving) {
+    let udp = UdpSocket::bind("127.0.0.1:0").expect("a socket");
+    for i in 0..200_u32 {
+        let bytes: Vec<u8> = (0..i * 6).map(|k| (k.wrapping_mul(i ^ 0x9e37) >> 3) as u8).collect();
+        udp.send_to(&bytes, server.address).expect("sent");
+        if i % 10 == 0 {
+            let mut tcp = TcpStream::connect(server.address).expect("the server listens");
+            // It may hang up in the middle.
+            let _ = tcp.write_all(&bytes);
+        }
+    }
+}
+
+#[test]
+fn a_killed_client_is_not_missed() {
+    let server = Serving::start("cornell", &SMALL);
+    limited(async {
+        let mut follower = Follower::connect(&server).await;
+        let mut other = common::Program::start(&["inspect", &server.url(), "--json"]);
+        let first = follower.next_state().await.tick;
+        other.kill();
+        follower.until(|state| (state.tick > first + 25).then_some(())).await;
+    });
+}
+
+#[test]
+fn a_restarted_server_is_found_again() {
+    let mut server = Serving::start("cornell", &SMALL);
+    let port = server.address.port();
+    let old = server.ready["epoch"].clone();
+    limited(async {
+        let mut follower = Follower::connect(&server).await;
+        follower.next_light().await;
+        server.program.kill();
+        let restarted = Serving::on("cornell", port, &SMALL);
+        assert_ne!(restarted.ready["epoch"], old, "an epoch of its own");
+        let began = Instant::now();
+        let mut catalogs =
+            follower.client.subscribe(follower.client.scene(), "catalog", ReadOptions::default());
+        let epoch = loop {
+            let frame = catalogs.next().await.expect("a frame").expect("the client goes on");
+            let catalog = Catalog::decode(&frame.bytes).expect("a catalog");
+            if serde_json::json!(catalog.epoch) != old {
+                break catalog.epoch;
+            }
+        };
+        assert_eq!(serde_json::json!(epoch), restarted.ready["epoch"]);
+        let field = &follower.catalog.fields[0];
+        follower.decoder = ProbeDecoder::new(field.regions[0].size, field.order);
+        follower.next_light().await;
+        assert!(began.elapsed() < Duration::from_secs(5), "{:?}", began.elapsed());
+    });
+}
+
+#[test]
+fn inspect_shows_a_running_server() {
+    let server = Serving::start("cornell", &SMALL);
+    let ran = run(&["inspect", &server.url(), "--json"]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let report = ran.json();
+    assert_eq!(report["epoch"], server.ready["epoch"]);
+    assert_eq!(report["fields"][0]["probes"], 27);
+    assert!(report["fields"][0]["c0"]["mean"].as_f64().is_some_and(|c0| c0 > 0.0), "{report}");
+    assert!(report["state"]["tick"].is_u64());
+
+    let nobody = format!("http://{}/cornell", free_address());
+    run(&["inspect", &nobody]).failed_saying(&[&nobody]);
+}
+
+/// An address at which nobody listens.
+fn free_address() -> std::net::SocketAddr {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+    listener.local_addr().expect("an address")
+}
+
+#[test]
+fn a_token_is_needed_where_one_is_asked_for() {
+    let folder = common::Folder::new("access");
+    let key = folder.0.join("key.jwk").to_str().expect("text").to_owned();
+    let token = run(&["token", "cornell", "--token-key", &key, "--generate"]).stdout;
+    let mut arguments = SMALL.to_vec();
+    arguments.extend(["--token-key", &key]);
+    let server = Serving::start("cornell", &arguments);
+    limited(async {
+        let mut stranger = Follower::connect(&server).await;
+        let mut strange = stranger.editor("stranger");
+        strange.send(dim(lamp(), 1.0));
+
+        let mut options = ConnectOptions::default();
+        options.token = Some(token.trim().to_owned());
+        let client = Client::connect(&server.url(), options).await.expect("a connection");
+        let broadcast = client.publish("cornell/edits/bearer").expect("a broadcast");
+        let mut track = broadcast.track("edits", 0).expect("a track");
+        broadcast.announce().expect("announced");
+        let frame = ClientEdit { seq: 1, edit: dim(lamp(), 2.0) }.encode();
+        track.write(frame.into(), true).expect("written");
+        let first = stranger
+            .until(|state| Some(state.edits.first()?.source.clone()))
+            .await
+            .expect("a client's edit");
+        assert_eq!(first.0, "bearer");
+    });
+    assert_eq!(server.metric("lumencast_edits_accepted_total"), 1.0);
+}
