@@ -219,20 +219,18 @@ impl Quantiser {
 impl Choices for Quantiser {
     fn skip(&mut self, probe: usize, base: &[[f32; 3]], base_step: i32) -> bool {
         let brightness = self.brightness[probe];
-        let mean_square =
-            squared_distance(self.target(probe), base) / (3 * self.coefficients) as f64;
+        let target = self.target(probe);
         let tolerated = SKIP_BELOW * brightness;
-        mean_square < tolerated * tolerated && step(base_step) < 2.0 * STEP_OF_C0 * brightness
+        let mean_square = squared_distance(target, base) / (3 * self.coefficients) as f64;
+        mean_square < tolerated * tolerated
+            && largest_distance(target, base.iter().map(|v| v.map(f64::from)))
+                <= STEP_OF_C0 * brightness
+            && step(base_step) < 2.0 * STEP_OF_C0 * brightness
     }
 
     fn step(&mut self, probe: usize, predicted: &[[f64; 3]], predicted_step: i32) -> i32 {
         let coarsest = step_index(STEP_OF_C0 * self.brightness[probe]);
-        let farthest = self
-            .target(probe)
-            .iter()
-            .zip(predicted)
-            .flat_map(|(t, p)| (0..3).map(move |k| (t[k] - p[k]).abs()))
-            .fold(0.0, f64::max);
+        let farthest = largest_distance(self.target(probe), predicted.iter().copied());
         let finest = step_index(farthest / MAX_MAGNITUDE as f64) + 2;
         let wanted = if (coarsest - FINER..=coarsest).contains(&predicted_step) {
             predicted_step
@@ -270,4 +268,13 @@ fn squared_distance(target: &[[f64; 3]], values: &[[f32; 3]]) -> f64 {
         (0..3).map(|k| (t[k] - f64::from(v[k])).powi(2)).sum()
     };
     target.iter().zip(values).map(square).sum()
+}
+
+/// The largest difference of two values.
+fn largest_distance(target: &[[f64; 3]], values: impl Iterator<Item = [f64; 3]>) -> f64 {
+    target
+        .iter()
+        .zip(values)
+        .flat_map(|(t, v)| (0..3).map(move |k| (t[k] - v[k]).abs()))
+        .fold(0.0, f64::max)
 }
