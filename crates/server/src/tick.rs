@@ -67,6 +67,9 @@ impl Default for GatherOptions {
 
 /// A snapshot of the scene goes out at least every so many ticks, for those who join.
 const SNAPSHOT_EVERY: u64 = 64;
+/// Bytes of a snapshot from which on nothing can be added: those who join have to get it in one
+/// frame, and moves need room too.
+const SNAPSHOT_ROOM: usize = limits::FRAME_BYTES / 2;
 /// Scene time moves at most this much in a tick, seconds, however long the machine slept.
 const LONGEST_STEP: f64 = 0.5;
 
@@ -79,6 +82,8 @@ pub struct Tick {
     budget: Budget,
     epoch: Epoch,
     number: u64,
+    /// Of the last snapshot, and of what was added since.
+    snapshot_bytes: usize,
     last_now: Option<f64>,
     last: Report,
 }
@@ -111,6 +116,7 @@ impl Tick {
             budget,
             epoch,
             number: 0,
+            snapshot_bytes: 0,
             last_now: None,
             last,
         })
@@ -197,24 +203,34 @@ impl Tick {
             None => Vec::new(),
         };
         for edit in scripted {
-            match self.scene.apply(&edit) {
+            match self.apply(&edit) {
                 Ok(edit) => outcome.accepted.push(AcceptedEdit { source: None, edit }),
-                Err(error) => tracing::warn!(%error, "an edit of the script is refused"),
+                Err(reason) => tracing::warn!(%reason, "an edit of the script is refused"),
             }
         }
         for received in edits {
             let Received { client, seq, edit } = received;
-            match self.scene.apply(&edit) {
+            match self.apply(&edit) {
                 Ok(edit) => {
                     outcome.accepted.push(AcceptedEdit { source: Some((client, seq)), edit });
                 }
-                Err(error) => {
-                    let reason = error.to_string();
-                    outcome.refused.push(RefusedEdit { client, seq, reason });
-                }
+                Err(reason) => outcome.refused.push(RefusedEdit { client, seq, reason }),
             }
         }
         outcome
+    }
+
+    /// Applies one edit; the reason when it is refused.
+    fn apply(&mut self, edit: &Edit) -> Result<Edit, String> {
+        let adds = matches!(edit, Edit::AddInstance { .. } | Edit::AddLight { .. });
+        if adds && self.snapshot_bytes > SNAPSHOT_ROOM {
+            return Err("edits have added as much as a scene can hold: remove some first".into());
+        }
+        let edit = self.scene.apply(edit).map_err(|error| error.to_string())?;
+        if adds {
+            self.snapshot_bytes += serde_json::to_vec(&edit).map_or(0, |json| json.len());
+        }
+        Ok(edit)
     }
 
     /// Light for every field, all fields' jobs under way at once.
@@ -244,7 +260,7 @@ impl Tick {
     }
 
     /// The state frame: a snapshot of the scene now and then, what changed otherwise.
-    fn state_frame(&self, scene: &Snapshot, edits: &Edits, clock: f64) -> (Vec<u8>, bool) {
+    fn state_frame(&mut self, scene: &Snapshot, edits: &Edits, clock: f64) -> (Vec<u8>, bool) {
         let is_snapshot = self.number.is_multiple_of(SNAPSHOT_EVERY);
         let snapshot = is_snapshot
             .then(|| SceneState { edits: self.scene.edits_since_load(), acks: edits.acks.clone() });
@@ -259,7 +275,11 @@ impl Tick {
             edits: edits.accepted.clone(),
             refused: edits.refused.clone(),
         };
-        (frame.encode(), is_snapshot)
+        let frame = frame.encode();
+        if is_snapshot {
+            self.snapshot_bytes = frame.len();
+        }
+        (frame, is_snapshot)
     }
 
     /// Counts the tick and sets the samples of the next.

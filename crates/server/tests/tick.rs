@@ -9,7 +9,9 @@ use lumencast_codec::{EncodedRegion, Epoch, ProbeDecoder, StateFrame};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Gathered, Job, Progress, Ticket};
 use lumencast_light::ProbeVolume;
-use lumencast_scene::{Edit, LightSpec, NodeId, Scene, Script, Transform, VolumeSpec};
+use lumencast_scene::{
+    Edit, InstanceSource, LightSpec, NodeId, Scene, Script, Transform, VolumeSpec,
+};
 use lumencast_server::{
     Inbox, Limits, Mail, Outlet, Received, Report, SampleRange, Tick, TickOptions,
 };
@@ -308,6 +310,40 @@ fn edits_of_an_inbox_reach_the_scene_in_order() {
     assert_eq!((report.accepted, report.refused), (2, 1));
     let light = stepped.tick.scene().nodes().find(|n| n.id == lamp).and_then(|n| n.light);
     assert_eq!(light.map(|l| l.intensity), Some(7.0));
+}
+
+#[test]
+fn additions_end_before_a_snapshot_grows_too_long() {
+    let mut quick = options();
+    quick.volumes[0].grid.resolution = glam::UVec3::ONE;
+    quick.samples = SampleRange::fixed(1);
+    let mut stepped = Stepped::new(quick);
+    let source =
+        InstanceSource::Mesh(stepped.tick.scene().nodes().find_map(|n| n.mesh).expect("one"));
+    let add = Edit::AddInstance {
+        node: None,
+        source,
+        parent: None,
+        transform: Transform {
+            translation: Some(Vec3::new(0.1, 0.2, 0.3)),
+            ..Transform::default()
+        },
+    };
+    let many = |first: u64| Mail {
+        edits: (first..first + 2000)
+            .map(|seq| Received { client: "a".into(), seq, edit: add.clone() })
+            .collect(),
+        ..Mail::default()
+    };
+    let reports: Vec<Report> = (0..5).map(|i| stepped.step(many(1 + 2000 * i))).collect();
+    assert_eq!(reports[0].refused, 0, "thousands are fine");
+    assert_eq!(reports[4].accepted, 0, "but not any number");
+    let reason = &stepped.kept.states[4].refused[0].reason;
+    assert!(reason.contains("remove some"), "{reason}");
+    stepped.steps(60);
+    let frames = stepped.kept.states.iter().filter(|state| state.snapshot.is_some());
+    let longest = frames.map(|state| state.encode().len()).max().expect("a snapshot");
+    assert!(longest < lumencast_codec::limits::FRAME_BYTES, "{longest}");
 }
 
 #[test]
