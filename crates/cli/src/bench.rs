@@ -207,7 +207,7 @@ fn print_figures(figures: &Value) {
             number(&format!("/stages_ms/{stage}/median")),
             number(&format!("/stages_ms/{stage}/p99")),
         );
-        println!("  {:<10}median {median:.3} ms, p99 {p99:.3} ms", stage.to_string());
+        println!("  {:<11} median {median:.3} ms, p99 {p99:.3} ms", stage.to_string());
     }
     println!(
         "samples     {} to {} a probe, median {}; {:.2} M a second, {:.2} M rays a second",

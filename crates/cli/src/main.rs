@@ -36,6 +36,10 @@ Examples:
 Log messages go to standard error; RUST_LOG=debug shows more of them.
 Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.";
 
+/// What is logged unless RUST_LOG says otherwise. The transport's libraries warn of much that is no
+/// fault here: a client that leaves, small socket buffers, addresses without a name.
+const LOGGED: &str = "warn,moq_sock=error,moq_tokio=error,moq_net=error,moq_relay=off";
+
 #[derive(Debug, Subcommand)]
 enum Command {
     Serve(serve::Serve),
@@ -50,7 +54,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(LOGGED));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
 
     let result = match cli.command {

@@ -11,6 +11,9 @@ use lumencast_transport::{Client, ConnectOptions, ReadOptions};
 /// How long a server may take to show its light.
 const PATIENCE: Duration = Duration::from_secs(15);
 
+/// How long the connection may take.
+const CONNECTION: Duration = Duration::from_secs(5);
+
 /// What there was to see.
 pub(crate) struct Seen {
     pub(crate) catalog: Catalog,
@@ -28,7 +31,9 @@ pub(crate) fn look(url: &str) -> Result<Seen> {
         .build()
         .context("cannot start the network threads")?;
     let seen = runtime.block_on(async {
-        let client = Client::connect(url, ConnectOptions::default()).await?;
+        let mut options = ConnectOptions::default();
+        options.timeout = CONNECTION;
+        let client = Client::connect(url, options).await?;
         match tokio::time::timeout(PATIENCE, read(&client)).await {
             Ok(seen) => seen,
             Err(_) => bail!("{url}: connected, but no light came within {PATIENCE:?}"),
