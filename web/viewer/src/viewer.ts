@@ -106,6 +106,11 @@ export class Viewer {
     void this.renderer.setAnimationLoop((now: number) => this.#frame(now));
   }
 
+  /** Draws no more by itself; light and edits go on to come in. */
+  stop(): void {
+    void this.renderer.setAnimationLoop(null);
+  }
+
   #frame(now: number): void {
     this.#timer.update(now);
     const seconds = this.#timer.getDelta();

@@ -21,6 +21,8 @@ const FLAGS = [
   '--use-vulkan=swiftshader',
   '--use-angle=swiftshader',
   '--enable-unsafe-swiftshader',
+  // Containers have little of it.
+  '--disable-dev-shm-usage',
 ];
 /** Small: every pixel is drawn by the processor. */
 const VIEWPORT = { width: 400, height: 300 };
@@ -41,7 +43,9 @@ describe.skipIf(missing !== undefined)('the page', () => {
   let server: Server;
   let page: Page;
 
-  const start = (scene: string, port: number) => Server.start(program!, scene, port, ['--page', folder]);
+  // The processor draws the picture as well: the server must leave some of it.
+  const start = (scene: string, port: number) =>
+    Server.start(program!, scene, port, ['--page', folder, '--samples', '4..16']);
 
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), 'lumencast-page-'));
@@ -54,6 +58,10 @@ describe.skipIf(missing !== undefined)('the page', () => {
     browser = await chromium.launch({ executablePath: browserProgram!, headless: true, args: FLAGS });
     server = await start('cornell', await freePort());
     page = await open(browser, server.address);
+    // Pictures are compared with each other: nothing is to move by itself.
+    await page.evaluate(() =>
+      window.lumencast!.light.edit({ edit: 'set_animation', animation: 0, playing: false }),
+    );
   }, 180_000);
 
   afterAll(async () => {
@@ -70,7 +78,7 @@ describe.skipIf(missing !== undefined)('the page', () => {
     expect(picture.some(([r, g]) => r > 1.5 * g && r > 40)).toBe(true);
     expect(picture.some(([r, g]) => g > 1.2 * r && g > 40)).toBe(true);
     await shoot(page, 'cornell');
-  });
+  }, 60_000);
 
   it('brightens what direct light does not reach', async () => {
     const direct = await look(page, 'direct');
@@ -80,39 +88,48 @@ describe.skipIf(missing !== undefined)('the page', () => {
     const shadowed = [...direct.keys()].filter((i) => sum(direct[i]) < 20 && sum(indirect[i]) > 20);
     expect(shadowed.length).toBeGreaterThan(5);
     for (const i of shadowed) expect(sum(both[i])).toBeGreaterThan(sum(direct[i]) + 10);
-  });
+  }, 60_000);
 
   it('follows a moved light within a second', async () => {
-    const elapsed = await page.evaluate(async () => {
+    const moves = await page.evaluate(async () => {
       const { light, viewer, setMode } = window.lumencast!;
-      setMode('indirect');
-      const lamp = viewer.lights[0];
-      const node = light.content.nodeOf(lamp)!;
+      const wait = (ms: number) => new Promise((resolve) => setTimeout(resolve, ms));
       const points = Array.from(
         { length: 60 },
         (_, i) => [60 + (i % 10) * 30, 40 + Math.floor(i / 10) * 30] as const,
       );
-      const brightness = () =>
-        viewer
-          .pixels(points)
-          .flat()
-          .reduce((a, b) => a + b);
-      const before = brightness();
-      const began = performance.now();
-      await light.edit({ edit: 'set_light', node, intensity: lamp.intensity * 4 });
-      while (brightness() < before * 1.1) {
-        if (performance.now() - began > 10_000) return Infinity;
-        await new Promise((resolve) => requestAnimationFrame(resolve));
+      const look = () => viewer.pixels(points).flat();
+      const change = (a: number[], b: number[]) =>
+        a.reduce((sum, value, i) => sum + Math.abs(value - b[i]), 0) /
+        a.reduce((sum, value) => sum + value, 1);
+      setMode('indirect');
+      const node = light.content.nodeOf(viewer.lights[0])!;
+      const home = light.content.object(node)!.position.toArray();
+      const { intensity } = viewer.lights[0];
+      await light.edit({ edit: 'set_light', node, intensity: intensity * 4 });
+      await wait(3000);
+      const [first, second] = [look(), (await wait(500), look())];
+      const noise = change(first, second);
+      const moves: number[] = [];
+      for (const translation of [[0.7, 0.5, 0.6], home, [-0.7, 0.5, 0.6]] as [number, number, number][]) {
+        const before = look();
+        const began = performance.now();
+        await light.edit({ edit: 'move_node', node, translation });
+        while (change(before, look()) < 2 * noise + 0.01 && performance.now() - began < 10_000) await wait(0);
+        moves.push(performance.now() - began);
+        await wait(3000);
       }
-      const after = performance.now() - began;
-      await light.edit({ edit: 'set_light', node, intensity: lamp.intensity / 4 });
-      return after;
+      await light.edit({ edit: 'move_node', node, translation: home });
+      await light.edit({ edit: 'set_light', node, intensity });
+      return moves.sort((a, b) => a - b);
     });
-    console.log(`light changed on the page ${elapsed.toFixed(0)} ms after the edit was sent`);
-    expect(elapsed).toBeLessThan(1000);
-  }, 30_000);
+    console.log(`the light changed ${moves.map((ms) => ms.toFixed(0)).join(', ')} ms after a lamp was moved`);
+    // The middle one: on a busy machine a single picture can take half a second.
+    expect(moves[1]).toBeLessThan(1000);
+  }, 90_000);
 
   it('keeps the picture when the server dies, and goes on when it is back', async () => {
+    await page.waitForTimeout(3000);
     const before = await look(page, 'both');
     const { port } = server;
     await server.kill();
@@ -124,10 +141,17 @@ describe.skipIf(missing !== undefined)('the page', () => {
 
     const revision = await page.evaluate(() => window.lumencast!.light.lightRevision);
     server = await start('cornell', port);
-    await page.waitForFunction((before) => window.lumencast!.light.lightRevision > before + 3, revision, {
-      timeout: 20_000,
-    });
+    await page.waitForFunction(
+      (before) => {
+        const { light, viewer } = window.lumencast!;
+        viewer.draw();
+        return light.lightRevision > before + 3;
+      },
+      revision,
+      { timeout: 20_000, polling: 200 },
+    );
     expect(await page.isVisible('.notice.standing')).toBe(false);
+    await page.waitForTimeout(3000);
     expect(difference(before, await look(page, 'both'))).toBeLessThan(0.25);
   }, 90_000);
 
@@ -165,7 +189,7 @@ describe.skipIf(missing !== undefined)('the page', () => {
     await lonely.goto(server.address);
     expect(await lonely.textContent('.curtain.failed')).toMatch(/does not answer/);
     await lonely.close();
-  });
+  }, 30_000);
 
   const sponza = sharedScene('sponza/Sponza.glb');
   it.skipIf(!SHOTS || !sponza)(
@@ -174,7 +198,8 @@ describe.skipIf(missing !== undefined)('the page', () => {
       const other = await start(sponza!, await freePort());
       try {
         const view = await open(browser, other.address, { width: 1280, height: 720 });
-        await view.waitForTimeout(15_000);
+        await view.waitForTimeout(10_000);
+        await view.evaluate(() => window.lumencast!.viewer.meter());
         await shoot(view, 'sponza');
         await view.close();
       } finally {
@@ -197,13 +222,21 @@ async function open(browser: Browser, address: string, viewport = VIEWPORT): Pro
     await page.goto(`${address}/?scale=1`);
     await page.waitForFunction(() => window.lumencast, undefined, { timeout: 60_000 });
     await page.evaluate(() => window.lumencast!.ready);
-    await page.evaluate(() => window.lumencast!.viewer.meter());
-    await page.evaluate(() => (window.lumencast!.viewer.autoExposure = false));
     await page.waitForSelector('.curtain', { state: 'detached', timeout: 20_000 });
+    // From here on it draws when asked to: a page that draws without pause in software leaves the
+    // server no processor, and never comes to rest for a screenshot.
+    await page.evaluate(() => {
+      const { viewer } = window.lumencast!;
+      viewer.autoExposure = false;
+      viewer.stop();
+      return viewer.meter();
+    });
     return page;
   } catch (error) {
-    const shown = await page.textContent('body').catch(() => '');
-    throw new Error(`the page did not come up; it says: ${shown}\n${errors.join('\n')}`, { cause: error });
+    const shown = await page.innerText('body').catch(() => '');
+    throw new Error(`the page did not come up; it says: ${shown.slice(0, 300)}\n${errors.join('\n')}`, {
+      cause: error,
+    });
   }
 }
 
@@ -235,12 +268,10 @@ function difference(a: readonly Pixel[], b: readonly Pixel[]): number {
 
 async function shoot(page: Page, name: string): Promise<void> {
   if (!SHOTS) return;
-  // A page that draws without pause in software never comes to rest for a screenshot.
-  await page.evaluate(async () => {
+  await page.evaluate(() => {
     const { viewer } = window.lumencast!;
-    await viewer.renderer.setAnimationLoop(null);
     viewer.draw();
+    viewer.controls.update();
   });
-  await page.screenshot({ path: join(SHOTS, `${name}.png`), timeout: 60_000 });
-  await page.evaluate(() => window.lumencast!.viewer.start());
+  await page.screenshot({ path: join(SHOTS, `${name}.png`), timeout: 60_000, animations: 'disabled' });
 }
