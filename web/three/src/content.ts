@@ -36,7 +36,8 @@ export class Content {
   /** Forgets materials and animations from these numbers on. */
   forgetFrom(first: { material: number; animation: number }): void {
     for (const number of this.#materials.keys()) if (number >= first.material) this.#materials.delete(number);
-    for (const number of this.#animations.keys()) if (number >= first.animation) this.#animations.delete(number);
+    for (const number of this.#animations.keys())
+      if (number >= first.animation) this.#animations.delete(number);
   }
 
   /** GLTFLoader makes variants of a material, say for meshes with vertex colours. */
