@@ -97,7 +97,7 @@ impl World {
         self.lights.emitters = emitters;
     }
 
-    /// World bounds of the geometry.
+    /// Version of the snapshot.
     pub(crate) fn version(&self) -> u64 {
         self.snapshot.version
     }
