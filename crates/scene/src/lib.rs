@@ -4,7 +4,25 @@
 //! moment of it, flattened to placed instances and lights, which is all that a gatherer sees.
 //!
 //! Space is glTF's: right-handed, +Y up, metres. Colours are linear Rec. 709. Lights have the units
-//! of KHR_lights_punctual (candela, lux); emission is a radiance in cd/m².
+//! of KHR_lights_punctual (candela, lux); emission is a radiance in cd/m². The back face of a
+//! single-sided material blocks light, reflects none and emits none, wherever light is computed; which
+//! side is the front follows the winding after all transforms, mirroring ones too.
+//!
+//! ```
+//! use lumencast_scene::{Edit, NodeId, Scene, Transform};
+//!
+//! let mut scene = Scene::open("cornell")?;
+//! let box_node = scene.nodes().find(|n| n.name == "tall box").map_or(NodeId(0), |n| n.id);
+//! let transform = Transform { translation: Some([0.3, 0.0, -0.4].into()), ..Transform::default() };
+//! scene.apply(&Edit::MoveNode { node: box_node, transform })?;
+//! scene.advance(0.04);
+//! let snapshot = scene.snapshot();
+//! assert_eq!(snapshot.version, 2); // one edit, one step of the animation
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Loading is total: any bytes give a scene or an error that says where the fault lies, and memory is
+//! asked for only after it has been counted against limits.
 
 mod aabb;
 mod animation;
@@ -24,6 +42,8 @@ mod scene;
 mod script;
 mod settings;
 mod snapshot;
+#[cfg(test)]
+mod tests;
 mod trs;
 mod volume;
 

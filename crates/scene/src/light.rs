@@ -29,7 +29,7 @@ impl Light {
     /// Whether it makes sense; the reason when it does not.
     pub fn check(&self) -> Result<(), String> {
         let Self { kind, color, intensity, range } = *self;
-        if !(intensity >= 0.0 && intensity <= limits::LIGHT) {
+        if !(0.0..=limits::LIGHT).contains(&intensity) {
             return Err(format!(
                 "its intensity is {intensity}; 0 to {:e} is possible",
                 limits::LIGHT

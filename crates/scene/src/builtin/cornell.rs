@@ -49,9 +49,14 @@ pub(super) fn glb() -> Vec<u8> {
     let moved = (sphere, "translation");
     w.animation("sphere goes round", moved, "LINEAR", &times, ("VEC3", &places));
 
+    // A spot light, so that it does not scorch the ceiling that it hangs from.
+    let down = Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2).to_array();
     w.light(
-        json!({ "name": "lamp", "type": "point", "color": [1.0, 0.85, 0.65], "intensity": 3.0 }),
-        json!({ "name": "lamp", "translation": [0.0, 1.8, 0.0] }),
+        json!({
+            "name": "lamp", "type": "spot", "color": [1.0, 0.85, 0.65], "intensity": 4.0,
+            "spot": { "innerConeAngle": 0.6, "outerConeAngle": 1.2 },
+        }),
+        json!({ "name": "lamp", "translation": [0.0, 1.95, 0.0], "rotation": down }),
     );
     w.camera("camera", 0.66, json!({ "name": "camera", "translation": [0.0, 1.0, 4.0] }));
     let volume = json!({

@@ -1,7 +1,7 @@
 //! Light through a narrow doorway: a lit front room, and a dark one behind with a green sphere in
 //! it, from which the camera looks to the door. About 11,000 triangles.
 
-use glam::{Affine3A, Quat, Vec3};
+use glam::{Quat, Vec3};
 use serde_json::{Value, json};
 
 use super::shapes::Shape;
@@ -21,11 +21,11 @@ pub(super) fn glb() -> Vec<u8> {
     let floor = w.surface("floor", [0.45, 0.32, 0.22], 0.6);
     let wood = w.surface("wood", [0.5, 0.3, 0.15], 0.7);
     let green = w.diffuse("green", [0.12, 0.55, 0.15]);
-    let glaze = w.surface("glaze", [0.2, 0.35, 0.65], 0.3);
+    let glaze = w.two_sided("glaze", [0.2, 0.35, 0.65], 0.3);
 
     let rooms = w.mesh("rooms", &[(&walls(), plaster), (&floors(), floor)]);
     w.node(json!({ "name": "rooms", "mesh": rooms }));
-    let leaf = Shape::cuboid(Vec3::ZERO, Vec3::new(DOOR.1 - DOOR.0, DOOR.2 - 0.02, 0.04), 6);
+    let leaf = Shape::cuboid(Vec3::ZERO, Vec3::new(DOOR.1 - DOOR.0, DOOR.2 - 0.02, 0.04), 4);
     let leaf = w.mesh("door", &[(&leaf, wood)]);
     let turned = Quat::from_rotation_y(-1.9);
     w.node(placed("door", leaf, Vec3::new(DOOR.0, 0.0, WALL), turned));
@@ -100,7 +100,7 @@ fn furnish(w: &mut Writer, wood: usize, glaze: usize) {
     w.node(placed("table", table, table_at, Quat::from_rotation_y(0.25)));
 
     let seat = Shape::cuboid(Vec3::new(-0.22, 0.43, -0.22), Vec3::new(0.22, 0.46, 0.22), 2);
-    let back = Shape::cuboid(Vec3::new(-0.22, 0.46, -0.22), Vec3::new(0.22, 0.95, -0.19), 4);
+    let back = Shape::cuboid(Vec3::new(-0.22, 0.46, -0.22), Vec3::new(0.22, 0.95, -0.19), 2);
     let chair = w.mesh("chair", &[(&Shape::joined([seat, back, legs(0.19, 0.19, 0.43)]), wood)]);
     for (index, (x, z, turn)) in [(-1.6, -2.4, 0.1), (-0.7, -2.5, -0.3)].into_iter().enumerate() {
         let name = format!("chair {}", index + 1);
@@ -121,18 +121,10 @@ fn furnish(w: &mut Writer, wood: usize, glaze: usize) {
         let belly = 0.05 + 0.06 * (std::f32::consts::PI * t).sin() + 0.02 * t * t;
         (if t == 0.0 { 0.0 } else { belly }, 0.35 * t)
     });
-    let inner = Affine3A::from_scale(Vec3::new(0.7, 1.0, 0.7));
-    let vase = w.mesh("vase", &[(&vase, glaze), (&flipped(vase.clone().placed(inner)), glaze)]);
+    let vase = w.mesh("vase", &[(&vase, glaze)]);
     for (index, at) in
         [Vec3::new(-1.45, 0.76, -1.55), Vec3::new(1.75, 1.33, -4.8)].into_iter().enumerate()
     {
         w.node(placed(&format!("vase {}", index + 1), vase, at, Quat::IDENTITY));
     }
-}
-
-/// The same surface, seen from its other side.
-fn flipped(mut shape: Shape) -> Shape {
-    shape.triangles.iter_mut().for_each(|t| t.swap(1, 2));
-    shape.normals.iter_mut().for_each(|n| *n = -*n);
-    shape
 }

@@ -5,9 +5,9 @@
 
 mod cornell;
 mod door;
-mod shapes;
+pub(crate) mod shapes;
 mod tomb;
-mod writer;
+pub(crate) mod writer;
 
 /// Names of the built-in scenes.
 pub const NAMES: &[&str] = &["cornell", "door", "tomb"];

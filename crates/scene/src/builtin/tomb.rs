@@ -33,9 +33,9 @@ pub(super) fn glb() -> Vec<u8> {
 
     let sculptures: [(&str, Shape, usize, [f32; 3], f32); 4] = [
         ("knot", knot(2.0, 3.0), bronze, [-1.5, 1.5, -2.2], 14.0),
-        ("star", knot(3.0, 5.0), gold, [1.6, 1.5, -2.6], -18.0),
+        ("star", knot(3.0, 5.0), gold, [1.5, 1.5, -3.2], -18.0),
         ("idol", idol(), jade, [0.1, 0.9, -4.6], 22.0),
-        ("shell", shell(), marble, [0.0, 1.3, 0.6], 12.0),
+        ("shell", shell(), marble, [1.9, 1.3, 0.2], 12.0),
     ];
     let pedestal = Shape::cuboid(Vec3::new(-0.4, 0.0, -0.4), Vec3::new(0.4, 0.8, 0.4), 12);
     let pedestal = w.mesh("pedestal", &[(&pedestal, stone)]);
@@ -47,20 +47,21 @@ pub(super) fn glb() -> Vec<u8> {
     }
     curtain(&mut w);
 
+    let hand = Vec3::new(-0.9, 1.5, 4.8);
     w.light(
         json!({
-            "name": "flashlight", "type": "spot", "color": [1.0, 0.93, 0.8], "intensity": 90.0,
-            "spot": { "innerConeAngle": 0.22, "outerConeAngle": 0.36 },
+            "name": "flashlight", "type": "spot", "color": [1.0, 0.93, 0.8], "intensity": 120.0,
+            "spot": { "innerConeAngle": 0.28, "outerConeAngle": 0.42 },
         }),
         json!({
-            "name": "flashlight", "translation": [0.6, 1.6, 4.6],
-            "rotation": aimed(Vec3::new(0.6, 1.6, 4.6), Vec3::new(-2.6, 1.7, -5.8)),
+            "name": "flashlight", "translation": hand.to_array(),
+            "rotation": aimed(hand, Vec3::new(-0.6, 1.5, -5.5)),
         }),
     );
-    let eye = Vec3::new(0.3, 1.9, 5.4);
+    let eye = Vec3::new(-0.4, 1.9, 5.5);
     let camera = json!({
         "name": "camera", "translation": eye.to_array(),
-        "rotation": aimed(eye, Vec3::new(-0.2, 1.3, -3.0)),
+        "rotation": aimed(eye, Vec3::new(0.1, 1.3, -3.0)),
     });
     w.camera("camera", 1.0, camera);
     let volume = json!({
@@ -122,7 +123,7 @@ fn room() -> Shape {
 
 /// A fluted column.
 fn column() -> Shape {
-    Shape::surface(96, 40, |s, t| {
+    Shape::surface(72, 30, |s, t| {
         let t = t.clamp(0.0, 1.0);
         let ends = (1.0 - (2.0 * t - 1.0).abs()) * 12.0;
         let radius = 0.3 - 0.04 * t + 0.1 * (1.0 - ends.clamp(0.0, 1.0));
@@ -145,7 +146,7 @@ fn knot(p: f32, q: f32) -> Shape {
 
 /// A figure of rings, each a little turned.
 fn idol() -> Shape {
-    Shape::surface(256, 240, |s, t| {
+    Shape::surface(256, 200, |s, t| {
         let t = t.clamp(0.0, 1.0);
         let body = (PI * t).sin().max(0.0).sqrt() * (0.22 + 0.1 * (4.0 * PI * t).cos());
         let radius = body * (1.0 + 0.12 * (7.0 * TAU * s + 9.0 * t).cos());
@@ -156,7 +157,7 @@ fn idol() -> Shape {
 
 /// A sphere with spiralling ribs.
 fn shell() -> Shape {
-    Shape::surface(256, 170, |s, t| {
+    Shape::surface(256, 171, |s, t| {
         let t = t.clamp(0.0, 1.0);
         let (ring, height) = (PI * (1.0 - t)).sin_cos();
         let ribs = (10.0 * TAU * s + 12.0 * t).cos() * ring;
@@ -188,15 +189,7 @@ fn curtain(w: &mut Writer) {
         let normals = w.vectors(&differ(&moved.normals, &rest.normals));
         json!({ "POSITION": positions, "NORMAL": normals })
     });
-    let red = w.add(
-        "materials",
-        json!({
-            "name": "red velvet", "doubleSided": true,
-            "pbrMetallicRoughness": {
-                "baseColorFactor": [0.6, 0.03, 0.04, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.95,
-            },
-        }),
-    );
+    let red = w.two_sided("red velvet", [0.6, 0.03, 0.04], 0.95);
     let attributes =
         json!({ "POSITION": w.vectors(&rest.positions), "NORMAL": w.vectors(&rest.normals) });
     let indices = w.indices(&rest.triangles);

@@ -93,11 +93,22 @@ impl Writer {
     }
 
     /// Adds a dielectric material of a perceptual roughness.
-    pub(crate) fn surface(&mut self, name: &str, [r, g, b]: [f32; 3], roughness: f32) -> usize {
+    pub(crate) fn surface(&mut self, name: &str, color: [f32; 3], roughness: f32) -> usize {
+        self.dielectric(name, color, roughness, false)
+    }
+
+    /// Adds a dielectric material for surfaces that are seen from both sides.
+    pub(crate) fn two_sided(&mut self, name: &str, color: [f32; 3], roughness: f32) -> usize {
+        self.dielectric(name, color, roughness, true)
+    }
+
+    fn dielectric(&mut self, name: &str, color: [f32; 3], roughness: f32, both: bool) -> usize {
+        let [r, g, b] = color;
         let pbr = json!({
             "baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": roughness,
         });
-        self.add("materials", json!({ "name": name, "pbrMetallicRoughness": pbr }))
+        let material = json!({ "name": name, "pbrMetallicRoughness": pbr, "doubleSided": both });
+        self.add("materials", material)
     }
 
     /// Adds a black material that emits `radiance` (cd/m²) from its front.

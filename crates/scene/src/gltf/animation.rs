@@ -97,7 +97,7 @@ fn read_curve(
     if values.len() < needed {
         return Err(invalid(format!("{} values; its keys need {needed}", values.len())));
     }
-    if values.iter().any(|v| !(v.abs() < 1e9)) {
+    if values.iter().any(|v| !v.is_finite() || v.abs() > 1e9) {
         return Err(invalid("a value is not finite or over 1e9"));
     }
     Ok(Curve { property, interpolation, width, times, values })

@@ -58,30 +58,42 @@ impl Scene {
         }
         let environment = scene.environment.clone();
         scene.environment = scene.load_picture(environment).map_err(|fault| fault.of(path))?;
-        if scene.lights().is_empty() && !scene.shines() {
-            scene
-                .warnings
-                .push("nothing gives light: no lamps, no emission, no environment".into());
-        }
+        scene.warn_if_dark();
         Ok(scene)
+    }
+
+    /// A scene from a .glb in memory that refers to no files.
+    ///
+    /// # Errors
+    /// See [`Scene::load`].
+    pub fn from_glb(name: &str, bytes: impl Into<Arc<[u8]>>) -> Result<Self, SceneError> {
+        let file = format!("{name}.glb");
+        let budget = Budget::default();
+        let read = || {
+            let asset = gltf::read_bytes(&file, bytes.into(), &budget)?;
+            let mut scene = Self::of(short_name(name), file.clone(), asset, None, budget);
+            scene.check()?;
+            let environment = scene.environment.clone();
+            scene.environment = scene.load_picture(environment)?;
+            scene.warn_if_dark();
+            Ok(scene)
+        };
+        read().map_err(|fault: Fault| fault.of(&file))
     }
 
     /// A built-in scene, one of [`BUILTINS`](crate::BUILTINS).
     pub fn builtin(name: &str) -> Option<Self> {
-        let bytes: Arc<[u8]> = builtin::glb(name)?.into();
-        let file = format!("{name}.glb");
-        let budget = Budget::default();
-        match gltf::read_bytes(&file, bytes, &budget) {
-            Ok(asset) => Some(Self::of(name.to_owned(), file, asset, None, budget)),
-            Err(fault) => {
+        match Self::from_glb(name, builtin::glb(name)?) {
+            Ok(scene) => Some(scene),
+            Err(error) => {
                 // Tests load them all.
-                tracing::error!(%fault, name, "a built-in scene is broken");
+                tracing::error!(%error, "a built-in scene is broken");
                 None
             }
         }
     }
 
-    pub(super) fn of(
+    fn of(
         name: String,
         file: String,
         asset: Asset,
@@ -134,9 +146,12 @@ impl Scene {
         if triangles == 0 { Err(Fault::NoTriangles) } else { Ok(()) }
     }
 
-    fn shines(&self) -> bool {
-        self.environment != Environment::BLACK
-            || self.materials.iter().any(|m| m.emissive != glam::Vec3::ZERO)
+    fn warn_if_dark(&mut self) {
+        let shines = self.environment != Environment::BLACK
+            || self.materials.iter().any(|m| m.emissive != glam::Vec3::ZERO);
+        if !shines && self.lights().is_empty() {
+            self.warnings.push("nothing gives light: no lamps, no emission, no environment".into());
+        }
     }
 
     /// Takes over what a file beside the scene says.

@@ -1,0 +1,348 @@
+//! Files that are broken, by accident or on purpose: each gives an error that says what is wrong, and
+//! none a panic, or memory that its size does not warrant.
+
+use serde_json::{Value, json};
+
+use super::{TRIANGLE, fault, fault_of, triangle};
+use crate::builtin::writer::{Writer, container};
+use crate::{Fault, Scene};
+
+/// A file with a bit of everything.
+fn rich() -> Vec<u8> {
+    let mut w = triangle();
+    let positions = w.floats("VEC3", &TRIANGLE);
+    let weights = w.floats("VEC4", &[1., 0., 0., 0.].repeat(3));
+    let joints = w.view(&[0; 12]);
+    let joints = w.add(
+        "accessors",
+        json!({ "bufferView": joints, "componentType": 5121, "type": "VEC4", "count": 3 }),
+    );
+    let matrices = w.floats("MAT4", &glam::Mat4::IDENTITY.to_cols_array());
+    let attributes = json!({ "POSITION": positions, "JOINTS_0": joints, "WEIGHTS_0": weights });
+    let primitive = json!({ "attributes": attributes, "targets": [{ "POSITION": positions }] });
+    w.add("meshes", json!({ "primitives": [primitive] }));
+    w.add("skins", json!({ "joints": [0], "inverseBindMatrices": matrices }));
+    w.node(json!({ "mesh": 1, "skin": 0 }));
+    w.animation("a", (1, "weights"), "LINEAR", &[0.0, 1.0], ("SCALAR", &[0.0, 1.0]));
+    w.animation("b", (0, "rotation"), "CUBICSPLINE", &[0.0, 1.0], ("VEC4", &[0.5; 24]));
+    w.light(json!({ "type": "spot", "range": 3.0 }), json!({ "name": "lamp" }));
+    w.camera("camera", 1.0, json!({}));
+    let image = w.view(&png(2, 2));
+    w.add("images", json!({ "bufferView": image, "mimeType": "image/png" }));
+    w.add("textures", json!({ "source": 0 }));
+    w.add("materials", json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }));
+    w.finish(
+        json!({ "lumencast": { "environment": { "type": "constant", "radiance": [1, 1, 1] } } }),
+    )
+}
+
+/// A PNG that says it has this size. It is whole when that is 2 × 2.
+fn png(width: u32, height: u32) -> Vec<u8> {
+    let mut png = b"\x89PNG\r\n\x1a\n".to_vec();
+    let mut header = Vec::new();
+    header.extend(width.to_be_bytes());
+    header.extend(height.to_be_bytes());
+    header.extend([8, 0, 0, 0, 0]);
+    // Two rows of a filter byte and two grey texels, stored, not compressed.
+    let rows = [0u8, 10, 20, 0, 30, 40];
+    let mut data = vec![0x78, 1, 1, 6, 0, !6, !0];
+    data.extend(rows);
+    let (a, b) = rows.iter().fold((1u32, 0u32), |(a, b), byte| {
+        let a = (a + u32::from(*byte)) % 65_521;
+        (a, (b + a) % 65_521)
+    });
+    data.extend((b << 16 | a).to_be_bytes());
+    for (kind, body) in [(b"IHDR", header), (b"IDAT", data), (b"IEND", Vec::new())] {
+        png.extend((body.len() as u32).to_be_bytes());
+        let checked = [&kind[..], &body].concat();
+        png.extend(&checked);
+        png.extend(crc(&checked).to_be_bytes());
+    }
+    png
+}
+
+fn crc(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0u32, |crc, byte| {
+        (0..8).fold(
+            crc ^ u32::from(*byte),
+            |c, _| if c & 1 == 1 { c >> 1 ^ 0xEDB8_8320 } else { c >> 1 },
+        )
+    })
+}
+
+/// Loads, and if that goes well, uses what was loaded.
+fn exercise(glb: Vec<u8>) {
+    if let Ok(mut scene) = Scene::from_glb("test", glb) {
+        scene.snapshot();
+        scene.advance(0.4);
+        let snapshot = scene.snapshot();
+        let sound = |p: &crate::Primitive| {
+            let n = p.vertices.positions.len();
+            p.triangles.iter().flatten().all(|i| (*i as usize) < n)
+                && p.vertices.normals.len() == n
+                && p.vertices.positions.iter().all(|p| p.is_finite())
+        };
+        assert!(snapshot.instances.iter().flat_map(|i| &i.mesh.primitives).all(sound));
+        scene.edits_since_load();
+    }
+}
+
+#[test]
+fn the_sound_file_loads() {
+    let scene = Scene::from_glb("test", rich()).expect("a sound file");
+    assert_eq!(scene.warnings(), [""; 0]);
+    let texture = scene.materials()[0].base_color_texture.as_ref().expect("a texture");
+    assert_eq!(texture.image.texels[3], [40, 40, 40, 255]);
+}
+
+#[test]
+fn cut_off_anywhere_it_is_refused() {
+    let whole = rich();
+    for length in (0..whole.len()).step_by(3) {
+        let error = Scene::from_glb("test", whole[..length].to_vec()).expect_err("cut off");
+        assert!(!error.to_string().is_empty());
+    }
+}
+
+#[test]
+fn damaged_anywhere_it_does_no_harm() {
+    let whole = rich();
+    let mut state = 1u64;
+    let mut random = |n: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 33) as usize % n
+    };
+    for round in 0..6000 {
+        let mut damaged = whole.clone();
+        for _ in 0..=round % 4 {
+            let at = random(damaged.len());
+            // Digits for digits too, so that the JSON often stays whole.
+            damaged[at] = match damaged[at] {
+                b'0'..=b'9' => b'0' + random(10) as u8,
+                _ => random(256) as u8,
+            };
+        }
+        exercise(damaged);
+    }
+}
+
+/// Replaces every number of the JSON by others, one at a time.
+#[test]
+fn any_number_may_be_absurd() {
+    let whole = rich();
+    let json_length = u32::from_le_bytes([whole[12], whole[13], whole[14], whole[15]]) as usize;
+    let text = std::str::from_utf8(&whole[20..20 + json_length]).expect("JSON").to_owned();
+    let binary = &whole[20 + json_length + 8..];
+    let bytes = text.as_bytes();
+    let mut at = 0;
+    while at < bytes.len() {
+        if !bytes[at].is_ascii_digit()
+            || bytes[at - 1] == b'.'
+            || bytes[at - 1].is_ascii_alphanumeric()
+        {
+            at += 1;
+            continue;
+        }
+        let end = at + bytes[at..].iter().take_while(|b| b".0123456789eE-".contains(b)).count();
+        for absurd in ["-1", "7", "4294967295", "18446744073709551615", "1e38", "1e300"] {
+            exercise(container(&format!("{}{absurd}{}", &text[..at], &text[end..]), binary));
+        }
+        at = end;
+    }
+}
+
+#[test]
+fn huge_counts_are_refused_before_memory_is_asked_for() {
+    for (accessor, reason) in [
+        (json!({ "bufferView": 0, "count": 1u64 << 60 }), "more vertices"),
+        (json!({ "bufferView": 0, "count": 4 }), "do not fit into bufferView 0"),
+        (json!({ "count": 4_000_000_000u64 }), "exceed the limit"),
+        (json!({ "bufferView": 0, "byteOffset": u64::MAX, "count": 1 }), "do not fit"),
+        (json!({ "bufferView": 9, "count": 1 }), "bufferView 9"),
+    ] {
+        let mut w = triangle();
+        let mut accessor = accessor;
+        accessor["componentType"] = 5126.into();
+        accessor["type"] = "VEC3".into();
+        let index = w.add("accessors", accessor);
+        let primitive = json!({ "attributes": { "POSITION": index } });
+        w.add("meshes", json!({ "name": "huge", "primitives": [primitive] }));
+        let fault = fault(w);
+        assert!(
+            fault.contains("mesh 1 \"huge\", primitive 0") && fault.contains(reason),
+            "{fault}"
+        );
+    }
+}
+
+/// One buffer may be named again and again.
+#[test]
+fn triangles_named_again_and_again_are_counted() {
+    let mut w = Writer::default();
+    let positions = w.floats("VEC3", &TRIANGLE.repeat(20_000));
+    let indices: Vec<[u32; 3]> = (0..40_000).map(|i| [i, i + 1, i + 2]).collect();
+    let indices = w.indices(&indices);
+    let primitive = json!({ "attributes": { "POSITION": positions }, "indices": indices });
+    let primitives = vec![primitive; 100_000];
+    w.add("meshes", json!({ "primitives": primitives }));
+    w.node(json!({ "mesh": 0 }));
+    let fault = fault(w);
+    assert!(fault.contains("exceed the limit"), "{fault}");
+}
+
+#[test]
+fn vertices_that_are_not_finite_are_refused_by_mesh() {
+    for bad in [f32::NAN, f32::INFINITY, 1e30] {
+        let mut w = triangle();
+        let positions = w.floats("VEC3", &[0., 0., 0., 1., bad, 0., 0., 1., 0.]);
+        let primitive = json!({ "attributes": { "POSITION": positions } });
+        w.add("meshes", json!({ "name": "bent", "primitives": [primitive] }));
+        // JSON has no NaN: the bounds have to go.
+        let fault = fault_of(without_bounds(w));
+        assert!(fault.contains("mesh 1 \"bent\"") && fault.contains("not finite"), "{fault}");
+    }
+}
+
+fn without_bounds(w: Writer) -> Vec<u8> {
+    let glb = w.finish(Value::Null);
+    let json_length = u32::from_le_bytes([glb[12], glb[13], glb[14], glb[15]]) as usize;
+    let mut json: Value = serde_json::from_slice(&glb[20..20 + json_length]).expect("JSON");
+    for accessor in json["accessors"].as_array_mut().expect("accessors") {
+        accessor.as_object_mut().expect("an object").retain(|key, _| key != "min" && key != "max");
+    }
+    container(&json.to_string(), &glb[20 + json_length + 8..])
+}
+
+#[test]
+fn indices_past_the_vertices_are_refused() {
+    let mut w = triangle();
+    let positions = w.floats("VEC3", &TRIANGLE);
+    let indices = w.indices(&[[0, 1, 3]]);
+    let primitive = json!({ "attributes": { "POSITION": positions }, "indices": indices });
+    w.add("meshes", json!({ "primitives": [primitive] }));
+    assert!(fault(w).contains("index 3 of 3 vertices does not exist"));
+}
+
+#[test]
+fn trees_that_are_none_are_refused() {
+    for (children, reason) in [
+        (vec![json!([1]), json!([2]), json!([1])], "node 1 is a child of node"),
+        (vec![json!([1]), json!([]), json!([2])], "circle"),
+        (vec![json!([1]), json!([]), json!([3]), json!([2])], "circle"),
+        (vec![json!([1]), json!([0])], "circle"),
+        (vec![json!([99])], "child node 99"),
+    ] {
+        let mut w = triangle();
+        for children in children {
+            w.node(json!({ "children": children.as_array().map(|c| {
+                c.iter().map(|i| i.as_u64().unwrap_or(0) + 1).collect::<Vec<_>>()
+            }) }));
+        }
+        let fault = fault_of(w.finish_as(json!({ "nodes": [0] })));
+        let reason = reason.replace("node 1", "node 2").replace("99", "100");
+        assert!(fault.contains(&reason), "{fault:?} without {reason:?}");
+    }
+}
+
+#[test]
+fn image_bombs_are_refused() {
+    for (width, height, reason) in
+        [(60_000, 60_000, "16384"), (60_000, 1, "16384"), (0, 2, "decoded")]
+    {
+        let mut w = triangle();
+        let view = w.view(&png(width, height));
+        w.add("images", json!({ "name": "bomb", "bufferView": view }));
+        w.add("textures", json!({ "source": 0 }));
+        w.add("materials", json!({ "emissiveTexture": { "index": 0 } }));
+        let fault = fault(w);
+        let said =
+            fault.contains("\"bomb\"") && (fault.contains(reason) || fault.contains("exceed"));
+        assert!(said, "{width} × {height}: {fault}");
+    }
+    // Each within bounds, together too many.
+    let mut w = triangle();
+    for k in 0..3 {
+        let view = w.view(&png(16_000, 16_000));
+        w.add("images", json!({ "bufferView": view }));
+        w.add("textures", json!({ "source": k }));
+        w.add("materials", json!({ "emissiveTexture": { "index": k } }));
+    }
+    let fault = fault(w);
+    assert!(fault.contains("texels exceed the limit") || fault.contains("decoded"), "{fault}");
+}
+
+#[test]
+fn missing_pictures_are_named() {
+    let mut w = triangle();
+    w.add("images", json!({ "uri": "wall.png" }));
+    w.add("textures", json!({ "source": 0 }));
+    w.add("materials", json!({ "emissiveTexture": { "index": 0 } }));
+    let folder = super::Folder::new("missing");
+    let path = folder.write("scene.glb", w.finish(Value::Null));
+    let error = Scene::load(&path).expect_err("a missing picture").to_string();
+    assert!(error.contains("\"wall.png\"") && error.contains("scene.glb"), "{error}");
+}
+
+#[test]
+fn unknown_required_extensions_are_named() {
+    for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_texture_basisu"] {
+        let mut w = triangle();
+        w.add("extensionsRequired", name.into());
+        let glb = w.finish(Value::Null);
+        let error = Scene::from_glb("test", glb).expect_err("an unknown extension");
+        assert!(matches!(&error.fault, Fault::UnknownExtension(unknown) if unknown == name));
+        assert!(error.to_string().contains(&format!("unknown required extension {name}")));
+    }
+    let mut w = triangle();
+    w.add("extensionsUsed", "KHR_materials_iridescence".into());
+    let scene = super::load(w);
+    assert!(scene.warnings()[0].contains("KHR_materials_iridescence"));
+}
+
+#[test]
+fn scenes_without_triangles_or_light() {
+    let mut w = Writer::default();
+    w.node(json!({ "name": "empty" }));
+    assert!(fault(w).contains("has no triangles"));
+    // A mesh that no node of the scene shows does not count.
+    let glb = triangle().finish_as(json!({ "nodes": [] }));
+    assert!(fault_of(glb).contains("has no triangles"));
+    assert!(super::load(triangle()).warnings()[0].contains("nothing gives light"));
+}
+
+#[test]
+fn what_is_no_gltf_is_refused() {
+    for (bytes, reason) in [
+        (&b""[..], "not valid glTF"),
+        (b"hello", "not valid glTF"),
+        (b"{}", "version"),
+        (b"glTF\x01\0\0\0\x0c\0\0\0", "version 1"),
+        (b"glTF\x02\0\0\0\xff\xff\xff\xff", "cut off"),
+        (b"glTF\x02\0\0\0\x0c\0\0\0", "no JSON chunk"),
+        (b"{\"asset\":{\"version\":\"1.0\"}}", "version"),
+        (b"[[[[[[[[", "not valid glTF"),
+    ] {
+        let fault = fault_of(bytes.to_vec());
+        assert!(fault.contains(reason), "{fault:?} without {reason:?}");
+    }
+    let deep = format!("{}{}", "{\"extras\":".repeat(100_000), "}".repeat(100_000));
+    assert!(fault_of(deep.into_bytes()).contains("not valid glTF"));
+}
+
+#[test]
+fn lights_and_cameras_out_of_range_are_refused() {
+    for (light, reason) in [
+        (json!({ "type": "point", "intensity": -1.0 }), "light 0: its intensity"),
+        (json!({ "type": "point", "color": [0.0, -1.0, 0.0] }), "light 0: its colour"),
+        (json!({ "type": "spot", "spot": { "outerConeAngle": 3.0 } }), "light 0: its cones"),
+        (json!({ "type": "area" }), "light 0: unknown type"),
+    ] {
+        let mut w = triangle();
+        w.light(light, json!({}));
+        let fault = fault(w);
+        assert!(fault.contains(reason), "{fault:?} without {reason:?}");
+    }
+    let mut w = triangle();
+    w.camera("wide", 4.0, json!({}));
+    assert!(fault(w).contains("camera 0 \"wide\""));
+}

@@ -1,0 +1,192 @@
+//! Animation, morph targets and skins, against results found by hand.
+
+use std::sync::Arc;
+
+use glam::{Quat, Vec3};
+use serde_json::json;
+
+use super::{TRIANGLE, load, triangle};
+use crate::builtin::writer::Writer;
+use crate::{Edit, NodeId, Playback, Scene};
+
+fn animate(
+    w: &mut Writer,
+    node: usize,
+    path: &str,
+    interpolation: &str,
+    kind: &str,
+    values: &[f32],
+) {
+    w.animation(path, (node, path), interpolation, &[0.0, 2.0], (kind, values));
+}
+
+fn translation(scene: &Scene, node: usize) -> Vec3 {
+    let info = scene.nodes().nth(node).expect("the node");
+    info.transform.translation.expect("all parts are set")
+}
+
+#[test]
+fn animations_play_in_a_loop_and_tell_when_something_moves() {
+    let mut w = triangle();
+    animate(&mut w, 0, "translation", "LINEAR", "VEC3", &[0., 0., 0., 4., 0., 0.]);
+    let mut scene = load(w);
+    assert!(scene.advance(0.5));
+    assert_eq!((translation(&scene, 0).x, scene.version()), (1.0, 1));
+    assert!(!scene.advance(0.0), "no time has passed");
+    assert!(scene.advance(2.25), "by way of the end");
+    assert_eq!(scene.version(), 2);
+    // After 2.75 s of a loop of 2 s it stands where it stood after 0.75 s.
+    assert!((translation(&scene, 0).x - 1.5).abs() < 1e-6);
+    let world = scene.snapshot().instances[0].world_from_object;
+    assert!((world.translation.x - 1.5).abs() < 1e-6);
+    assert!(!scene.advance(f64::NAN) && !scene.advance(-1.0));
+    assert_eq!(scene.time(), 2.75);
+}
+
+#[test]
+fn a_snapshot_is_kept_until_something_changes() {
+    let mut scene = load(triangle());
+    let first = scene.snapshot();
+    assert!(Arc::ptr_eq(&first, &scene.snapshot()));
+    drop(first);
+    scene.advance(1.0);
+    assert_eq!((scene.snapshot().time, scene.snapshot().version), (1.0, 0));
+}
+
+#[test]
+fn playback_is_paused_sought_and_turned_round() {
+    let mut w = triangle();
+    animate(&mut w, 0, "translation", "LINEAR", "VEC3", &[0., 0., 0., 4., 0., 0.]);
+    let mut scene = load(w);
+    let set = |scene: &mut Scene, playback: Playback| {
+        scene.apply(&Edit::SetAnimation { animation: crate::AnimationId(0), playback }).map(|_| ())
+    };
+    scene.advance(0.25);
+    set(&mut scene, Playback { playing: Some(false), ..Playback::default() }).expect("paused");
+    assert!(!scene.advance(0.5));
+    assert_eq!(translation(&scene, 0).x, 0.5);
+    let back = Playback { playing: Some(true), time: Some(1.5), speed: Some(-2.0) };
+    set(&mut scene, back).expect("sought");
+    assert_eq!(translation(&scene, 0).x, 3.0);
+    scene.advance(0.5);
+    assert_eq!(translation(&scene, 0).x, 1.0);
+    let nan = Playback { time: Some(f64::NAN), ..Playback::default() };
+    set(&mut scene, nan).expect_err("not a time");
+}
+
+#[test]
+fn morph_targets_displace_by_their_weights() {
+    let mut w = Writer::default();
+    let positions = w.floats("VEC3", &TRIANGLE);
+    let up = w.vectors(&[Vec3::Z, Vec3::Z, Vec3::Z]);
+    let aside = w.vectors(&[Vec3::X, Vec3::ZERO, Vec3::ZERO]);
+    let primitive = json!({
+        "attributes": { "POSITION": positions },
+        "targets": [{ "POSITION": up }, { "POSITION": aside }],
+    });
+    w.add("meshes", json!({ "primitives": [primitive], "weights": [0.5, 0.0] }));
+    w.node(json!({ "mesh": 0, "translation": [0.0, 0.0, 10.0] }));
+    animate(&mut w, 0, "weights", "LINEAR", "SCALAR", &[0.5, 0.0, 0.5, 2.0]);
+    let mut scene = load(w);
+    scene.advance(0.5);
+    let moved = scene.snapshot();
+    let instance = &moved.instances[0];
+    assert_eq!(instance.world_from_object.translation.z, 10.0);
+    let vertices = &instance.deformed.as_ref().expect("deformed")[0];
+    let want = [Vec3::new(0.5, 0.0, 0.5), Vec3::new(1.0, 0.0, 0.5), Vec3::new(0.0, 1.0, 0.5)];
+    assert_eq!(vertices.positions, want);
+    assert!(vertices.normals.iter().all(|n| *n == Vec3::Z));
+
+    // Unchanged weights keep the same vertices, changed ones give new ones.
+    let kept =
+        |scene: &mut Scene| scene.snapshot().instances[0].deformed.clone().expect("deformed");
+    let before = kept(&mut scene);
+    let transform = crate::Transform { translation: Some(Vec3::ONE), ..Default::default() };
+    scene.apply(&Edit::MoveNode { node: NodeId(0), transform }).expect("moved");
+    assert!(Arc::ptr_eq(&before, &kept(&mut scene)));
+    scene.advance(0.1);
+    assert!(!Arc::ptr_eq(&before, &kept(&mut scene)));
+}
+
+/// Two joints: the first stands, the second, a metre up, turns about z. The upper vertex hangs on
+/// the second one, the right one half on each.
+#[test]
+fn skinned_vertices_follow_their_joints() {
+    let mut w = Writer::default();
+    let positions = w.floats("VEC3", &[0., 0., 0., 1., 1., 0., 0., 2., 0.]);
+    let normals = w.vectors(&[Vec3::Z, Vec3::Z, Vec3::X]);
+    let joints_view = w.view(&[0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0]);
+    let joints = w.add(
+        "accessors",
+        json!({ "bufferView": joints_view, "componentType": 5121, "type": "VEC4", "count": 3 }),
+    );
+    // Weights are normalised on reading.
+    let weights = w.floats("VEC4", &[1., 0., 0., 0., 2., 2., 0., 0., 1., 0., 0., 0.]);
+    let attributes = json!({ "POSITION": positions, "NORMAL": normals, "JOINTS_0": joints, "WEIGHTS_0": weights });
+    w.add("meshes", json!({ "primitives": [{ "attributes": attributes }] }));
+    let identity = glam::Mat4::IDENTITY.to_cols_array();
+    let down = glam::Mat4::from_translation(Vec3::NEG_Y).to_cols_array();
+    let inverse_bind = w.floats("MAT4", &[identity, down].concat());
+    w.add("skins", json!({ "joints": [1, 2], "inverseBindMatrices": inverse_bind }));
+    // The node's own transform does not count for a skinned mesh.
+    w.node(
+        json!({ "mesh": 0, "skin": 0, "translation": [100.0, 0.0, 0.0], "scale": [0.0, 0.0, 0.0] }),
+    );
+    w.node(json!({ "name": "root", "translation": [0.0, 0.0, 5.0], "children": [2] }));
+    w.node(json!({ "name": "tip", "translation": [0.0, 1.0, 0.0] }));
+    let turned = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2).to_array();
+    animate(&mut w, 2, "rotation", "STEP", "VEC4", &[turned, [0., 0., 0., 1.]].concat());
+    let mut scene = load(w);
+    let snapshot = scene.snapshot();
+    let instance = &snapshot.instances[0];
+    assert_eq!(instance.world_from_object, glam::Affine3A::IDENTITY);
+    let v = &instance.deformed.as_ref().expect("skinned")[0];
+    // By hand: the tip turns (0, 2) about (0, 1) to (−1, 1); (1, 1) goes to (0, 2), half of it to
+    // (0.5, 1.5); the root moves all by z = 5.
+    let want = [Vec3::new(0., 0., 5.), Vec3::new(0.5, 1.5, 5.), Vec3::new(-1., 1., 5.)];
+    for (got, want) in v.positions.iter().zip(want) {
+        assert!((*got - want).length() < 1e-6, "{got} {want}");
+    }
+    assert!((v.normals[2] - Vec3::Y).length() < 1e-6, "{}", v.normals[2]);
+}
+
+#[test]
+fn the_later_animation_of_a_node_wins() {
+    let mut w = triangle();
+    animate(&mut w, 0, "translation", "STEP", "VEC3", &[1., 0., 0., 1., 0., 0.]);
+    animate(&mut w, 0, "translation", "STEP", "VEC3", &[2., 0., 0., 2., 0., 0.]);
+    let mut scene = load(w);
+    assert_eq!(translation(&scene, 0).x, 2.0);
+    let pause = Playback { playing: Some(false), ..Playback::default() };
+    let edit = Edit::SetAnimation { animation: crate::AnimationId(1), playback: pause };
+    scene.apply(&edit).expect("paused");
+    scene.advance(0.1);
+    assert_eq!(translation(&scene, 0).x, 1.0, "the one that runs moves it");
+}
+
+#[test]
+fn what_shrinks_to_nothing_is_not_drawn() {
+    let mut w = triangle();
+    animate(&mut w, 0, "scale", "STEP", "VEC3", &[0., 0., 0., 1., 1., 1.]);
+    let mut scene = load(w);
+    assert!(scene.snapshot().instances.is_empty());
+    assert!(scene.edits_since_load().is_empty());
+}
+
+#[test]
+fn mirrored_and_nested_transforms() {
+    let mut w = triangle();
+    w.node(json!({ "children": [0], "scale": [-2.0, 1.0, 1.0], "translation": [1.0, 0.0, 0.0] }));
+    let matrix = glam::Mat4::from_scale_rotation_translation(
+        Vec3::new(1.0, 2.0, -3.0),
+        Quat::from_rotation_x(0.4),
+        Vec3::new(0.0, 0.0, 7.0),
+    );
+    w.node(json!({ "children": [1], "matrix": matrix.to_cols_array() }));
+    let mut scene = load(w);
+    let world = scene.snapshot().instances[0].world_from_object;
+    let point = matrix.transform_point3(Vec3::new(1.0 - 2.0 * 0.5, 0.25, 0.0));
+    let got = world.transform_point3(Vec3::new(0.5, 0.25, 0.0));
+    assert!((got - point).length() < 1e-5, "{got} {point}");
+    assert!(world.matrix3.determinant() > 0.0, "mirrored twice");
+}
