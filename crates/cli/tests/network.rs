@@ -11,7 +11,7 @@ use bytes::Bytes;
 use common::{PATIENCE, Serving, run};
 use lumencast_cache::Cache;
 use lumencast_codec::{ClientEdit, StateFrame};
-use lumencast_scene::{Edit, LightSpec, NodeId, Scene};
+use lumencast_scene::{Edit, InstanceSource, LightSpec, NodeId, Scene, Transform};
 use lumencast_transport::{
     Broadcast, Client, ConnectOptions, Frame, ReadOptions, TrackReader, TrackWriter,
 };
@@ -216,6 +216,40 @@ fn a_refused_edit_comes_back_with_its_reason() {
     });
     // Counted at the end of the tick that told of it.
     server.wait_for_metric("lumencast_edits_refused_total", |n| n == 2.0);
+}
+
+#[test]
+fn another_gltf_is_served_once_it_is_in_the_scene() {
+    let folder = common::Folder::new("added");
+    let model = Serving::start("cornell", &SMALL).get("/scene/cornell.glb").body;
+    let scene = folder.file("scene.glb", &model);
+    folder.file("model.glb", &model);
+    let server = Serving::start(&scene, &SMALL);
+    assert_eq!(server.get("/scene/model.glb").status, 404, "not yet part of the scene");
+    limited(async {
+        let mut follower = Follower::connect(&server).await;
+        let mut editor = follower.editor("a");
+        for (name, accepted) in [("../outside.glb", false), ("model.glb", true)] {
+            let seq = editor.send(Edit::AddInstance {
+                node: None,
+                source: InstanceSource::File(name.into()),
+                parent: None,
+                transform: Transform::default(),
+            });
+            let answer = |state: &StateFrame| {
+                let edit = state.edits.iter().find(|e| e.source == Some(("a".into(), seq)));
+                let refused = state.refused.iter().any(|r| r.seq == seq);
+                edit.map(|e| Some(e.edit.clone())).or(refused.then_some(None))
+            };
+            let answer = follower.until(answer).await;
+            assert_eq!(answer.is_some(), accepted, "{name}");
+            if let Some(edit) = answer {
+                assert!(matches!(edit, Edit::AddInstance { node: Some(_), .. }), "{edit:?}");
+            }
+        }
+    });
+    server.wait_for_metric("lumencast_edits_accepted_total", |n| n == 1.0);
+    assert_eq!(server.get("/scene/model.glb").body, model);
 }
 
 #[test]

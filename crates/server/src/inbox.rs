@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use lumencast_codec::{ClientEdit, RefusedEdit};
+use lumencast_codec::{ClientEdit, RefusedEdit, limits};
 use lumencast_scene::Edit;
 
 /// How much one client may send.
@@ -30,9 +30,13 @@ pub(crate) const MAX_CLIENTS: usize = 1024;
 /// Edits taken in one tick, and refusals reported in one: the wire's limit for a delta.
 pub(crate) const MAX_EDITS_A_TICK: usize = 4096;
 /// Bytes of a frame; no edit is nearly as long.
-pub(crate) const MAX_FRAME: usize = 16 * 1024;
+pub(crate) const MAX_FRAME: usize = 4 * 1024;
 /// Edits of all clients that wait for the next tick.
 const MAX_PENDING: usize = 4 * MAX_EDITS_A_TICK;
+/// Bytes of the edits taken in one tick: half of what a frame of the state may hold.
+const MAX_BYTES_A_TICK: usize = limits::FRAME_BYTES / 2;
+/// Characters of a reason for refusing an edit that cannot be read.
+const MAX_REASON: usize = 200;
 /// Seconds after which a silent client's numbers are forgotten.
 const FORGET_AFTER: f64 = 60.0;
 
@@ -76,7 +80,8 @@ pub enum Verdict {
 pub struct Inbox {
     limits: Limits,
     clients: BTreeMap<String, Mailbox>,
-    pending: Vec<Received>,
+    /// With the bytes that each came in.
+    pending: Vec<(Received, usize)>,
     refused: Vec<RefusedEdit>,
 }
 
@@ -135,7 +140,8 @@ impl Inbox {
         match edit {
             Ok(edit) => {
                 mailbox.pending += 1;
-                self.pending.push(Received { client: client.to_owned(), seq, edit });
+                let received = Received { client: client.to_owned(), seq, edit };
+                self.pending.push((received, bytes.len()));
                 Verdict::Taken
             }
             Err(reason) => {
@@ -150,8 +156,14 @@ impl Inbox {
     /// What there is for a tick at `now` seconds, edits in the order in which they came. Edits over
     /// the limit of a tick stay for the next.
     pub fn take(&mut self, now: f64) -> Mail {
-        let rest = self.pending.split_off(self.pending.len().min(MAX_EDITS_A_TICK));
-        let edits = std::mem::replace(&mut self.pending, rest);
+        let mut room = MAX_BYTES_A_TICK;
+        let fits = |(_, bytes): &&(Received, usize)| {
+            let taken = room.checked_sub(*bytes);
+            room = taken.unwrap_or(0);
+            taken.is_some()
+        };
+        let count = self.pending.iter().take(MAX_EDITS_A_TICK).take_while(fits).count();
+        let edits: Vec<Received> = self.pending.drain(..count).map(|(edit, _)| edit).collect();
         for received in &edits {
             if let Some(mailbox) = self.clients.get_mut(&received.client) {
                 mailbox.pending -= 1;
@@ -165,7 +177,7 @@ impl Inbox {
     fn acks(&self) -> BTreeMap<String, u64> {
         let mut acks: BTreeMap<_, _> =
             self.clients.iter().map(|(name, m)| (name.clone(), m.last)).collect();
-        for waiting in &self.pending {
+        for (waiting, _) in &self.pending {
             if let Some(ack) = acks.get_mut(&waiting.client) {
                 *ack = waiting.seq.saturating_sub(1).min(*ack);
             }
@@ -183,7 +195,10 @@ fn parse(bytes: &[u8]) -> Option<(u64, Result<Edit, String>)> {
     }
     match ClientEdit::decode(bytes) {
         Ok(ClientEdit { seq, edit }) => Some((seq, Ok(edit))),
-        Err((seq, error)) => Some((seq?, Err(format!("not an edit: {error}")))),
+        Err((seq, error)) => {
+            let reason = format!("not an edit: {error}");
+            Some((seq?, Err(reason.chars().take(MAX_REASON).collect())))
+        }
     }
 }
 
@@ -257,6 +272,24 @@ mod tests {
         assert_eq!(mail.acks["a"], MAX_EDITS_A_TICK as u64);
         let mail = inbox.take(0.0);
         assert_eq!((mail.edits.len(), mail.acks["a"]), (10, many));
+    }
+
+    #[test]
+    fn long_edits_are_spread_over_ticks() {
+        let limits = Limits { rate: 1e9, burst: 1e9, ..Limits::default() };
+        let mut inbox = Inbox::new(limits);
+        for seq in 1..=200 {
+            let name = "x".repeat(MAX_FRAME - 100);
+            let edit = format!(r#"{{"edit":"add_instance","source":{{"file":"{name}"}}}}"#);
+            let frame = format!(r#"{{"seq":{seq},"edit":{edit}}}"#);
+            assert_eq!(inbox.receive("a", frame.as_bytes(), 0.0), Verdict::Taken);
+        }
+        let (first, second) = (inbox.take(0.0), inbox.take(0.0));
+        assert!(first.edits.len() * MAX_FRAME <= MAX_BYTES_A_TICK + 100 * first.edits.len());
+        assert_eq!(first.edits.len() + second.edits.len(), 200);
+        assert_eq!(second.acks["a"], 200);
+        let long = "x".repeat(MAX_FRAME + 1);
+        assert_eq!(inbox.receive("a", long.as_bytes(), 0.0), Verdict::Rubbish);
     }
 
     #[test]
