@@ -26,13 +26,16 @@ impl Scene {
     /// See [`Scene::load`]; a name that is neither.
     pub fn open(name: &str) -> Result<Self, SceneError> {
         let path = Path::new(name);
+        // A folder does not hide the built-in scene of its name.
+        if !path.is_file()
+            && let Some(scene) = Self::builtin(name)
+        {
+            return Ok(scene);
+        }
         if path.exists() {
             return Self::load(path);
         }
-        Self::builtin(name).ok_or_else(|| {
-            let builtins = builtin::NAMES.join(", ");
-            Fault::Unknown { builtins }.of(path)
-        })
+        Err(Fault::Unknown { builtins: builtin::NAMES.join(", ") }.of(path))
     }
 
     /// Loads a .gltf or .glb file. Files that it refers to, and those that edits add later, have to
