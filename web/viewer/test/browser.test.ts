@@ -30,14 +30,8 @@ const SHOTS = process.env.LUMENCAST_SHOTS;
 
 const program = lumencastProgram();
 const browserProgram = chromiumProgram();
-const missing = !program
-  ? 'no lumencast program (cargo build -p lumencast-cli)'
-  : !browserProgram
-    ? 'no Chromium'
-    : undefined;
-if (missing) console.log(`skipped: ${missing}`);
 
-describe.skipIf(missing !== undefined)('the page', () => {
+describe('the page', () => {
   let folder: string;
   let browser: Browser;
   let server: Server;
@@ -45,7 +39,7 @@ describe.skipIf(missing !== undefined)('the page', () => {
 
   // The processor draws the picture as well: the server must leave some of it.
   const start = (scene: string, port: number) =>
-    Server.start(program!, scene, port, ['--page', folder, '--samples', '4..16']);
+    Server.start(program, scene, port, ['--page', folder, '--samples', '4..16']);
 
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), 'lumencast-page-'));
@@ -55,7 +49,7 @@ describe.skipIf(missing !== undefined)('the page', () => {
       logLevel: 'error',
       build: { outDir: folder, emptyOutDir: true },
     });
-    browser = await chromium.launch({ executablePath: browserProgram!, headless: true, args: FLAGS });
+    browser = await chromium.launch({ executablePath: browserProgram, headless: true, args: FLAGS });
     server = await start('cornell', await freePort());
     page = await open(browser, server.address);
     // Pictures are compared with each other: nothing is to move by itself.

@@ -6,18 +6,24 @@ import { resolve } from 'node:path';
 const ROOT = resolve(import.meta.dirname, '../../..');
 
 /** The program under test: what the environment says, else what cargo has built. */
-export function lumencastProgram(): string | undefined {
+export function lumencastProgram(): string {
   const target = process.env.CARGO_TARGET_DIR ?? resolve(ROOT, 'target');
-  return [process.env.LUMENCAST_BIN, resolve(target, 'debug/lumencast')].find(
-    (path) => path && existsSync(path),
-  );
+  return firstThatExists('lumencast (cargo build -p lumencast-cli)', [
+    process.env.LUMENCAST_BIN,
+    resolve(target, 'debug/lumencast'),
+  ]);
 }
 
 /** A browser to drive: what the environment says, else the system's Chromium. */
-export function chromiumProgram(): string | undefined {
-  return [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/google-chrome'].find(
-    (path) => path && existsSync(path),
-  );
+export function chromiumProgram(): string {
+  return firstThatExists('Chromium', [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/google-chrome']);
+}
+
+function firstThatExists(what: string, paths: readonly (string | undefined)[]): string {
+  const found = paths.find((path) => path && existsSync(path));
+  if (!found)
+    throw new Error(`the browser test needs ${what}; looked for ${paths.filter(Boolean).join(', ')}`);
+  return found;
 }
 
 /** A scene from beside the repository; `undefined` when it is not there. */
