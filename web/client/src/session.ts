@@ -107,8 +107,8 @@ class LiveSession implements Session, Sink {
   private reading: Reading | undefined;
   private catalogBytes: Uint8Array = new Uint8Array();
   private camera: Vec3 | undefined;
-  /** When the link was made, or last gave a frame. */
-  private heard = 0;
+  /** Seconds awake since the link was made, or last gave a frame. */
+  private silence = 0;
 
   constructor(
     private readonly target: Target,
@@ -161,11 +161,16 @@ class LiveSession implements Session, Sink {
     let die = (_reason: string): void => {};
     const dead = new Promise<string>((resolve) => (die = resolve));
     this.link = link;
-    this.heard = seconds();
+    this.silence = 0;
     const catalog = link.subscribe('catalog', { priority: CATALOG_PRIORITY, maxAge: 0 }, (frame) =>
       this.catalogFrame(frame, link),
     );
-    const beat = setInterval(() => this.beat(die), BEAT);
+    let beaten = seconds();
+    const beat = setInterval(() => {
+      const now = seconds();
+      this.beat(now, now - beaten, die);
+      beaten = now;
+    }, BEAT);
     const aborted = () => die('closed');
     this.ending.signal.addEventListener('abort', aborted, { once: true });
     const reason = await Promise.race([link.ended, dead]);
@@ -180,16 +185,16 @@ class LiveSession implements Session, Sink {
     return reason;
   }
 
-  private beat(die: (reason: string) => void): void {
-    const now = seconds();
-    const silent = now - this.heard;
+  private beat(now: number, elapsed: number, die: (reason: string) => void): void {
+    // A page that is busy or in the background beats late, and has not heard what came meanwhile.
+    this.silence += Math.min(elapsed, (2 * BEAT) / 1000);
     if (!this.reading) {
-      if (silent > CATALOG_WAIT) die(`${this.origin} has no scene named ${this.scene}`);
+      if (this.silence > CATALOG_WAIT) die(`${this.origin} has no scene named ${this.scene}`);
       return;
     }
     const tick = this.cache.catalog?.tickSeconds ?? 0;
     const limit = Math.max(SILENCE.seconds, SILENCE.ticks * tick);
-    if (silent > limit) return die(`nothing has come for ${limit} s`);
+    if (this.silence > limit) return die(`nothing has come for ${limit} s`);
     this.reading.adapt(now);
     this.outbox.check(now);
   }
@@ -258,7 +263,7 @@ class LiveSession implements Session, Sink {
   /** Notes that a frame came; returns when. */
   private hear(track: string, frame: Uint8Array): number {
     const now = seconds();
-    this.heard = now;
+    this.silence = 0;
     this.meter.frame(track, frame.length, now);
     return now;
   }

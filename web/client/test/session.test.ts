@@ -140,6 +140,20 @@ describe('after a loss', () => {
     expect(net.links[0].closed).toBe(true);
   });
 
+  it('does not take its own sleep for silence', async () => {
+    const { net, server, statuses } = await joined();
+    await run(net, server, 1);
+    // As when the page drew for a minute, or was a tab in the background.
+    const now = performance.now.bind(performance);
+    const clock = vi.spyOn(performance, 'now').mockImplementation(() => now() + 60_000);
+    await pass(0.5);
+    net.link.tick(server);
+    await run(net, server, 1);
+    clock.mockRestore();
+    expect(statuses.at(-1)?.state).toBe('connected');
+    expect(net.links.length).toBe(1);
+  });
+
   it('knows a restarted server: scene anew, tracks anew, edits on their way rejected', async () => {
     const { net, server, session } = await joined();
     await run(net, server, 1);

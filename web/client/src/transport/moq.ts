@@ -4,6 +4,11 @@ import { LIMITS } from '../codec/limits.js';
 import type { Connector, Link, ReadOptions, Target, TrackReader } from '../transport.js';
 import { offeredCertificateHash } from './certificate.js';
 
+/**
+ * Milliseconds before a WebSocket is tried beside WebTransport. Long, because a page that is busy
+ * loading would else end up with the lesser transport, and the library keeps to what won once.
+ */
+const WEBSOCKET_DELAY = 2000;
 /** Milliseconds before a track that could not be had is asked for again. */
 const RETRY = 250;
 /** Frames of a group of edits: a reader that falls behind by more loses some. */
@@ -16,7 +21,7 @@ export const moqConnector: Connector = async (target, signal) => {
     webtransport: await webTransportOptions(target, signal),
     websocket: {
       enabled: target.transport !== 'webtransport',
-      ...(target.transport === 'websocket' ? { delay: 0 } : {}),
+      delay: target.transport === 'websocket' ? 0 : WEBSOCKET_DELAY,
     },
   });
   return new MoqLink(connection, target);
