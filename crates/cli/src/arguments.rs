@@ -11,8 +11,10 @@ use lumencast_gather::Gather;
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, MaterialModel, Options};
 use lumencast_light::{Grid, Order};
-use lumencast_scene::{Scene, Script, VolumeSpec};
+use lumencast_scene::{Edit, Scene, Script, VolumeSpec};
 use lumencast_server::{GatherOptions, SampleRange, TickOptions};
+
+use crate::environment::EnvironmentArgument;
 
 /// The port of `serve` unless told otherwise.
 pub(crate) const DEFAULT_PORT: u16 = 4443;
@@ -23,11 +25,19 @@ pub(crate) struct SceneSource {
     /// A glTF file (.gltf or .glb), or a built-in scene: cornell, door, tomb.
     #[arg(value_name = "SCENE")]
     pub(crate) scene: String,
+    /// Light from all around in place of the scene's own: sky:LUX, a colour R,G,B in cd/m², or an
+    /// .hdr or .exr file in the scene's folder.
+    #[arg(long, value_name = "ENVIRONMENT")]
+    environment: Option<EnvironmentArgument>,
 }
 
 impl SceneSource {
     pub(crate) fn open(&self) -> Result<Scene> {
-        Ok(Scene::open(&self.scene)?)
+        let mut scene = Scene::open(&self.scene)?;
+        if let Some(EnvironmentArgument(environment)) = self.environment.clone() {
+            scene.apply(&Edit::SetEnvironment { environment }).context("--environment")?;
+        }
+        Ok(scene)
     }
 }
 

@@ -6,6 +6,7 @@ mod arguments;
 mod bake;
 mod bench;
 mod doctor;
+mod environment;
 mod inspect;
 mod output;
 mod probe;
@@ -13,6 +14,7 @@ mod remote;
 mod serve;
 mod token;
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -56,7 +58,11 @@ enum Command {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(LOGGED));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .init();
 
     let result = match cli.command {
         Command::Serve(command) => command.run(),

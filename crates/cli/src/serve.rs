@@ -18,6 +18,7 @@ use crate::output;
 Examples:
   lumencast serve cornell
   lumencast serve sponza.glb --volume 10x6x7 --samples 16..128
+  lumencast serve sponza.glb --environment sky:1000
   lumencast serve cornell --edits benches/minute.jsonl
   lumencast serve sponza.glb --listen 0.0.0.0:4443 --token-key key.jwk \\
       --tls-cert cert.pem --tls-key key.pem

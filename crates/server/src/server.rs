@@ -172,6 +172,8 @@ fn beat(
         beat.start(started);
         let mail = inbox.lock().unwrap_or_else(PoisonError::into_inner).take(started);
         let report = tick.step(started, mail, &mut publisher);
+        // With the log's time, from which pages measure the way to them.
+        tracing::debug!(tick = report.tick, late = report.late, "tick published");
         if report.files_changed {
             *shared.scene_files.write().unwrap_or_else(PoisonError::into_inner) =
                 scene_files(tick.scene());

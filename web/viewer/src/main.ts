@@ -1,4 +1,4 @@
-import { connect } from '@lumencast/client';
+import { connect, type ConnectOptions } from '@lumencast/client';
 import './style.css';
 import { openPage } from './page.js';
 
@@ -18,6 +18,12 @@ void openPage(async () => {
   return {
     name: root,
     file: new URL(`/scene/${root.split('/').map(encodeURIComponent).join('/')}`, location.href).href,
-    connect: () => connect(address, { scene: broadcast }),
+    connect: () => connect(address, { scene: broadcast, transport: transport() }),
   };
 });
+
+/** `?transport=websocket` and the like, for measurements and for networks that swallow UDP. */
+function transport(): NonNullable<ConnectOptions['transport']> {
+  const asked = new URLSearchParams(location.search).get('transport');
+  return asked === 'webtransport' || asked === 'websocket' ? asked : 'auto';
+}

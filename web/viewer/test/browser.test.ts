@@ -7,29 +7,17 @@
 import { mkdirSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
-import { type Browser, chromium, type Page } from 'playwright-core';
+import type { Browser, Page } from 'playwright-core';
 import { build } from 'vite';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { chromiumProgram, freePort, lumencastProgram, Server, sharedScene } from './server.js';
+import { launchBrowser, openPage } from './browser.js';
+import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
 
-const FLAGS = [
-  '--headless=new',
-  '--no-sandbox',
-  '--enable-unsafe-webgpu',
-  '--use-webgpu-adapter=swiftshader',
-  '--enable-features=Vulkan',
-  '--use-vulkan=swiftshader',
-  '--use-angle=swiftshader',
-  '--enable-unsafe-swiftshader',
-  // Containers have little of it.
-  '--disable-dev-shm-usage',
-];
 /** Small: every pixel is drawn by the processor. */
 const VIEWPORT = { width: 400, height: 300 };
 const SHOTS = process.env.LUMENCAST_SHOTS;
 
 const program = lumencastProgram();
-const browserProgram = chromiumProgram();
 
 describe('the page', () => {
   let folder: string;
@@ -49,9 +37,9 @@ describe('the page', () => {
       logLevel: 'error',
       build: { outDir: folder, emptyOutDir: true },
     });
-    browser = await chromium.launch({ executablePath: browserProgram, headless: true, args: FLAGS });
+    browser = await launchBrowser();
     server = await start('cornell', await freePort());
-    page = await open(browser, server.address);
+    page = await openPage(browser, server.address, VIEWPORT);
     // Pictures are compared with each other: nothing is to move by itself.
     await page.evaluate(() =>
       window.lumencast!.light.edit({ edit: 'set_animation', animation: 0, playing: false }),
@@ -109,7 +97,7 @@ describe('the page', () => {
         const before = look();
         const began = performance.now();
         await light.edit({ edit: 'move_node', node, translation });
-        while (change(before, look()) < 2 * noise + 0.01 && performance.now() - began < 10_000) await wait(0);
+        while (change(before, look()) < 2 * noise + 0.01 && performance.now() - began < 10_000) await wait(50);
         moves.push(performance.now() - began);
         await wait(3000);
       }
@@ -150,7 +138,7 @@ describe('the page', () => {
   }, 90_000);
 
   it('shows one page’s edit on another', async () => {
-    const second = await open(browser, server.address);
+    const second = await openPage(browser, server.address, VIEWPORT);
     try {
       const moved: [number, number, number] = [0.31, 1.27, 0.11];
       const node = await page.evaluate(async (translation) => {
@@ -165,7 +153,7 @@ describe('the page', () => {
         { timeout: 5000 },
       );
       // A page that joins later gets it with the snapshot.
-      const third = await open(browser, server.address);
+      const third = await openPage(browser, server.address, VIEWPORT);
       const position = await third.evaluate(
         (node) => window.lumencast!.light.content.object(node)!.position.toArray(),
         node,
@@ -191,7 +179,7 @@ describe('the page', () => {
     async () => {
       const other = await start(sponza!, await freePort());
       try {
-        const view = await open(browser, other.address, { width: 1280, height: 720 });
+        const view = await openPage(browser, other.address, { width: 1280, height: 720 });
         await view.waitForTimeout(10_000);
         await view.evaluate(() => window.lumencast!.viewer.meter());
         await shoot(view, 'sponza');
@@ -205,34 +193,6 @@ describe('the page', () => {
 });
 
 type Pixel = [r: number, g: number, b: number];
-
-/** Opens the page and waits for its first light, at a fixed exposure. */
-async function open(browser: Browser, address: string, viewport = VIEWPORT): Promise<Page> {
-  const page = await browser.newPage({ viewport });
-  const errors: string[] = [];
-  page.on('pageerror', (error) => errors.push(String(error)));
-  page.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
-  try {
-    await page.goto(`${address}/?scale=1`);
-    await page.waitForFunction(() => window.lumencast, undefined, { timeout: 60_000 });
-    await page.evaluate(() => window.lumencast!.ready);
-    await page.waitForSelector('.curtain', { state: 'detached', timeout: 20_000 });
-    // From here on it draws when asked to: a page that draws without pause in software leaves the
-    // server no processor, and never comes to rest for a screenshot.
-    await page.evaluate(() => {
-      const { viewer } = window.lumencast!;
-      viewer.autoExposure = false;
-      viewer.stop();
-      return viewer.meter();
-    });
-    return page;
-  } catch (error) {
-    const shown = await page.innerText('body').catch(() => '');
-    throw new Error(`the page did not come up; it says: ${shown.slice(0, 300)}\n${errors.join('\n')}`, {
-      cause: error,
-    });
-  }
-}
 
 /** Points of the picture on a grid, with one part of the light shown. */
 function look(page: Page, shown: 'both' | 'direct' | 'indirect'): Promise<Pixel[]> {

@@ -14,15 +14,10 @@ export function lumencastProgram(): string {
   ]);
 }
 
-/** A browser to drive: what the environment says, else the system's Chromium. */
-export function chromiumProgram(): string {
-  return firstThatExists('Chromium', [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/google-chrome']);
-}
-
-function firstThatExists(what: string, paths: readonly (string | undefined)[]): string {
+/** Of some paths, the first that there is. */
+export function firstThatExists(what: string, paths: readonly (string | undefined)[]): string {
   const found = paths.find((path) => path && existsSync(path));
-  if (!found)
-    throw new Error(`the browser test needs ${what}; looked for ${paths.filter(Boolean).join(', ')}`);
+  if (!found) throw new Error(`the test needs ${what}; looked for ${paths.filter(Boolean).join(', ')}`);
   return found;
 }
 
@@ -57,9 +52,11 @@ export class Server {
     scene: string,
     port: number,
     options: readonly string[],
+    environment: Readonly<Record<string, string>> = {},
   ): Promise<Server> {
     const child = spawn(program, ['serve', scene, '--listen', `127.0.0.1:${port}`, ...options], {
       stdio: ['ignore', 'pipe', 'pipe'],
+      env: { ...process.env, ...environment },
     });
     const said: string[] = [];
     child.stdout.on('data', (chunk: Buffer) => said.push(chunk.toString()));
@@ -71,6 +68,11 @@ export class Server {
 
   get address(): string {
     return `http://127.0.0.1:${this.port}`;
+  }
+
+  /** What it has written so far. */
+  get output(): string {
+    return this.said.join('');
   }
 
   /** Ends it at once, as a crash would. */
@@ -89,6 +91,6 @@ export class Server {
       await new Promise((resolve) => setTimeout(resolve, 100));
     }
     await this.kill();
-    throw new Error(`the server did not start:\n${this.said.join('')}`);
+    throw new Error(`the server did not start:\n${this.output}`);
   }
 }

@@ -1,0 +1,163 @@
+/**
+ * Figures of the whole way, server and page on one machine: the delay from the end of a tick to the
+ * update in the page, and the time that the page's light takes to follow a moved sun. The page does
+ * not draw meanwhile: without a GPU that would take the server's processor.
+ *
+ *     LUMENCAST_BIN=target/release/lumencast npm run figures
+ *
+ * LUMENCAST_FIGURES names a file for the figures as JSON.
+ */
+import { writeFileSync } from 'node:fs';
+import { cpus } from 'node:os';
+import type { Browser } from 'playwright-core';
+import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import { launchBrowser, openPage } from './browser.js';
+import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
+
+const VIEWPORT = { width: 400, height: 300 };
+/** Updates whose way is timed; the session remembers 1,000 arrivals. */
+const UPDATES_SECONDS = 38;
+
+const program = lumencastProgram();
+const sponza = sharedScene('sponza/Sponza.glb');
+const figures: Record<string, unknown> = { processor: cpus()[0]?.model, cores: cpus().length };
+
+let browser: Browser;
+beforeAll(async () => {
+  browser = await launchBrowser();
+});
+afterAll(async () => {
+  await browser.close();
+  console.log(JSON.stringify(figures, undefined, 2));
+  const file = process.env.LUMENCAST_FIGURES;
+  if (file) writeFileSync(file, `${JSON.stringify(figures, undefined, 2)}\n`);
+});
+
+describe('the delay from the end of a tick to the update in a page', () => {
+  it.each(['webtransport', 'websocket'])(
+    'over %s',
+    async (transport) => {
+      // Fewer samples than there is time for: queueing behind the tracer is no part of the way.
+      const server = await Server.start(program, 'cornell', await freePort(), ['--samples', '16'], {
+        RUST_LOG: 'warn,lumencast_server=debug',
+      });
+      try {
+        const page = await openPage(browser, server.address, VIEWPORT, { transport });
+        await page.waitForTimeout(UPDATES_SECONDS * 1000);
+        const { timings, status } = await page.evaluate(() => {
+          const { session } = window.lumencast!;
+          return { timings: session.timings(), status: session.status };
+        });
+        expect(status).toMatchObject({ state: 'connected', transport });
+        const ended = ticksEnded(server.output);
+        // On joining, frames of the group under way come late.
+        const first = timings[0].tick + 50;
+        const delays = timings
+          .filter(({ tick }) => tick > first && ended.has(tick))
+          .map(({ tick, decoded }) => decoded - ended.get(tick)!);
+        expect(delays.length).toBeGreaterThan(500);
+        figures[`delay_ms_${transport}`] = { updates: delays.length, ...summary(delays) };
+      } finally {
+        await server.kill();
+      }
+    },
+    120_000,
+  );
+});
+
+describe('the time from a moved sun to 95 % of its new light', () => {
+  it.skipIf(!sponza)(
+    'in Sponza',
+    async () => {
+      const options = ['--volume', '10x6x7', '--samples', '4..256'];
+      const server = await Server.start(program, sponza!, await freePort(), options);
+      try {
+        const page = await openPage(browser, server.address, VIEWPORT);
+        const followed = [];
+        for (const degrees of [40, -40, 25]) followed.push(await page.evaluate(turnSun, degrees));
+        figures.sun = followed;
+        for (const { toShare } of followed) expect(toShare['0.95']).toBeLessThan(30_000);
+      } finally {
+        await server.kill();
+      }
+    },
+    300_000,
+  );
+});
+
+/** When each tick ended, in milliseconds of the system's clock, as the server's log has it. */
+function ticksEnded(log: string): Map<number, number> {
+  const ended = new Map<number, number>();
+  for (const [, day, microseconds, tick] of log.matchAll(
+    /^(\S+T[\d:]+)\.(\d{6})Z .*tick published.*?tick=(\d+)/gm,
+  )) {
+    ended.set(Number(tick), Date.parse(`${day}Z`) + Number(microseconds) / 1000);
+  }
+  return ended;
+}
+
+function summary(values: readonly number[]): Record<'median' | 'p99' | 'max', number> {
+  const sorted = values.toSorted((a, b) => a - b);
+  const at = (q: number): number => sorted[Math.round(q * (sorted.length - 1))];
+  return { median: at(0.5), p99: at(0.99), max: at(1) };
+}
+
+/**
+ * In the page: turns the sun about the vertical and watches the light go from the old steady state A
+ * to the new one B. The share at a moment is the light's projection on the way from A to B.
+ */
+async function turnSun(degrees: number) {
+  const SETTLE = 20_000;
+  const AVERAGE = 4_000;
+  const { light, session, viewer } = window.lumencast!;
+  const wait = (ms: number) => new Promise((resolve) => setTimeout(resolve, ms));
+  const look = () => new Float64Array(session.light().fields[0].coefficients);
+  const watch = async (ms: number) => {
+    const seen: { at: number; light: Float64Array }[] = [];
+    for (const start = performance.now(); performance.now() - start < ms; await wait(20)) {
+      seen.push({ at: performance.now(), light: look() });
+    }
+    return seen;
+  };
+  const mean = (seen: { light: Float64Array }[]) =>
+    seen[0].light.map((_, i) => seen.reduce((sum, { light }) => sum + light[i], 0) / seen.length);
+  const dot = (a: Float64Array, b: Float64Array) => a.reduce((sum, value, i) => sum + value * b[i], 0);
+  const minus = (a: Float64Array, b: Float64Array) => a.map((value, i) => value - b[i]);
+
+  await wait(SETTLE);
+  const before = mean(await watch(AVERAGE));
+  const sun = viewer.lights[0];
+  const turn = (degrees * Math.PI) / 180;
+  const worldFromParent = sun.parent!.getWorldQuaternion(sun.quaternion.clone());
+  const about = sun.quaternion.clone().set(0, Math.sin(turn / 2), 0, Math.cos(turn / 2));
+  const rotation = worldFromParent
+    .clone()
+    .invert()
+    .multiply(about)
+    .multiply(worldFromParent)
+    .multiply(sun.quaternion);
+  const moved = performance.now();
+  void light.edit({
+    edit: 'move_node',
+    node: light.content.nodeOf(sun)!,
+    rotation: rotation.toArray() as [number, number, number, number],
+  });
+  const seen = await watch(SETTLE);
+  const after = mean(await watch(AVERAGE));
+  const { samples, tickRate } = session.stats;
+
+  const way = minus(after, before);
+  const length = dot(way, way);
+  const shares = seen.map(({ light }) => dot(minus(light, before), way) / length);
+  const toShare: Record<string, number> = {};
+  for (const share of [0.5, 0.9, 0.95]) {
+    const last = shares.findLastIndex((value) => value < share);
+    toShare[share] = seen[Math.min(last + 1, seen.length - 1)].at - moved;
+  }
+  // What chance makes of steady light, to be compared with the 5 % that are left.
+  const noise = Math.sqrt(
+    shares.slice(-100).reduce((sum, value) => sum + (value - 1) ** 2, 0) / Math.min(shares.length, 100),
+  );
+  const change = Math.sqrt(length / dot(before, before));
+  return { degrees, change, toShare, noise, samples, tickRate };
+}
