@@ -97,7 +97,8 @@ describe('the page', () => {
         const before = look();
         const began = performance.now();
         await light.edit({ edit: 'move_node', node, translation });
-        while (change(before, look()) < 2 * noise + 0.01 && performance.now() - began < 10_000) await wait(50);
+        while (change(before, look()) < 2 * noise + 0.01 && performance.now() - began < 10_000)
+          await wait(50);
         moves.push(performance.now() - began);
         await wait(3000);
       }
