@@ -112,7 +112,7 @@ pub(crate) struct TickArguments {
     ratio: f32,
     /// Standard deviations by which a change stands out to be followed at once; inf to follow by
     /// the ratio alone.
-    #[arg(long, default_value = "5", value_parser = parse_positive)]
+    #[arg(long, default_value = "3.5", value_parser = parse_positive)]
     significance: f32,
     /// A script of edits (JSON lines, {"at": seconds, "edit": …}), played by scene time.
     #[arg(long, value_name = "FILE")]

@@ -79,7 +79,7 @@ fn main() -> std::io::Result<()> {
         let updates: Vec<Gathered> = (0..STILL + AFTER)
             .map(|t| gather(&mut tracer, if t < STILL { &before } else { &after }, samples, t))
             .collect();
-        for significance in [4.0, 5.0, 6.0, f32::INFINITY] {
+        for significance in [2.5, 3.0, 3.5, 4.0, 5.0, f32::INFINITY] {
             let settings = BlendSettings { ratio: 0.01, significance };
             let mut history = History::new(settings, updates[0].sums.len(), Order::L2);
             let fields: Vec<Field> = updates
