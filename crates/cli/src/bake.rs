@@ -70,7 +70,7 @@ impl Bake {
             }));
         }
         println!(
-            "{}: {} fields, {probes} probes, {}",
+            "{}: fields: {}, probes: {probes}, {}",
             self.output.display(),
             light.len(),
             output::bytes(bytes.len() as u64)

@@ -6,10 +6,19 @@ import {
   LinearFilter,
   RGBAFormat,
   type Scene,
+  Vector3,
 } from 'three';
+import { withMargin } from './margin.js';
 import type { Platform, ProbeGrid } from './platform.js';
 import { L2_VALUES, Resampler, toL2 } from './resample.js';
-import { type GridPlan, planVolumes } from './volumes.js';
+import { type GridPlan, mostCells, planVolumes } from './volumes.js';
+
+/**
+ * By how many cells a grid's box is larger on each side than the volume. A grid lights nothing outside
+ * its box, and samples of a pixel at the edge of a triangle lie outside the triangle: walls that bound
+ * a volume would have black edges. Probes appear displaced by at most so much of a cell.
+ */
+const GROWTH = 0.05;
 
 /**
  * The probe grids of a scene: made from the catalog's fields, filled from the session's light. Each
@@ -33,7 +42,10 @@ export class ProbeGrids {
       textureSize: platform.max3DTextureSize,
     });
     this.#clear();
-    this.#filled = plan.grids.map((grid, priority) => new FilledGrid(grid, priority, platform));
+    const maxCells = mostCells(platform.max3DTextureSize);
+    this.#filled = plan.grids
+      .map((grid) => withMargin(grid, plan.grids, maxCells))
+      .map((grid, priority) => new FilledGrid(grid, priority, platform));
     for (const { grid } of this.#filled) this.scene.add(grid);
     this.visible = this.#visible;
     return plan.warnings;
@@ -99,6 +111,8 @@ class FilledGrid {
     this.grid.priority = priority;
     this.grid.texture = this.#texture;
     this.grid.updateBoundingBox();
+    const cell = plan.size.map((size, axis) => size / plan.resolution[axis]);
+    this.grid.boundingBox.expandByVector(new Vector3(...cell).multiplyScalar(GROWTH));
   }
 
   update(light: LightState): boolean {

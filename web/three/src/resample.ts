@@ -33,7 +33,7 @@ export class Resampler {
     const { resolution, size } = plan.fields[source].grid;
     const axes = fieldFromWorld(plan.fields[source], position).map((p, axis) => {
       const n = resolution[axis];
-      const cell = Math.min(Math.max((p / size[axis] + 0.5) * n - 0.5, 0), n - 1);
+      const cell = Math.min(Math.max(snapped((p / size[axis] + 0.5) * n - 0.5), 0), n - 1);
       const low = Math.min(Math.floor(cell), Math.max(n - 2, 0));
       return { low, high: Math.min(low + 1, n - 1), weight: cell - low };
     });
@@ -80,6 +80,12 @@ export function toL2(coefficients: Float32Array, order: number, out: Float32Arra
     for (let i = 0; i < values; i++) out[to + i] = coefficients[from + i];
   }
   return out;
+}
+
+/** A place among probes; that of a probe itself where it is one but for rounding. */
+function snapped(cell: number): number {
+  const nearest = Math.round(cell);
+  return Math.abs(cell - nearest) < 1e-4 ? nearest : cell;
 }
 
 function probePosition({ center, size, resolution }: GridPlan, probe: number): Vec3 {

@@ -31,17 +31,13 @@ export interface VolumeLimits {
 }
 
 /** Most probes of a grid that is resampled at every update: about 10 ms of a page's time. */
-const MAX_RESAMPLED = 16_384;
+export const MAX_RESAMPLED = 16_384;
 /** Sub-volumes of an L2 atlas. */
 const SUB_VOLUMES = 7;
 
 export function planVolumes(fields: readonly Field[], limits: VolumeLimits): VolumePlan {
   const warnings: string[] = [];
-  const maxCells: Vec3 = [
-    limits.textureSize,
-    limits.textureSize,
-    Math.floor(limits.textureSize / SUB_VOLUMES) - 2,
-  ];
+  const maxCells = mostCells(limits.textureSize);
   let grids = forAllInstances(fields, warnings).map((field) => gridOf(field, maxCells, warnings));
   if (limits.grids < 1 && grids.length > 0) {
     warnings.push('no texture unit is free: indirect light is not shown');
@@ -49,6 +45,11 @@ export function planVolumes(fields: readonly Field[], limits: VolumeLimits): Vol
   }
   while (grids.length > limits.grids) grids = mergeClosest(grids, maxCells, warnings);
   return { grids: grids.sort((a, b) => cellVolume(b) - cellVolume(a)), warnings };
+}
+
+/** Cells along each axis that a 3D texture of a size along an axis has room for. */
+export function mostCells(textureSize: number): Vec3 {
+  return [textureSize, textureSize, Math.floor(textureSize / SUB_VOLUMES) - 2];
 }
 
 /** three.js lights every instance with the same grids. */
@@ -151,7 +152,7 @@ function fieldCell(field: Field): number {
   return cellVolume(field.grid);
 }
 
-function volume(size: Vec3): number {
+export function volume(size: Vec3): number {
   return size[0] * size[1] * size[2];
 }
 

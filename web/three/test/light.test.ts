@@ -114,7 +114,8 @@ describe('light', () => {
     light.update(camera);
     const texture = light.grids[0].texture!;
     const halves = [...(texture.image.data as Uint16Array)].map((half) => DataUtils.fromHalfFloat(half));
-    expect(halves).toHaveLength(7 * 3 * 4);
+    // One probe, and a layer of its copies on every side.
+    expect(halves).toHaveLength(3 * 3 * 7 * (3 + 2) * 4);
     expect(halves.slice(0, 4)).toEqual([1, 0.5, 0.5, 0.5]);
     expect(halves.slice(-4)).toEqual([0.5, 0.5, 0.5, 11]);
 

@@ -1,7 +1,8 @@
 import type { Field, Vec3, Vec4 } from '@lumencast/client';
 import { describe, expect, it } from 'vitest';
+import { withMargin } from '../src/margin.js';
 import { L2_VALUES, Resampler, toL2 } from '../src/resample.js';
-import { planVolumes } from '../src/volumes.js';
+import { mostCells, planVolumes } from '../src/volumes.js';
 
 const WIDE = { grids: 8, textureSize: 2048 };
 const QUARTER_ABOUT_Y: Vec4 = [0, Math.SQRT1_2, 0, Math.SQRT1_2];
@@ -93,6 +94,47 @@ describe('planVolumes', () => {
     const moving = field(1, {}, { use: 'moving' });
     expect(planVolumes([field(0, {}), moving], WIDE).grids).toHaveLength(1);
     expect(planVolumes([moving], WIDE).grids).toHaveLength(1);
+  });
+});
+
+describe('withMargin', () => {
+  const margins = (fields: Field[], textureSize = 2048) => {
+    const { grids } = planVolumes(fields, { ...WIDE, textureSize });
+    return grids.map((grid) => withMargin(grid, grids, mostCells(textureSize)));
+  };
+
+  it('goes on a cell beyond a lonely volume, with its outermost probes', () => {
+    const lonely = field(0, { size: [8, 6, 4], resolution: [4, 3, 2] });
+    const [grid] = margins([lonely]);
+    expect(grid).toMatchObject({ center: [0, 0, 0], size: [12, 10, 8], resolution: [6, 5, 4] });
+    const value = ([x, y, z]: Vec3) => x + 10 * y + 100 * z;
+    const clamped = ([x, y, z]: Vec3): Vec3 => [
+      Math.min(Math.max(x, -3), 3),
+      Math.min(Math.max(y, -2), 2),
+      Math.min(Math.max(z, -1), 1),
+    ];
+    const out = new Float32Array(6 * 5 * 4 * L2_VALUES);
+    new Resampler(grid).fill([fill(lonely, value)], out);
+    const beyond = fill({ ...lonely, grid: { ...lonely.grid, ...grid } as Field['grid'] }, (position) =>
+      value(clamped(position)),
+    );
+    expect(out).toEqual(beyond);
+  });
+
+  it('does not reach into the next volume', () => {
+    const [left, right] = margins([field(0, { center: [-2, 0, 0] }), field(1, { center: [2, 0, 0] })]);
+    expect(left).toMatchObject({ center: [-2.5, 0, 0], size: [5, 6, 6], resolution: [5, 6, 6] });
+    expect(right).toMatchObject({ center: [2.5, 0, 0], size: [5, 6, 6] });
+  });
+
+  it('leaves a volume within another alone', () => {
+    const [coarse, fine] = margins([field(0, {}), field(1, { size: [1, 1, 1] })]);
+    expect(coarse.resolution).toEqual([6, 6, 6]);
+    expect(fine).toMatchObject({ exact: true, resolution: [4, 4, 4] });
+  });
+
+  it('stays within what textures hold', () => {
+    expect(margins([field(0, { resolution: [2, 2, 33] })], 256)[0].resolution).toEqual([4, 4, 34]);
   });
 });
 

@@ -43,14 +43,15 @@ pub(super) fn glb() -> Vec<u8> {
         "name": "camera", "translation": [-1.7, 1.5, -4.4], "rotation": (look * Quat::from_rotation_x(-0.12)).to_array(),
     });
     w.camera("camera", 0.95, camera);
+    // They meet within the wall, so that the doorway is in one or the other.
     let volume = |z: f32| {
         json!({
             "center": [0.0, HEIGHT / 2.0, z],
-            "size": [2.0 * HALF_WIDTH, HEIGHT, DEPTH - WALL],
+            "size": [2.0 * HALF_WIDTH, HEIGHT, DEPTH],
             "resolution": [8, 5, 8], "order": 2,
         })
     };
-    let volumes = [volume(-(DEPTH + WALL) / 2.0), volume((DEPTH + WALL) / 2.0)];
+    let volumes = [volume(-DEPTH / 2.0), volume(DEPTH / 2.0)];
     w.finish(json!({ "lumencast": { "volumes": volumes } }))
 }
 
