@@ -1,7 +1,9 @@
-//! What one runs by hand in this repository: `cargo xtask demo`, `cargo xtask test`, `cargo xtask setup`.
+//! What one runs by hand in this repository: `cargo xtask demo`, `cargo xtask test`,
+//! `cargo xtask figures`, `cargo xtask setup`.
 #![expect(clippy::print_stdout, reason = "a program for the terminal")]
 
 mod demo;
+mod figures;
 mod run;
 mod setup;
 mod test;
@@ -23,6 +25,8 @@ enum Command {
     Demo(demo::Demo),
     /// Everything that CI runs: formatting, lints, tests, licences, the web packages, the browser
     Test(test::Test),
+    /// Measure this machine: ticks, and the way to a page; writes benches/results/NAME.json
+    Figures(figures::Figures),
     /// Install what building and testing need (as root), or print the commands that do
     Setup,
 }
@@ -31,6 +35,7 @@ fn main() -> ExitCode {
     let outcome = match Args::parse().command {
         Command::Demo(demo) => demo.run(),
         Command::Test(test) => test.run(),
+        Command::Figures(figures) => figures.run(),
         Command::Setup => setup::install(setup::Purpose::Test),
     };
     match outcome {

@@ -26,8 +26,8 @@ describe('the page', () => {
   let page: Page;
 
   // The processor draws the picture as well: the server must leave some of it.
-  const start = (scene: string, port: number) =>
-    Server.start(program, scene, port, ['--page', folder, '--samples', '4..16']);
+  const start = (scene: string, port: number, ...options: string[]) =>
+    Server.start(program, scene, port, ['--page', folder, '--samples', '4..16', ...options]);
 
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), 'lumencast-page-'));
@@ -178,10 +178,11 @@ describe('the page', () => {
   it.skipIf(!SHOTS || !sponza)(
     'draws Sponza',
     async () => {
-      const other = await start(sponza!, await freePort());
+      const options = ['--volume', '16x8x10', '--environment', 'sky:4'];
+      const other = await start(sponza!, await freePort(), ...options);
       try {
         const view = await openPage(browser, other.address, { width: 1280, height: 720 });
-        await view.waitForTimeout(10_000);
+        await view.waitForTimeout(20_000);
         await view.evaluate(() => window.lumencast!.viewer.meter());
         await shoot(view, 'sponza');
         await view.close();
@@ -228,5 +229,10 @@ async function shoot(page: Page, name: string): Promise<void> {
     viewer.draw();
     viewer.controls.update();
   });
-  await page.screenshot({ path: join(SHOTS, `${name}.png`), timeout: 60_000, animations: 'disabled' });
+  await page.screenshot({
+    path: join(SHOTS, `${name}.jpg`),
+    quality: 90,
+    timeout: 60_000,
+    animations: 'disabled',
+  });
 }
