@@ -82,6 +82,18 @@ export class Reconciler {
     for (const key of this.#accepted.keys()) this.#show(key);
   }
 
+  /** Things have come that edits may have changed before they were here: an added file is loaded. */
+  arrived(): void {
+    for (const [key, known] of this.#initial) {
+      if (known !== undefined) continue;
+      const value = this.values.get(key);
+      if (value === undefined) continue;
+      this.#initial.set(key, value);
+      if (this.#accepted.get(key) === undefined) this.#accepted.set(key, value);
+      this.#show(key);
+    }
+  }
+
   /** Forgets what was known of a thing whose number will never be used again. */
   forget(prefix: string): void {
     for (const map of [this.#initial, this.#accepted, this.#pending, this.#held]) {

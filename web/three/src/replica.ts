@@ -234,6 +234,7 @@ export class Replica implements Values {
   async #fillInstance(group: Group, { source, node = 0 }: Edit & { edit: 'add_instance' }): Promise<void> {
     try {
       group.add(await this.#models.instantiate(source, node));
+      this.#reconciler.arrived();
       this.events.added(group);
       this.revision++;
     } catch (error) {

@@ -55,6 +55,23 @@ describe('Reconciler', () => {
     expect(shown()).toBe(1);
   });
 
+  it('gives a thing that comes late what edits have made of it, and takes it back with them', () => {
+    const values = new Map<string, unknown>();
+    const reconciler = new Reconciler({
+      get: (key) => values.get(key),
+      set: (key, value) => void (values.has(key) && values.set(key, value)),
+    });
+    reconciler.accept(move(3));
+    values.set(KEY, [1, 1, 1]); // the file is loaded
+    reconciler.arrived();
+    expect(values.get(KEY)).toEqual([3, 0, 0]);
+    reconciler.accept(move(4));
+    reconciler.arrived();
+    expect(values.get(KEY)).toEqual([4, 0, 0]);
+    reconciler.restart([]);
+    expect(values.get(KEY)).toEqual([1, 1, 1]);
+  });
+
   it('leaves held values to the page', () => {
     const { reconciler, shown, values } = scene();
     const release = reconciler.hold([KEY]);
