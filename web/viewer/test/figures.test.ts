@@ -57,6 +57,7 @@ describe('the delay from the end of a tick to the update in a page', () => {
           .map(({ tick, decoded }) => decoded - ended.get(tick)!);
         expect(delays.length).toBeGreaterThan(500);
         figures[`delay_ms_${transport}`] = { updates: delays.length, ...summary(delays) };
+      await page.close();
       } finally {
         await server.kill();
       }
@@ -76,6 +77,7 @@ describe('the time from a moved sun to 95 % of its new light', () => {
         const followed = [];
         for (const degrees of [40, -40, 25]) followed.push(await page.evaluate(turnSun, degrees));
         figures.sun = followed;
+      await page.close();
         for (const { toShare } of followed) expect(toShare['0.95']).toBeLessThan(30_000);
       } finally {
         await server.kill();
@@ -111,18 +113,18 @@ async function turnSun(degrees: number) {
   const AVERAGE = 4_000;
   const { light, session, viewer } = window.lumencast!;
   const wait = (ms: number) => new Promise((resolve) => setTimeout(resolve, ms));
-  const look = () => new Float64Array(session.light().fields[0].coefficients);
+  const look = () => new Float32Array(session.light().fields[0].coefficients);
   const watch = async (ms: number) => {
-    const seen: { at: number; light: Float64Array }[] = [];
+    const seen: { at: number; light: Float32Array }[] = [];
     for (const start = performance.now(); performance.now() - start < ms; await wait(20)) {
       seen.push({ at: performance.now(), light: look() });
     }
     return seen;
   };
-  const mean = (seen: { light: Float64Array }[]) =>
+  const mean = (seen: { light: Float32Array }[]) =>
     seen[0].light.map((_, i) => seen.reduce((sum, { light }) => sum + light[i], 0) / seen.length);
-  const dot = (a: Float64Array, b: Float64Array) => a.reduce((sum, value, i) => sum + value * b[i], 0);
-  const minus = (a: Float64Array, b: Float64Array) => a.map((value, i) => value - b[i]);
+  const dot = (a: Float32Array, b: Float32Array) => a.reduce((sum, value, i) => sum + value * b[i], 0);
+  const minus = (a: Float32Array, b: Float32Array) => a.map((value, i) => value - b[i]);
 
   await wait(SETTLE);
   const before = mean(await watch(AVERAGE));

@@ -130,6 +130,74 @@ fn settings_in_extras_and_beside_the_scene() {
 }
 
 #[test]
+fn an_environment_from_openexr() {
+    let folder = Folder::new("exr");
+    let path = folder.write("scene.glb", triangle().finish(Value::Null));
+    // Brighter than halves can say, and a texel that no light has.
+    let texels = image::Rgb32FImage::from_fn(4, 2, |x, y| match (x, y) {
+        (0, 0) => image::Rgb([100_000.0, 2.0, 1e-3]),
+        (1, 0) => image::Rgb([f32::NAN, -1.0, 0.5]),
+        _ => image::Rgb([1.0; 3]),
+    });
+    let mut exr = std::io::Cursor::new(Vec::new());
+    image::DynamicImage::from(texels)
+        .write_to(&mut exr, image::ImageFormat::OpenExr)
+        .expect("encodes");
+    folder.write("sky.exr", exr.into_inner());
+    folder.write("scene.lumencast.toml", "[environment]\ntype = \"image\"\nuri = \"sky.exr\"\n");
+    let scene = Scene::load(&path).expect("the scene");
+    let Environment::Image { image: Some(image), .. } = scene.environment() else {
+        panic!("no picture: {:?}", scene.environment())
+    };
+    assert_eq!((image.width, image.height), (4, 2));
+    assert_eq!(image.texels[0], Vec3::new(100_000.0, 2.0, 1e-3));
+    assert_eq!(image.texels[1], Vec3::new(0.0, 0.0, 0.5));
+    assert!(
+        scene.warnings().iter().any(|w| w.contains("sky.exr: 1 texel")),
+        "{:?}",
+        scene.warnings()
+    );
+}
+
+#[test]
+fn textures_in_every_format() {
+    let texel = |x: u32, y: u32| image::Rgba([200 - 8 * x as u8, 40 + 8 * y as u8, 90, 255]);
+    let picture = image::RgbaImage::from_fn(16, 16, texel);
+    // JPEG is lossy: a smooth picture comes back within a few steps.
+    for (format, kind, within) in [
+        (image::ImageFormat::Png, "image/png", 0),
+        (image::ImageFormat::WebP, "image/webp", 0),
+        (image::ImageFormat::Jpeg, "image/jpeg", 12),
+    ] {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let source = image::DynamicImage::from(picture.clone());
+        let source = if within > 0 { source.to_rgb8().into() } else { source };
+        source.write_to(&mut bytes, format).expect("encodes");
+        let mut w = triangle();
+        let view = w.view(bytes.get_ref());
+        w.add("images", json!({ "bufferView": view, "mimeType": kind }));
+        w.add(
+            "textures",
+            match format {
+                image::ImageFormat::WebP => {
+                    json!({ "extensions": { "EXT_texture_webp": { "source": 0 } } })
+                }
+                _ => json!({ "source": 0 }),
+            },
+        );
+        let pbr = json!({ "baseColorTexture": { "index": 0 } });
+        w.add("materials", json!({ "pbrMetallicRoughness": pbr }));
+        let scene = Scene::from_glb("formats", w.finish(Value::Null)).expect(kind);
+        let texture = scene.materials()[0].base_color_texture.as_ref().expect("a texture");
+        assert_eq!((texture.image.width, texture.image.height), (16, 16));
+        for (expected, read) in picture.pixels().zip(texture.image.texels.iter()) {
+            let apart = expected.0.iter().zip(read).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(apart <= Some(within), "{kind}: {expected:?} {read:?}");
+        }
+    }
+}
+
+#[test]
 fn senseless_settings_name_their_file() {
     let folder = Folder::new("odd-settings");
     let path = folder.write("scene.glb", triangle().finish(Value::Null));
