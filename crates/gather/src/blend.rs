@@ -21,6 +21,9 @@
 //!   more than about one of its own standard deviations, however bright it is; a change that stays
 //!   stands out after three updates.
 //!
+//! Where the caller knows that light may have changed ([`History::expect_change`]: an edit), two
+//! standard deviations are enough for a while.
+//!
 //! A lamp that jumps is thus answered within a few updates, a slow drift within as many as its
 //! significance needs, and while nothing changes the ladder leaves the estimate alone, also where
 //! light comes by rare paths only. Measured by `examples/reaction.rs` and `examples/still.rs`. A
@@ -41,6 +44,9 @@ const NOISE: f32 = 1.0 / 128.0;
 /// Share of a mean's own scatter that counts as chance. Of a change that has just begun, most of the
 /// scatter is the change itself.
 const SCATTER: f32 = 0.64;
+/// Standard deviations that are enough while a change is expected, and for how many updates it is.
+const EXPECTED: f32 = 2.0;
+const EXPECTING: u32 = 12;
 /// Coefficients that are watched: bands 0 and 1.
 const WATCHED: usize = 4;
 
@@ -65,6 +71,8 @@ impl Default for BlendSettings {
 pub struct History {
     settings: BlendSettings,
     receivers: Vec<Ladder>,
+    /// Updates for which a change is still expected.
+    expecting: u32,
 }
 
 impl History {
@@ -72,7 +80,7 @@ impl History {
     pub fn new(settings: BlendSettings, receivers: usize, order: Order) -> Self {
         let ladder =
             Ladder::new(settings.ratio.clamp(f32::MIN_POSITIVE, 1.0), order.coefficients());
-        Self { settings, receivers: vec![ladder; receivers] }
+        Self { settings, receivers: vec![ladder; receivers], expecting: 0 }
     }
 
     /// Number of receivers.
@@ -93,19 +101,22 @@ impl History {
     /// Takes an update, one entry a receiver in order. Entries without samples, or with numbers that
     /// are not finite, change nothing.
     pub fn update(&mut self, sums: &[Sums]) {
+        let mut significance = self.settings.significance;
+        if self.expecting > 0 && significance.is_finite() {
+            significance = significance.min(EXPECTED);
+        }
+        self.expecting = self.expecting.saturating_sub(1);
         for (ladder, sums) in self.receivers.iter_mut().zip(sums) {
             if let Some(update) = Update::new(sums, ladder.coefficients()) {
-                ladder.update(&update, self.settings.significance);
+                ladder.update(&update, significance);
             }
         }
     }
 
-    /// Trusts what is known as if it rested on `factor` (0 to 1) times as many samples: 0 replaces
-    /// it by the next update, 1 changes nothing. For changes that the caller knows of.
-    pub fn forget(&mut self, factor: f32) {
-        for ladder in &mut self.receivers {
-            ladder.means.iter_mut().for_each(|m| m.forget(factor.clamp(0.0, 1.0)));
-        }
+    /// Light may be another from the next update on: something was moved, switched, changed. Makes
+    /// the next updates follow it sooner, at the price of a little noise where it is the same.
+    pub fn expect_change(&mut self) {
+        self.expecting = EXPECTING;
     }
 
     /// The estimate: coefficients of arriving radiance, cd/m²; zero before the first update.
@@ -218,10 +229,6 @@ impl Mean {
         }
         self.q = (1.0 - w).powi(2) * self.q + w * w / n;
         self.samples = n / w;
-    }
-
-    fn forget(&mut self, factor: f32) {
-        self.samples *= factor;
     }
 
     /// Whether another mean of the same updates lies further away than chance explains.
@@ -386,6 +393,29 @@ mod tests {
         }
     }
 
+    #[test]
+    fn expected_changes_are_followed_sooner() {
+        let settings = BlendSettings::default();
+        let after = |expected: bool| {
+            let answers = (0..100).map(|receiver| {
+                let mut history = History::new(settings, 1, Order::L2);
+                (0..400).for_each(|t| history.update(&[sums(10.0, 1.0, receiver * 2000 + t)]));
+                if expected {
+                    history.expect_change();
+                }
+                let mut update = |t: u64| {
+                    history.update(&[sums(12.0, 1.0, receiver * 2000 + t)]);
+                    history.coefficients(0)[0].x
+                };
+                (400..1000).take_while(|t| update(*t) < 11.0).count()
+            });
+            let mut answers: Vec<usize> = answers.collect();
+            answers.sort_unstable();
+            answers[50]
+        };
+        assert!(after(true) * 3 <= after(false) * 2, "{} {}", after(true), after(false));
+    }
+
     /// Updates until the error stays below a share of a jump of `jump` standard deviations.
     fn updates_to(share: f32, jump: f32, significance: f32) -> usize {
         let settings = BlendSettings { significance, ..Default::default() };
@@ -420,14 +450,5 @@ mod tests {
         // By the ratio alone: ln 2/0.01 and ln 10/0.01.
         assert!((60..80).contains(&updates_to(0.5, 20.0, f32::INFINITY)));
         assert!((220..240).contains(&updates_to(0.1, 20.0, f32::INFINITY)));
-    }
-
-    #[test]
-    fn forgetting_all_shows_the_next_update() {
-        let mut history = History::new(BlendSettings::default(), 1, Order::L2);
-        (0..50).for_each(|_| history.update(&[sums(1.0, 0.0, 1)]));
-        history.forget(0.0);
-        history.update(&[sums(5.0, 0.0, 1)]);
-        assert!((history.coefficients(0)[0].x - 5.0).abs() < 1e-5);
     }
 }

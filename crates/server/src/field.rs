@@ -87,6 +87,11 @@ impl Field {
         Job { scene, receivers, order: self.volume.order, bounces, clamp, seed }
     }
 
+    /// The scene was edited: light may be another from now on.
+    pub(crate) fn expect_change(&mut self) {
+        self.history.expect_change();
+    }
+
     /// Blends new light into the history and brings up to date what is to be published.
     pub(crate) fn blend(&mut self, gathered: &Gathered) {
         self.history.update(&gathered.sums);

@@ -159,6 +159,9 @@ impl Tick {
         let elapsed = self.last_now.map_or(0.0, |last| (now - last).clamp(0.0, LONGEST_STEP));
 
         let edits = self.apply_edits(elapsed, mail);
+        if !edits.accepted.is_empty() {
+            self.fields.iter_mut().for_each(Field::expect_change);
+        }
         report.seconds[Stage::Edits as usize] = watch.lap();
 
         self.scene.advance(elapsed);

@@ -166,6 +166,70 @@ describe('the page', () => {
     }
   }, 90_000);
 
+  it('moves a sphere by its gizmo and aims the flashlight, for every page', async () => {
+    const second = await openPage(browser, server.address, VIEWPORT);
+    try {
+      const place = (on: Page, name: string): Promise<number[]> =>
+        on.evaluate((name) => {
+          const { scene, viewer } = window.lumencast!;
+          viewer.draw();
+          const object = scene.getObjectByName(name)!;
+          return [...object.position.toArray(), ...object.quaternion.toArray()] as number[];
+        }, name);
+      const apart = (a: number[], b: number[]) => Math.hypot(...a.map((value, i) => value - b[i]));
+      // The page draws when asked to: each gesture needs pictures, as a hand would see them.
+      const gesture = async (...steps: (() => Promise<unknown>)[]) => {
+        for (const step of steps) {
+          await step();
+          await page.evaluate(() => window.lumencast!.viewer.draw());
+          await page.waitForTimeout(60);
+        }
+      };
+      const seenBySecond = async (name: string, from: number[]) => {
+        await expect
+          .poll(async () => apart(await place(second, name), from), { timeout: 5000 })
+          .toBeGreaterThan(0.02);
+        // What the hand's page shows is what the others get.
+        await expect
+          .poll(async () => apart(await place(second, name), await place(page, name)), { timeout: 5000 })
+          .toBeLessThan(1e-3);
+      };
+
+      // The server that was restarted plays again.
+      await page.evaluate(() =>
+        window.lumencast!.light.edit({ edit: 'set_animation', animation: 0, playing: false }),
+      );
+      const sphere = await place(page, 'sphere');
+      const [x, y] = await page.evaluate(() => {
+        const { scene, camera } = window.lumencast!;
+        const sphere = scene.getObjectByName('sphere')!;
+        const at = sphere.getWorldPosition(sphere.position.clone()).project(camera);
+        return [((at.x + 1) / 2) * innerWidth, ((1 - at.y) / 2) * innerHeight];
+      });
+      const { mouse } = page;
+      await gesture(
+        () => mouse.click(x, y),
+        () => mouse.move(x, y),
+        () => mouse.down(),
+        () => mouse.move(x + 10, y),
+        () => mouse.move(x + 30, y),
+        () => mouse.up(),
+      );
+      await seenBySecond('sphere', sphere);
+
+      const lamp = await place(page, 'lamp');
+      await gesture(
+        () => page.click('[title^="Take the flashlight"]'),
+        () => mouse.move(120, 150),
+        () => mouse.move(160, 170),
+      );
+      await seenBySecond('lamp', lamp);
+      await gesture(() => page.click('[title^="Take the flashlight"]'));
+    } finally {
+      await second.close();
+    }
+  }, 90_000);
+
   it('says so when there is no server', async () => {
     const lonely = await browser.newPage();
     await lonely.route('**/lumencast.json', (route) => route.abort());

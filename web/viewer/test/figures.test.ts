@@ -57,7 +57,7 @@ describe('the delay from the end of a tick to the update in a page', () => {
           .map(({ tick, decoded }) => decoded - ended.get(tick)!);
         expect(delays.length).toBeGreaterThan(500);
         figures[`delay_ms_${transport}`] = { updates: delays.length, ...summary(delays) };
-      await page.close();
+        await page.close();
       } finally {
         await server.kill();
       }
@@ -77,7 +77,7 @@ describe('the time from a moved sun to 95 % of its new light', () => {
         const followed = [];
         for (const degrees of [40, -40, 25]) followed.push(await page.evaluate(turnSun, degrees));
         figures.sun = followed;
-      await page.close();
+        await page.close();
         for (const { toShare } of followed) expect(toShare['0.95']).toBeLessThan(30_000);
       } finally {
         await server.kill();
