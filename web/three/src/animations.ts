@@ -42,11 +42,15 @@ export class Animations {
     return clock && { playing: clock.playing, time: clock.time, speed: clock.speed };
   }
 
-  /** Plays, pauses, seeks; `now` is the server's scene time at which this holds. */
+  /**
+   * Plays, pauses, seeks; `now` is the server's scene time at which this holds. What the animation
+   * moves is put there at once: edits that follow may move it on.
+   */
   set(animation: number, change: Playback, now: number): void {
     const playing = this.#get(animation);
-    if (playing)
-      playing.clock = { ...playing.clock, time: timeAt(playing.clock, now), since: now, ...change };
+    if (!playing) return;
+    playing.clock = { ...playing.clock, time: timeAt(playing.clock, now), since: now, ...change };
+    pose(playing, now);
   }
 
   /** Moves the scene to a time; true when something moved. */
@@ -54,14 +58,7 @@ export class Animations {
     let moved = false;
     for (const animation of this.content.animations.keys()) {
       const playing = this.#get(animation);
-      if (!playing) continue;
-      for (const copy of playing.copies) {
-        const time = wrap(timeAt(playing.clock, now), copy.of.clip.duration);
-        if (time === copy.shown) continue;
-        copy.shown = copy.action.time = time;
-        copy.mixer.update(0);
-        moved = true;
-      }
+      if (playing && pose(playing, now)) moved = true;
     }
     return moved;
   }
@@ -80,6 +77,19 @@ export class Animations {
     for (const source of sources.slice(playing.copies.length)) playing.copies.push(start(source));
     return playing;
   }
+}
+
+/** Puts an animation's nodes where it has them at a scene time; true when that moves any. */
+function pose({ copies, clock }: Playing, now: number): boolean {
+  let moved = false;
+  for (const copy of copies) {
+    const time = wrap(timeAt(clock, now), copy.of.clip.duration);
+    if (time === copy.shown) continue;
+    copy.shown = copy.action.time = time;
+    copy.mixer.update(0);
+    moved = true;
+  }
+  return moved;
 }
 
 /** An animation's own time, not wrapped, at a scene time. */

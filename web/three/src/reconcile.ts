@@ -75,8 +75,10 @@ export class Reconciler {
   /** Starts again from the file's state, with a snapshot's edits; own pending values stay shown. */
   restart(edits: readonly Edit[]): void {
     for (const [key, value] of this.#initial) this.#accepted.set(key, value);
+    // In the edits' order: a node is moved after the animation that stands has placed it.
     for (const { key, value } of edits.flatMap(assignments)) {
       this.#remember(key);
+      this.#accepted.delete(key);
       this.#accepted.set(key, value);
     }
     for (const key of this.#accepted.keys()) this.#show(key);

@@ -159,6 +159,31 @@ describe('Replica', () => {
   });
 });
 
+describe('a node that an edit moves after its animation was stopped', () => {
+  const edits: Edit[] = [
+    { edit: 'set_animation', animation: 0, playing: false, time: 1 },
+    { edit: 'move_node', node: 0, translation: [5, 6, 7] },
+  ];
+
+  it('stays there, with no picture drawn in between', () => {
+    const { gltf, mesh } = file();
+    const replica = replicaOf(gltf);
+    replica.update(0.5);
+    for (const edit of edits) replica.applyAccepted(edit, false);
+    replica.update(0.6);
+    expect(mesh.position.toArray()).toEqual([5, 6, 7]);
+  });
+
+  it('stays there after a snapshot, whatever was known of the node before', () => {
+    const { gltf, mesh } = file();
+    const replica = replicaOf(gltf);
+    replica.applyAccepted({ edit: 'move_node', node: 0, translation: [9, 9, 9] }, false);
+    replica.applySnapshot(edits);
+    replica.update(0.6);
+    expect(mesh.position.toArray()).toEqual([5, 6, 7]);
+  });
+});
+
 describe('the time of an animation', () => {
   it('runs, stands and goes backwards', () => {
     expect(timeAt({ playing: true, time: 1, speed: 2, since: 10 }, 11)).toBe(3);
