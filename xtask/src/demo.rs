@@ -3,7 +3,7 @@
 use anyhow::Result;
 use clap::Args;
 
-use crate::run::{cargo, command, npm, step, target_dir};
+use crate::run::{build_release, command, step};
 use crate::setup::{self, Purpose};
 
 /// Options of `cargo xtask demo`.
@@ -20,10 +20,7 @@ pub(crate) struct Demo {
 impl Demo {
     pub(crate) fn run(&self) -> Result<()> {
         setup::install(Purpose::Demo)?;
-        step("web packages", npm(&["ci", "--no-audit", "--no-fund"]))?;
-        step("the page", npm(&["run", "build"]))?;
-        step("the server", cargo(&["build", "--release", "-p", "lumencast-cli"]))?;
-        let program = target_dir().join("release/lumencast");
+        let program = build_release()?;
         let mut serve = command(&program.to_string_lossy(), &["serve", &self.scene]);
         serve.args(&self.serve);
         // Relative paths are meant from where the user stands.

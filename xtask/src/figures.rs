@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde_json::{Map, Value, json};
 
-use crate::run::{cargo, command, npm, output, root, step, target_dir};
+use crate::run::{build_release, command, npm, output, root, step, target_dir};
 use crate::setup::{self, Purpose};
 
 /// Options of `cargo xtask figures`.
@@ -39,10 +39,7 @@ const MINUTE: &str = "--edits=benches/minute.jsonl";
 impl Figures {
     pub(crate) fn run(&self) -> Result<()> {
         setup::install(Purpose::Test)?;
-        step("web packages", npm(&["ci", "--no-audit", "--no-fund"]))?;
-        step("the page", npm(&["run", "build"]))?;
-        step("the program", cargo(&["build", "--release", "-p", "lumencast-cli"]))?;
-        let program = target_dir().join("release/lumencast");
+        let program = build_release()?;
         let has_sponza = root().join(&self.sponza).is_file();
 
         let mut ticks = Map::new();

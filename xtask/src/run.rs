@@ -55,6 +55,14 @@ pub(crate) fn step(title: &str, mut command: Command) -> Result<()> {
     Ok(())
 }
 
+/// Builds the page and, with it inside, the release program; returns the program's path.
+pub(crate) fn build_release() -> Result<PathBuf> {
+    step("web packages", npm(&["ci", "--no-audit", "--no-fund"]))?;
+    step("the page", npm(&["run", "build"]))?;
+    step("the program", cargo(&["build", "--release", "-p", "lumencast-cli"]))?;
+    Ok(target_dir().join("release/lumencast"))
+}
+
 /// What a program prints on its standard output, or `None` when it can't be run or fails.
 pub(crate) fn output(program: &str, args: &[&str]) -> Option<String> {
     let output = Command::new(program).args(args).output().ok()?;

@@ -2,23 +2,23 @@
  * What both renderers really draw, in a headless browser, against closed forms. Skipped, in words,
  * where there is no Chromium.
  */
-import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
-import { type Browser, chromium, type Page } from 'playwright-core';
+import type { Browser, Page } from 'playwright-core';
 import { build, preview, type PreviewServer } from 'vite';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import { chromiumProgram, launchBrowser } from '../../testing/chromium.js';
 import { distanceAttenuation, spotAttenuation } from '../src/falloff.js';
 
-const browserProgram = [process.env.CHROMIUM, '/usr/bin/chromium'].find((path) => path && existsSync(path));
-if (!browserProgram) console.log('skipped: no Chromium');
+if (!chromiumProgram) console.log('skipped: no Chromium');
 
 const SIZE = 64;
 /** World x of a pixel of the floor's middle row; its z is half a pixel off the axis. */
 const worldX = (pixel: number) => ((pixel + 0.5) / SIZE) * 4 - 2;
 const HALF_PIXEL = 2 / SIZE;
 
-describe.skipIf(!browserProgram)('drawn by', () => {
+describe.skipIf(!chromiumProgram)('drawn by', () => {
   let folder: string;
   let vite: PreviewServer;
   let browser: Browser;
@@ -47,19 +47,7 @@ describe.skipIf(!browserProgram)('drawn by', () => {
       build: { outDir: folder },
       preview: { host: '127.0.0.1', port: 0 },
     });
-    browser = await chromium.launch({
-      executablePath: browserProgram!,
-      args: [
-        '--headless=new',
-        '--no-sandbox',
-        '--enable-unsafe-webgpu',
-        '--use-webgpu-adapter=swiftshader',
-        '--enable-features=Vulkan',
-        '--use-vulkan=swiftshader',
-        '--use-angle=swiftshader',
-        '--enable-unsafe-swiftshader',
-      ],
-    });
+    browser = await launchBrowser();
     page = await browser.newPage();
     page.on('pageerror', (error) => console.error(error));
     await page.goto(vite.resolvedUrls!.local[0]);

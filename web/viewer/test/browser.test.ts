@@ -10,7 +10,8 @@ import { join, resolve } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { build } from 'vite';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { launchBrowser, openPage } from './browser.js';
+import { launchBrowser } from '../../testing/chromium.js';
+import { openPage } from './browser.js';
 import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
 
 /** Small: every pixel is drawn by the processor. */

@@ -1,29 +1,4 @@
-import { type Browser, chromium, type Page } from 'playwright-core';
-import { firstThatExists } from './server.js';
-
-/** WebGL and WebGPU drawn by the processor. */
-const FLAGS = [
-  '--headless=new',
-  '--no-sandbox',
-  '--enable-unsafe-webgpu',
-  '--use-webgpu-adapter=swiftshader',
-  '--enable-features=Vulkan',
-  '--use-vulkan=swiftshader',
-  '--use-angle=swiftshader',
-  '--enable-unsafe-swiftshader',
-  // Containers have little of it.
-  '--disable-dev-shm-usage',
-];
-
-/** A browser to drive: what the environment says, else the system's Chromium. */
-export function launchBrowser(): Promise<Browser> {
-  const executablePath = firstThatExists('Chromium', [
-    process.env.CHROMIUM,
-    '/usr/bin/chromium',
-    '/usr/bin/google-chrome',
-  ]);
-  return chromium.launch({ executablePath, headless: true, args: FLAGS });
-}
+import type { Browser, Page } from 'playwright-core';
 
 /**
  * Opens the page and waits for its first light, at a fixed exposure. From then on it draws when asked

@@ -11,7 +11,8 @@ import { writeFileSync } from 'node:fs';
 import { cpus } from 'node:os';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { launchBrowser, openPage } from './browser.js';
+import { launchBrowser } from '../../testing/chromium.js';
+import { openPage } from './browser.js';
 import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
 
 const VIEWPORT = { width: 400, height: 300 };

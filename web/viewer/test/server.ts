@@ -8,16 +8,13 @@ const ROOT = resolve(import.meta.dirname, '../../..');
 /** The program under test: what the environment says, else what cargo has built. */
 export function lumencastProgram(): string {
   const target = process.env.CARGO_TARGET_DIR ?? resolve(ROOT, 'target');
-  return firstThatExists('lumencast (cargo build -p lumencast-cli)', [
-    process.env.LUMENCAST_BIN,
-    resolve(target, 'debug/lumencast'),
-  ]);
-}
-
-/** Of some paths, the first that there is. */
-export function firstThatExists(what: string, paths: readonly (string | undefined)[]): string {
+  const paths = [process.env.LUMENCAST_BIN, resolve(target, 'debug/lumencast')];
   const found = paths.find((path) => path && existsSync(path));
-  if (!found) throw new Error(`the test needs ${what}; looked for ${paths.filter(Boolean).join(', ')}`);
+  if (!found) {
+    throw new Error(
+      `the test needs lumencast (cargo build -p lumencast-cli); looked for ${paths.filter(Boolean).join(', ')}`,
+    );
+  }
   return found;
 }
 
