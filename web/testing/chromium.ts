@@ -21,7 +21,7 @@ export const chromiumProgram = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr
 );
 
 /** Starts {@link chromiumProgram}; an error where there is none. */
-export function launchBrowser(): Promise<Browser> {
+export function launchBrowser(...flags: string[]): Promise<Browser> {
   if (!chromiumProgram) throw new Error('the test needs Chromium; CHROMIUM names another place for it');
-  return chromium.launch({ executablePath: chromiumProgram, headless: true, args: FLAGS });
+  return chromium.launch({ executablePath: chromiumProgram, headless: true, args: [...FLAGS, ...flags] });
 }

@@ -62,6 +62,13 @@ const PACKAGES: &[Package] = &[
         present: || runs("chromium", "--version"),
     },
     Package {
+        name: "openssl",
+        release: Release::Stable,
+        purpose: Purpose::Test,
+        why: "makes the certificate of the browser test",
+        present: || runs("openssl", "version"),
+    },
+    Package {
         name: "mesa-vulkan-drivers",
         release: Release::Backports,
         purpose: Purpose::Test,

@@ -1,5 +1,6 @@
 //! `lumencast doctor`: what this machine offers, and what is missing for what.
 
+use std::ffi::OsStr;
 use std::net::{Ipv4Addr, TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -13,7 +14,7 @@ use serde_json::{Value, json};
 use crate::arguments::DEFAULT_PORT;
 use crate::output;
 
-/// Says what this machine offers: system, processor, Vulkan drivers, port, programs.
+/// Says what this machine offers: system, processor, drivers, adapters, port, programs.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -22,6 +23,9 @@ pub(crate) struct Doctor {
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
+    /// Prints the adapters only, as JSON: what `doctor` runs in a process of its own.
+    #[arg(long, hide = true)]
+    adapters: bool,
 }
 
 /// Programs that building and testing need, with what for.
@@ -39,12 +43,16 @@ const PATIENCE: Duration = Duration::from_secs(10);
 
 impl Doctor {
     pub(crate) fn run(self) -> Result<()> {
+        if self.adapters {
+            return output::json(&json!(enumerate_adapters()?));
+        }
         let report = json!({
             "lumencast": env!("CARGO_PKG_VERSION"),
             "page": lumencast_server::page_is_embedded(),
             "system": system(),
             "processor": processor(),
-            "vulkan": vulkan(),
+            "drivers": vulkan_drivers(),
+            "adapters": adapters(),
             "port": port(),
             "programs": programs(),
         });
@@ -76,20 +84,33 @@ fn print_report(report: &Value) {
         if yes("/processor/fma") { "yes" } else { "no" },
     );
     println!("memory      {} GiB", text("/system/memory_gib"));
-    let drivers = report.pointer("/vulkan/drivers").and_then(Value::as_array);
-    match drivers.filter(|d| !d.is_empty()) {
-        None => println!("Vulkan      no driver; light is computed on the processor without one"),
-        Some(drivers) => drivers.iter().for_each(|d| {
-            println!("Vulkan      {}", d.as_str().unwrap_or_default());
-        }),
+    for driver in report["drivers"].as_array().into_iter().flatten() {
+        println!("driver      {}", driver.as_str().unwrap_or_default());
     }
-    println!("Mesa        {}", text("/vulkan/mesa"));
+    match report["adapters"].as_array().map(Vec::as_slice) {
+        None => println!("adapter     unknown: a driver crashed or did not answer"),
+        Some([]) => println!("adapter     none; light is computed on the processor without one"),
+        Some(adapters) => adapters.iter().for_each(print_adapter),
+    }
     println!("port {DEFAULT_PORT}   {}", text("/port/state"));
     for program in report["programs"].as_array().into_iter().flatten() {
         let version = program["version"].as_str().unwrap_or("not found");
         let name = program["name"].as_str().unwrap_or_default();
         println!("{name:<11} {version} ({})", program["purpose"].as_str().unwrap_or_default());
     }
+}
+
+fn print_adapter(adapter: &Value) {
+    let text = |key: &str| adapter[key].as_str().unwrap_or_default();
+    println!(
+        "adapter     {} ({}, {}, driver {} {}), ray query {}",
+        text("name"),
+        text("kind"),
+        text("backend"),
+        text("driver"),
+        text("driver_version"),
+        if adapter["ray_query"] == true { "yes" } else { "no" },
+    );
 }
 
 fn system() -> Value {
@@ -125,9 +146,8 @@ fn processor() -> Value {
     json!({ "name": name, "cores": cores, "avx2": avx2, "fma": fma })
 }
 
-/// Driver manifests where the Vulkan loader looks for them, and what `vulkaninfo` says, if it is
-/// installed, of Mesa's version.
-fn vulkan() -> Value {
+/// Driver manifests where the Vulkan loader looks for them.
+fn vulkan_drivers() -> Vec<PathBuf> {
     let mut drivers: Vec<PathBuf> = match env::var_os("VK_DRIVER_FILES") {
         Some(files) => env::split_paths(&files).collect(),
         None => ["/etc", "/usr/local/share", "/usr/share"]
@@ -139,11 +159,46 @@ fn vulkan() -> Value {
             .collect(),
     };
     drivers.sort();
-    let mesa = first_output("vulkaninfo", "--summary").and_then(|text| {
-        let at = text.find("Mesa ")?;
-        text[at + 5..].split_whitespace().next().map(str::to_owned)
-    });
-    json!({ "drivers": drivers, "mesa": mesa })
+    drivers
+}
+
+/// The adapters, asked for in a process of its own: a broken driver may crash or hang, and to say
+/// so is what this command is for. Null then.
+fn adapters() -> Value {
+    let program = env::current_exe().unwrap_or_else(|_| PathBuf::from("lumencast"));
+    first_output(program, &["doctor", "--adapters"])
+        .and_then(|text| serde_json::from_str(&text).ok())
+        .unwrap_or(Value::Null)
+}
+
+/// Every adapter of the platform's own interfaces (Vulkan, Metal, Direct3D 12).
+fn enumerate_adapters() -> Result<Vec<Value>> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapters = tokio::runtime::Builder::new_current_thread()
+        .build()?
+        .block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    Ok(adapters.iter().map(describe_adapter).collect())
+}
+
+fn describe_adapter(adapter: &wgpu::Adapter) -> Value {
+    let info = adapter.get_info();
+    let kind = match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+        wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+        wgpu::DeviceType::VirtualGpu => "virtual GPU",
+        wgpu::DeviceType::Cpu => "software",
+        wgpu::DeviceType::Other => "other",
+    };
+    json!({
+        "name": info.name,
+        "kind": kind,
+        "backend": info.backend.to_str(),
+        "driver": info.driver,
+        "driver_version": info.driver_info,
+        "ray_query": adapter.features().contains(wgpu::Features::EXPERIMENTAL_RAY_QUERY),
+        "timestamps": adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY),
+        "largest_buffer_bytes": adapter.limits().max_buffer_size,
+    })
 }
 
 /// Whether the default port is free, for HTTP (TCP) and for QUIC (UDP).
@@ -162,7 +217,7 @@ fn programs() -> Vec<Value> {
     PROGRAMS
         .iter()
         .map(|&(name, argument, purpose)| {
-            let version = first_output(name, argument)
+            let version = first_output(name, &[argument])
                 .and_then(|text| text.lines().next().map(|line| line.trim().to_owned()));
             json!({ "name": name, "version": version, "purpose": purpose })
         })
@@ -170,9 +225,9 @@ fn programs() -> Vec<Value> {
 }
 
 /// What a program prints, if there is such a program and it ends well in time.
-fn first_output(program: &str, argument: &str) -> Option<String> {
+fn first_output(program: impl AsRef<OsStr>, arguments: &[&str]) -> Option<String> {
     let mut child = Command::new(program)
-        .arg(argument)
+        .args(arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Folder, run};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 #[test]
 fn help_shows_examples_and_the_version_is_told() {
@@ -100,6 +100,12 @@ fn doctor_prints_json_only() {
     let report = ran.json();
     assert!(report["processor"]["cores"].as_u64().is_some_and(|n| n > 0));
     assert!(report["programs"].as_array().is_some_and(|p| !p.is_empty()));
+    // Set-up installs a software adapter at least.
+    for adapter in report["adapters"].as_array().expect("adapters") {
+        assert!(adapter["name"].as_str().is_some_and(|name| !name.is_empty()), "{adapter}");
+        assert!(adapter["largest_buffer_bytes"].as_u64().is_some_and(|n| n > 0), "{adapter}");
+    }
+    assert_ne!(report["adapters"], json!([]), "cargo xtask setup installs a software adapter");
     assert!(run(&["doctor"]).stdout.contains("processor"));
 }
 

@@ -152,7 +152,9 @@ class LiveSession implements Session, Sink {
       const limit = AbortSignal.any([this.ending.signal, AbortSignal.timeout(ATTEMPT)]);
       link = await this.connector(this.target, limit);
     } catch (error) {
-      return `no answer from ${this.origin} (${describe(error)})`;
+      // Browsers do not tell a page whether it was refused or nobody was there.
+      const hint = this.target.token ? '; the token may be wrong or have expired' : '';
+      return `no answer from ${this.origin} (${describe(error)})${hint}`;
     }
     if (this.ending.signal.aborted) {
       link.close();

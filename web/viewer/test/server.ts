@@ -38,6 +38,9 @@ export function freePort(): Promise<number> {
 
 /** A running `lumencast serve`, of which only this process is ever killed. */
 export class Server {
+  /** Where its page is, by its own words. */
+  address = '';
+
   private constructor(
     private readonly process: ChildProcess,
     readonly port: number,
@@ -59,12 +62,8 @@ export class Server {
     child.stdout.on('data', (chunk: Buffer) => said.push(chunk.toString()));
     child.stderr.on('data', (chunk: Buffer) => said.push(chunk.toString()));
     const server = new Server(child, port, said);
-    await server.#healthy();
+    await server.#ready();
     return server;
-  }
-
-  get address(): string {
-    return `http://127.0.0.1:${this.port}`;
   }
 
   /** What it has written so far. */
@@ -80,11 +79,11 @@ export class Server {
     await gone;
   }
 
-  async #healthy(): Promise<void> {
+  async #ready(): Promise<void> {
     for (const start = Date.now(); Date.now() - start < 90_000;) {
       if (this.process.exitCode !== null) break;
-      const answer = await fetch(`${this.address}/healthz`).catch(() => undefined);
-      if (answer?.ok) return;
+      this.address = /^(https?:\/\/\S+)\/$/m.exec(this.output)?.[1] ?? '';
+      if (this.address) return;
       await new Promise((resolve) => setTimeout(resolve, 100));
     }
     await this.kill();
