@@ -24,13 +24,14 @@ pub(super) struct Item {
 #[derive(Debug)]
 pub(super) enum Tree<'a> {
     Leaf(Aabb, &'a [Item]),
-    Inner(Aabb, Box<[Tree<'a>; 2]>),
+    /// The last is for [`super::wide::collapse`].
+    Inner(Aabb, Box<[Tree<'a>; 2]>, [u8; 8]),
 }
 
 impl Tree<'_> {
     pub(super) fn bounds(&self) -> Aabb {
         match self {
-            Self::Leaf(bounds, _) | Self::Inner(bounds, _) => *bounds,
+            Self::Leaf(bounds, _) | Self::Inner(bounds, ..) => *bounds,
         }
     }
 }
@@ -56,7 +57,7 @@ fn split(items: &mut [Item], leaf: usize, depth: u32) -> Tree<'_> {
     } else {
         (split(left, leaf, depth + 1), split(right, leaf, depth + 1))
     };
-    Tree::Inner(bounds, Box::new([children.0, children.1]))
+    Tree::Inner(bounds, Box::new([children.0, children.1]), [0; 8])
 }
 
 /// Items whose centre lies in bins below `bin` go left.

@@ -1,14 +1,15 @@
-//! Eight boxes, or eight triangles, at a time with AVX2 and FMA; see [`super::kernel`].
+//! Eight boxes, or four triangles, at a time with AVX2 and FMA; see [`super::kernel`].
 
 use std::arch::x86_64::{
-    __m256, _CMP_GE_OQ, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_NEQ_OQ, _mm256_add_ps, _mm256_and_ps,
-    _mm256_cmp_ps, _mm256_div_ps, _mm256_fmadd_ps, _mm256_fnmadd_ps, _mm256_max_ps, _mm256_min_ps,
-    _mm256_movemask_ps, _mm256_mul_ps, _mm256_or_ps, _mm256_set1_ps, _mm256_setzero_ps,
-    _mm256_sub_ps,
+    __m128, __m256, _CMP_LE_OQ, _mm_add_ps, _mm_and_ps, _mm_cmpge_ps, _mm_cmpgt_ps, _mm_cmple_ps,
+    _mm_cmpneq_ps, _mm_div_ps, _mm_fmadd_ps, _mm_fnmadd_ps, _mm_max_ps, _mm_min_ps,
+    _mm_movemask_ps, _mm_mul_ps, _mm_or_ps, _mm_set1_ps, _mm_setzero_ps, _mm_sub_ps, _mm256_cmp_ps,
+    _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_set1_ps,
+    _mm256_setzero_ps, _mm256_sub_ps,
 };
 
 use super::kernel::{BoxHits, Setup, Stack, TriangleHits, WIDEN, trace_with};
-use super::mesh_bvh::Block;
+use super::mesh_bvh::{Block, LANES};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
 
@@ -41,8 +42,8 @@ fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
         let origin = _mm256_set1_ps(ray.origin[axis]);
         let inverse = _mm256_set1_ps(ray.inverse[axis]);
         let widened = _mm256_set1_ps(ray.inverse[axis] * WIDEN);
-        let t_near = _mm256_mul_ps(_mm256_sub_ps(load(&node.planes[near]), origin), inverse);
-        let t_far = _mm256_mul_ps(_mm256_sub_ps(load(&node.planes[far]), origin), widened);
+        let t_near = _mm256_mul_ps(_mm256_sub_ps(load8(&node.planes[near]), origin), inverse);
+        let t_far = _mm256_mul_ps(_mm256_sub_ps(load8(&node.planes[far]), origin), widened);
         enter = _mm256_max_ps(t_near, enter);
         leave = _mm256_min_ps(t_far, leave);
     }
@@ -59,54 +60,57 @@ fn triangles(block: &Block, ray: &Setup, t_max: f32) -> TriangleHits {
     let u = cross(c, b);
     let v = cross(a, c);
     let w = cross(b, a);
-    let zero = _mm256_setzero_ps();
-    let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
-    let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
-    let inside = _mm256_or_ps(
-        _mm256_cmp_ps::<_CMP_GE_OQ>(least, zero),
-        _mm256_cmp_ps::<_CMP_LE_OQ>(most, zero),
-    );
-    let sum = _mm256_add_ps(_mm256_add_ps(u, v), w);
-    let inside = _mm256_and_ps(inside, _mm256_cmp_ps::<_CMP_NEQ_OQ>(sum, zero));
-    if _mm256_movemask_ps(inside) == 0 {
-        return TriangleHits { mask: 0, t: [0.0; 8], u: [0.0; 8], v: [0.0; 8] };
+    let zero = _mm_setzero_ps();
+    let least = _mm_min_ps(_mm_min_ps(u, v), w);
+    let most = _mm_max_ps(_mm_max_ps(u, v), w);
+    let inside = _mm_or_ps(_mm_cmpge_ps(least, zero), _mm_cmple_ps(most, zero));
+    let sum = _mm_add_ps(_mm_add_ps(u, v), w);
+    let inside = _mm_and_ps(inside, _mm_cmpneq_ps(sum, zero));
+    if _mm_movemask_ps(inside) == 0 {
+        return TriangleHits { mask: 0, t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES] };
     }
 
-    let scale = _mm256_div_ps(_mm256_set1_ps(1.0), sum);
-    let z = _mm256_fmadd_ps(u, a[2], _mm256_fmadd_ps(v, b[2], _mm256_mul_ps(w, c[2])));
-    let t = _mm256_mul_ps(_mm256_mul_ps(z, _mm256_set1_ps(ray.shear[2])), scale);
-    let before = _mm256_cmp_ps::<_CMP_LE_OQ>(t, _mm256_set1_ps(t_max));
-    let ahead = _mm256_cmp_ps::<_CMP_GT_OQ>(t, zero);
+    let scale = _mm_div_ps(_mm_set1_ps(1.0), sum);
+    let z = _mm_fmadd_ps(u, a[2], _mm_fmadd_ps(v, b[2], _mm_mul_ps(w, c[2])));
+    let t = _mm_mul_ps(_mm_mul_ps(z, _mm_set1_ps(ray.shear[2])), scale);
+    let before = _mm_cmple_ps(t, _mm_set1_ps(t_max));
+    let ahead = _mm_cmpgt_ps(t, zero);
     TriangleHits {
-        mask: _mm256_movemask_ps(_mm256_and_ps(inside, _mm256_and_ps(before, ahead))) as u32,
+        mask: _mm_movemask_ps(_mm_and_ps(inside, _mm_and_ps(before, ahead))) as u32,
         t: bytemuck::cast(t),
-        u: bytemuck::cast(_mm256_mul_ps(v, scale)),
-        v: bytemuck::cast(_mm256_mul_ps(w, scale)),
+        u: bytemuck::cast(_mm_mul_ps(v, scale)),
+        v: bytemuck::cast(_mm_mul_ps(w, scale)),
     }
 }
 
 /// Sheared x and y, and z, of a corner of each triangle.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn corner(block: &Block, vertex: usize, ray: &Setup) -> [__m256; 3] {
+fn corner(block: &Block, vertex: usize, ray: &Setup) -> [__m128; 3] {
     let at = |k: usize| {
         let axis = ray.axes[k];
-        _mm256_sub_ps(load(&block.corners[vertex][axis]), _mm256_set1_ps(ray.origin[axis]))
+        _mm_sub_ps(load4(&block.corners[vertex][axis]), _mm_set1_ps(ray.origin[axis]))
     };
     let z = at(2);
-    let sheared = |k: usize| _mm256_fnmadd_ps(_mm256_set1_ps(ray.shear[k]), z, at(k));
+    let sheared = |k: usize| _mm_fnmadd_ps(_mm_set1_ps(ray.shear[k]), z, at(k));
     [sheared(0), sheared(1), z]
 }
 
 /// Of x and y. Not fused: swapping `a` and `b` must give the exact negative.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn cross(a: [__m256; 3], b: [__m256; 3]) -> __m256 {
-    _mm256_sub_ps(_mm256_mul_ps(a[0], b[1]), _mm256_mul_ps(a[1], b[0]))
+fn cross(a: [__m128; 3], b: [__m128; 3]) -> __m128 {
+    _mm_sub_ps(_mm_mul_ps(a[0], b[1]), _mm_mul_ps(a[1], b[0]))
 }
 
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn load(lanes: &[f32; 8]) -> __m256 {
+fn load4(lanes: &[f32; LANES]) -> __m128 {
+    bytemuck::cast(*lanes)
+}
+
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn load8(lanes: &[f32; 8]) -> __m256 {
     bytemuck::cast(*lanes)
 }

@@ -16,6 +16,7 @@ mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_avx2;
 mod mesh_bvh;
+mod pages;
 #[cfg(test)]
 mod tests;
 mod wide;

@@ -1,5 +1,7 @@
 //! Nodes of eight children, laid out so that one instruction tests all eight.
 
+use bytemuck::{Pod, Zeroable};
+
 use super::Aabb;
 use super::build::{Item, Tree, tree};
 
@@ -7,13 +9,14 @@ use super::build::{Item, Tree, tree};
 pub(super) const LEAF: u32 = 1 << 31;
 
 /// Eight boxes and what they contain: 224 bytes, padded to four cache lines.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Node {
     /// min x, y, z, max x, y, z of the children; (∞, −∞) where there is none.
     pub(super) planes: [[f32; 8]; 6],
     /// Index of a node, or [`LEAF`] and the index of a leaf.
     pub(super) child: [u32; 8],
+    unused: [u32; 8],
 }
 
 impl Node {
@@ -27,6 +30,7 @@ impl Node {
             [f32::NEG_INFINITY; 8],
         ],
         child: [LEAF; 8],
+        unused: [0; 8],
     };
 
     pub(super) fn set_bounds(&mut self, lane: usize, bounds: Aabb) {
@@ -62,10 +66,51 @@ impl Node {
 
 /// Collapses a binary tree; `leaf` stores a leaf's items and returns its index. Parents come before
 /// their children; the root is node 0.
-pub(super) fn collapse(root: &Tree<'_>, leaf: &mut impl FnMut(&[Item]) -> u32) -> Vec<Node> {
+///
+/// Which inner nodes vanish is chosen so that the expected cost of a ray is least, by dynamic
+/// programming over the tree (Ylitie, Karras and Laine 2017, "Efficient incoherent ray traversal on
+/// GPUs through compressed wide BVHs", section 3.2).
+pub(super) fn collapse(root: &mut Tree<'_>, leaf: &mut impl FnMut(&[Item]) -> u32) -> Vec<Node> {
+    plan(root);
     let mut nodes = Vec::new();
     emit(root, &mut nodes, leaf);
     nodes
+}
+
+/// Cost of visiting a node, of visiting a leaf: one.
+const NODE_COST: f32 = 1.0;
+
+/// Least cost of a subtree as a forest of at most 1, 2, … 8 children. Notes at every inner node how
+/// many of them go to its left side.
+fn plan(tree: &mut Tree<'_>) -> [f32; 8] {
+    let area = tree.bounds().half_area();
+    let Tree::Inner(_, pair, cut) = tree else { return [area; 8] };
+    let [left, right] = &mut **pair;
+    let (left, right) = (plan(left), plan(right));
+    let mut costs = [0.0; 8];
+    for roots in 2..=8 {
+        // The first that is cheapest.
+        let (mut best, mut least) = (1, f32::INFINITY);
+        for k in 1..roots {
+            let cost = left[k - 1] + right[roots - k - 1];
+            if cost < least {
+                (best, least) = (k, cost);
+            }
+        }
+        costs[roots - 1] = least;
+        cut[roots - 1] = best as u8;
+    }
+    // As one child: a node of its own, with eight.
+    costs[0] = NODE_COST * area + costs[7];
+    for roots in 2..=8 {
+        if costs[roots - 2] <= costs[roots - 1] {
+            costs[roots - 1] = costs[roots - 2];
+            if roots < 8 {
+                cut[roots - 1] = 0;
+            }
+        }
+    }
+    costs
 }
 
 fn emit<'a>(
@@ -76,7 +121,17 @@ fn emit<'a>(
     let index = nodes.len();
     nodes.push(Node::EMPTY);
     let mut node = Node::EMPTY;
-    for (lane, child) in eight(tree).into_iter().enumerate() {
+    let mut children = Vec::with_capacity(8);
+    match tree {
+        Tree::Leaf(_, []) => {}
+        Tree::Leaf(..) => children.push(tree),
+        Tree::Inner(_, pair, cut) => {
+            let k = usize::from(cut[7]);
+            open(&pair[0], k, &mut children);
+            open(&pair[1], 8 - k, &mut children);
+        }
+    }
+    for (lane, child) in children.into_iter().enumerate() {
         node.set_bounds(lane, child.bounds());
         node.child[lane] = match child {
             Tree::Leaf(_, items) => LEAF | leaf(items),
@@ -87,31 +142,25 @@ fn emit<'a>(
     index as u32
 }
 
-/// Opens the largest child until there are eight.
-fn eight<'a>(tree: &'a Tree<'a>) -> Vec<&'a Tree<'a>> {
-    let mut children = Vec::with_capacity(8);
+/// The forest of at most `roots` children that [`plan`] chose.
+fn open<'a>(tree: &'a Tree<'a>, roots: usize, children: &mut Vec<&'a Tree<'a>>) {
     match tree {
-        Tree::Leaf(_, []) => {}
-        Tree::Leaf(..) => children.push(tree),
-        Tree::Inner(_, pair) => children.extend(pair.iter()),
+        Tree::Inner(_, pair, cut) if roots > 1 => match usize::from(cut[roots - 1]) {
+            0 => open(tree, roots - 1, children),
+            k => {
+                open(&pair[0], k, children);
+                open(&pair[1], roots - k, children);
+            }
+        },
+        _ => children.push(tree),
     }
-    while children.len() < 8 {
-        let area = |i: usize| children[i].bounds().half_area();
-        let largest = (0..children.len())
-            .filter(|&i| matches!(children[i], Tree::Inner(..)))
-            .max_by(|&a, &b| area(a).total_cmp(&area(b)));
-        let Some(i) = largest else { break };
-        if let Tree::Inner(_, pair) = children.swap_remove(i) {
-            children.extend(pair.iter());
-        }
-    }
-    children
 }
 
 /// A tree over boxes, one a leaf; leaf indices are those of the boxes.
 pub(super) fn over_boxes(boxes: &[Aabb]) -> (Vec<Node>, Aabb) {
     let mut items: Vec<_> =
         (0..).zip(boxes).map(|(index, &bounds)| Item { bounds, index }).collect();
-    let root = tree(&mut items, 1);
-    (collapse(&root, &mut |items| items[0].index), root.bounds())
+    let mut root = tree(&mut items, 1);
+    let nodes = collapse(&mut root, &mut |items| items[0].index);
+    (nodes, root.bounds())
 }
