@@ -7,6 +7,7 @@ mod accel;
 pub mod blend;
 mod bsdf;
 mod lights;
+pub mod measure;
 pub mod path_trace;
 pub mod reference;
 mod sampling;

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use lumencast_scene::{AlphaMode, Instance, Material, Snapshot};
 
 use crate::accel::{Accel, AccelCache, Hit, Kernel, Ray, Stack};
 use crate::lights::environment::{Sky, SkyCache};
 use crate::lights::punctual::Punctual;
-use crate::lights::{Lights, emitters};
+use crate::lights::{AreaSample, Lights, emitters};
 use crate::sampling::{mix2, unit};
 use crate::surface::{Frames, MaterialModel, Point, Triangle};
 
@@ -95,6 +95,39 @@ impl World {
         }
         emitters.finish(&self.snapshot.instances, |i, p| self.material(i, p));
         self.lights.emitters = emitters;
+    }
+
+    /// The acceleration structure alone, for which every surface is whole.
+    pub(crate) fn accel(&self) -> &Accel {
+        &self.accel
+    }
+
+    /// World-space corners of every triangle: instance by instance, primitive by primitive.
+    pub(crate) fn world_triangles(&self) -> Vec<[Vec3; 3]> {
+        let mut triangles = Vec::new();
+        for (instance, frames) in self.snapshot.instances.iter().zip(&self.frames) {
+            for (p, primitive) in (0..).zip(&instance.mesh.primitives) {
+                let count = primitive.triangles.len() as u32;
+                let corners = |t| Triangle::new(instance, p, t).positions();
+                triangles.extend((0..count).map(|t| corners(t).map(|c| frames.position(c))));
+            }
+        }
+        triangles
+    }
+
+    /// Direction (unit) and distance of a source of light, were nothing in between.
+    pub(crate) fn aim(&self, from: Vec3, choice: f32, u: Vec2) -> Option<(Vec3, f32)> {
+        let facing = |_: Vec3| Vec3::ONE;
+        if let Some((incident, _)) = self.lights.punctual.choose(from, choice, facing) {
+            return Some((incident.direction, incident.distance));
+        }
+        match self.lights.sample_area(from, choice, u)? {
+            AreaSample::Sky { direction, .. } => Some((direction, f32::INFINITY)),
+            AreaSample::Emitter(e) => {
+                let to = e.position - from;
+                Some((to.try_normalize()?, to.length()))
+            }
+        }
     }
 
     /// Version of the snapshot.

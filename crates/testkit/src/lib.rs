@@ -1,5 +1,6 @@
 //! Analytic scenes, image metrics, simulated links and planted faults for tests.
 
+pub mod embree;
 mod link;
 pub mod scenes;
 

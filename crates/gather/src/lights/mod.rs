@@ -35,6 +35,12 @@ pub(crate) enum AreaSample {
 }
 
 impl Lights {
+    /// Whether no ray can meet a source: nothing emits, and the environment is black.
+    pub(crate) fn are_punctual(&self) -> bool {
+        self.emitters.is_empty()
+            && matches!(self.sky, Sky::Constant(radiance) if radiance == Vec3::ZERO)
+    }
+
     /// Chance that an area sample is of the environment.
     fn sky_chance(&self) -> f32 {
         match (self.sky.is_sampled(), self.emitters.is_empty()) {

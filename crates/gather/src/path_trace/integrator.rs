@@ -1,8 +1,8 @@
 //! The path integrator: light arriving at a point from a direction.
 //!
 //! Unidirectional, with next-event estimation at every vertex and multiple importance sampling
-//! (Veach 1997) where a source can also be met by chance. Paths all have the same length: no
-//! Russian roulette, so that every sample of a probe costs and counts alike.
+//! (Veach 1997) where a source can also be met by chance. Russian roulette is for pictures with many
+//! bounces only: paths of probes all have the same length, so that every sample counts alike.
 
 use glam::{Mat3, Vec3};
 
@@ -13,14 +13,22 @@ use crate::sampling::{Sampler, luminance, mix2, power_heuristic};
 use crate::surface::{MaterialModel, Point};
 use crate::world::{Itself, World, itself};
 
-/// Follows paths through a world.
-pub(crate) struct Integrator<'a> {
-    pub(crate) world: &'a World,
+/// Which paths to follow.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Paths {
     /// Scattering events on a path.
     pub(crate) bounces: u32,
     /// Upper limit of the luminance that a vertex adds to scattered light, cd/m².
     pub(crate) clamp: f32,
-    pub(crate) stack: Stack,
+    /// Scattering events from which on paths may end by chance.
+    pub(crate) roulette_from: u32,
+}
+
+/// Follows paths through a world.
+pub(crate) struct Integrator<'a> {
+    world: &'a World,
+    paths: Paths,
+    stack: Stack,
     /// Rays traced so far.
     pub(crate) rays: u64,
 }
@@ -28,12 +36,27 @@ pub(crate) struct Integrator<'a> {
 /// What a path found.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seen {
-    /// Arriving radiance, cd/m².
-    pub(crate) radiance: Vec3,
+    /// Radiance, cd/m², of what a client that holds punctual lights draws by itself, had it a camera
+    /// here: sources seen, and punctual lights scattered once.
+    pub(crate) direct: Vec3,
+    /// The rest: all light that a light field would have to bring.
+    pub(crate) indirect: Vec3,
     /// Metres to the first surface; infinite where there is none.
     pub(crate) distance: f32,
     /// The first surface shows a back that nobody is meant to see.
     pub(crate) back: bool,
+}
+
+impl Seen {
+    /// Arriving radiance, cd/m².
+    pub(crate) fn radiance(&self) -> Vec3 {
+        self.direct + self.indirect
+    }
+
+    /// Where light goes that was found `scattered` events away, the last of them not counted.
+    fn part(&mut self, scattered: u32) -> &mut Vec3 {
+        if scattered == 0 { &mut self.direct } else { &mut self.indirect }
+    }
 }
 
 /// The ray in hand, and what is known of how it was chosen.
@@ -45,7 +68,16 @@ struct Segment {
     pdf: f32,
 }
 
-impl Integrator<'_> {
+impl<'a> Integrator<'a> {
+    pub(crate) fn new(world: &'a World, paths: Paths, stack: Stack) -> Self {
+        Self { world, paths, stack, rays: 0 }
+    }
+
+    /// The stack, to be used again.
+    pub(crate) fn into_stack(self) -> Stack {
+        self.stack
+    }
+
     /// Light arriving at `origin` from `direction` (unit), scattered at most `bounces` times.
     /// Punctual lights are seen only through the surfaces that they light.
     pub(crate) fn radiance(
@@ -58,12 +90,13 @@ impl Integrator<'_> {
         let ray = Ray { origin, direction, t_max: f32::INFINITY };
         let mut segment = Segment { ray, from: None, pdf: f32::INFINITY };
         let mut throughput = Vec3::ONE;
-        let mut seen = Seen { radiance: Vec3::ZERO, distance: f32::INFINITY, back: false };
+        let mut seen =
+            Seen { direct: Vec3::ZERO, indirect: Vec3::ZERO, distance: f32::INFINITY, back: false };
         for depth in 0.. {
             let key = mix2(sampler.key(), u64::from(depth) * 4);
             self.rays += 1;
             let Some(hit) = world.closest(&segment.ray, segment.from, key, &mut self.stack) else {
-                seen.radiance += self.limited(depth, throughput * self.sky(&segment));
+                *seen.part(depth) += self.limited(depth, throughput * self.sky(&segment));
                 break;
             };
             let Some(point) = world.point(hit, segment.ray.direction) else { break };
@@ -71,8 +104,9 @@ impl Integrator<'_> {
                 seen.distance = hit.t;
                 seen.back = !point.front && !point.material.double_sided;
             }
-            seen.radiance += self.limited(depth, throughput * self.emission(&point, &segment));
-            if depth == self.bounces {
+            let emitted = throughput * self.emission(&point, &segment);
+            *seen.part(depth) += self.limited(depth, emitted);
+            if depth == self.paths.bounces {
                 break;
             }
             let Some((bsdf, frame)) = point.scattering(world.frames(hit.instance), world.model)
@@ -86,12 +120,23 @@ impl Integrator<'_> {
                 model: world.model,
                 view: -segment.ray.direction,
             };
-            let direct = self.punctual(&vertex, key, sampler);
-            seen.radiance += self.limited(depth + 1, throughput * direct);
-            let direct = self.area(&vertex, key, sampler);
-            seen.radiance += self.limited(depth + 1, throughput * direct);
+            let punctual = throughput * self.punctual(&vertex, key, sampler);
+            *seen.part(depth) += self.limited(depth + 1, punctual);
+            let area = throughput * self.area(&vertex, key, sampler);
+            seen.indirect += self.limited(depth + 1, area);
+            if depth + 1 == self.paths.bounces && world.lights.are_punctual() {
+                // The last ray could only meet a source.
+                break;
+            }
             let Some((next, weight)) = vertex.scatter(sampler) else { break };
             throughput *= weight;
+            if depth + 1 >= self.paths.roulette_from {
+                let survival = throughput.max_element().min(1.0);
+                if sampler.number() >= survival {
+                    break;
+                }
+                throughput /= survival;
+            }
             segment = next;
         }
         seen
@@ -178,7 +223,7 @@ impl Integrator<'_> {
             return Vec3::ZERO;
         }
         let y = luminance(light);
-        if scattered == 0 || y <= self.clamp { light } else { light * (self.clamp / y) }
+        if scattered == 0 || y <= self.paths.clamp { light } else { light * (self.paths.clamp / y) }
     }
 }
 

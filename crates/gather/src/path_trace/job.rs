@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use lumencast_light::sh;
 use rayon::prelude::*;
 
-use super::integrator::Integrator;
+use super::integrator::{Integrator, Paths};
 use crate::accel::Stack;
 use crate::sampling::{Sampler, lattice};
 use crate::world::World;
@@ -84,9 +84,8 @@ fn tiles(job: &Job) -> Vec<Tile> {
 fn trace(job: &Job, world: &World, tile: &Tile, stack: &mut Stack) -> TileSums {
     let receiver = &job.receivers[tile.receiver as usize];
     let turn = lattice::turn(job.seed, tile.receiver);
-    let stack = std::mem::take(stack);
-    let mut integrator =
-        Integrator { world, bounces: job.bounces, clamp: job.clamp, stack, rays: 0 };
+    let paths = Paths { bounces: job.bounces, clamp: job.clamp, roulette_from: u32::MAX };
+    let mut integrator = Integrator::new(world, paths, std::mem::take(stack));
     let mut t = TileSums {
         sum: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
         squares: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
@@ -99,9 +98,10 @@ fn trace(job: &Job, world: &World, tile: &Tile, stack: &mut Stack) -> TileSums {
         let direction = (turn * lattice::direction(sample, receiver.samples)).normalize();
         let mut sampler = Sampler::new(job.seed, tile.receiver, sample);
         let seen = integrator.radiance(receiver.position, direction, &mut sampler);
+        let radiance = seen.radiance();
         let basis = sh::basis(job.order, direction);
         for (k, y) in basis.iter().enumerate().take(job.order.coefficients()) {
-            let term = 4.0 * PI * y * seen.radiance;
+            let term = 4.0 * PI * y * radiance;
             t.sum[k] += term;
             t.squares[k] += term * term;
         }
@@ -112,6 +112,7 @@ fn trace(job: &Job, world: &World, tile: &Tile, stack: &mut Stack) -> TileSums {
         }
     }
     t.rays = integrator.rays;
+    *stack = integrator.into_stack();
     t
 }
 

@@ -1,6 +1,6 @@
 //! Gathering by path tracing.
 
-mod integrator;
+pub(crate) mod integrator;
 mod job;
 #[cfg(test)]
 mod tests;

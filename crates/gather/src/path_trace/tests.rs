@@ -6,7 +6,7 @@ use lumencast_light::Order;
 use lumencast_scene::{Environment, HdrImage, Light, LightKind, Material, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
-use super::integrator::Integrator;
+use super::integrator::{Integrator, Paths};
 use super::*;
 use crate::Receiver as Probe;
 use crate::accel::Stack;
@@ -28,13 +28,14 @@ fn look(
         Kernel::detect(),
         &mut WorldCache::default(),
     );
-    let mut integrator =
-        Integrator { world: &world, bounces, clamp, stack: Stack::default(), rays: 0 };
+    let paths = Paths { bounces, clamp, roulette_from: u32::MAX };
+    let mut integrator = Integrator::new(&world, paths, Stack::default());
     let (groups, samples) = (32, 512);
     let means: Vec<Vec3> = (0..groups)
         .map(|group| {
-            let one =
-                |s| integrator.radiance(origin, direction, &mut Sampler::new(4, group, s)).radiance;
+            let one = |s| {
+                integrator.radiance(origin, direction, &mut Sampler::new(4, group, s)).radiance()
+            };
             (0..samples).map(one).sum::<Vec3>() / samples as f32
         })
         .collect();
@@ -296,17 +297,12 @@ fn lambert_model_takes_only_base_colour() {
     stage.environment(Environment::Constant { radiance: Vec3::ONE });
     let model = MaterialModel::Lambert;
     let world = World::new(stage.snapshot(), model, Kernel::detect(), &mut WorldCache::default());
-    let mut integrator = Integrator {
-        world: &world,
-        bounces: 1,
-        clamp: f32::INFINITY,
-        stack: Stack::default(),
-        rays: 0,
-    };
+    let paths = Paths { bounces: 1, clamp: f32::INFINITY, roulette_from: u32::MAX };
+    let mut integrator = Integrator::new(&world, paths, Stack::default());
     for (origin, direction) in [(Vec3::Y, down()), (Vec3::NEG_Y, -down())] {
         for s in 0..64 {
             let seen = integrator.radiance(origin, direction, &mut Sampler::new(1, 1, s));
-            assert!((seen.radiance - Vec3::splat(0.5)).abs().max_element() < 1e-5);
+            assert!((seen.radiance() - Vec3::splat(0.5)).abs().max_element() < 1e-5);
         }
     }
 }

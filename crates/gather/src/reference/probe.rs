@@ -1,4 +1,4 @@
-//! Light at points with its uncertainty: what is compared with closed forms and other renderers.
+//! Light at points with its uncertainty.
 
 use std::sync::Arc;
 

@@ -1,0 +1,108 @@
+//! Our rays beside Embree's, in turns, on the same threads and the same triangles.
+//!
+//! `LUMENCAST_EMBREE=libembree4.so cargo run --release -p lumencast-gather --example against_embree --
+//! SCENE [RAYS] [THREADS]`
+//!
+//! Embree runs with its default (medium) build quality, once in its watertight mode, as ours always
+//! is, and once without. Ratios above 1 mean that ours is faster.
+#![expect(clippy::print_stdout, reason = "a program for the terminal")]
+
+use std::error::Error;
+use std::num::NonZeroUsize;
+use std::time::Instant;
+
+use lumencast_gather::measure::{RayBench, TestRay, build_seconds};
+use lumencast_gather::reference::View;
+use lumencast_scene::Scene;
+use lumencast_testkit::embree::{Embree, Quality};
+use rayon::prelude::*;
+
+const ROUNDS: usize = 15;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let name = arguments.next().ok_or("which scene?")?;
+    let rays: usize = arguments.next().map_or(Ok(1_000_000), |n| n.parse())?;
+    let threads = arguments.next().map(|n| n.parse::<NonZeroUsize>()).transpose()?;
+    let library =
+        std::env::var_os("LUMENCAST_EMBREE").ok_or("LUMENCAST_EMBREE names no library")?;
+
+    let mut scene = Scene::open(&name)?;
+    let view = match scene.cameras().first() {
+        Some(c) => View { world_from_camera: c.world_from_camera, projection: c.camera.projection },
+        None => return Err("the scene has no camera".into()),
+    };
+    let snapshot = scene.snapshot();
+    let bench = RayBench::new(&snapshot, view, rays, threads)?;
+    let triangles = bench.triangles();
+    let pool = bench.install(rayon::current_num_threads);
+    println!("{name}: {} triangles, {} rays, {pool} threads", triangles.len(), bench.closest.len());
+
+    let build = |robust| Embree::new(library.as_ref(), &triangles, Quality::Medium, robust, pool);
+    let mut builds = Vec::new();
+    for _ in 0..ROUNDS {
+        let ours = bench.install(|| build_seconds(&snapshot)).0;
+        let theirs = seconds(|| build(true).map(drop))?;
+        builds.push(theirs / ours);
+    }
+    println!("build: {:.2} of Embree's speed", median(builds));
+
+    for robust in [true, false] {
+        let embree = build(robust)?;
+        let (mut closest, mut any) = (Vec::new(), Vec::new());
+        let mut rates = [0.0f64; 4];
+        for _ in 0..ROUNDS {
+            let times = [
+                seconds(|| Ok(bench.trace_closest(&bench.closest)))?,
+                seconds(|| Ok(run(&bench, &bench.closest, |r| embree_closest(&embree, r))))?,
+                seconds(|| Ok(bench.trace_any(&bench.any)))?,
+                seconds(|| Ok(run(&bench, &bench.any, |r| embree_any(&embree, r))))?,
+            ];
+            closest.push(times[1] / times[0]);
+            any.push(times[3] / times[2]);
+            let counts = [&bench.closest, &bench.closest, &bench.any, &bench.any].map(Vec::len);
+            for (rate, (time, count)) in rates.iter_mut().zip(times.into_iter().zip(counts)) {
+                *rate = rate.max(1e-6 * count as f64 / time);
+            }
+        }
+        println!(
+            "{}: closest {:.2} of Embree's speed (best {:.2} and {:.2} M/s), any {:.2} (best {:.2} and {:.2} M/s)",
+            if robust { "watertight" } else { "fast" },
+            median(closest),
+            rates[0],
+            rates[1],
+            median(any),
+            rates[2],
+            rates[3],
+        );
+    }
+    Ok(())
+}
+
+fn embree_closest(embree: &Embree, ray: &TestRay) -> bool {
+    embree.closest(ray.origin, ray.direction, ray.t_max).is_some()
+}
+
+fn embree_any(embree: &Embree, ray: &TestRay) -> bool {
+    embree.occluded(ray.origin, ray.direction, ray.t_max)
+}
+
+/// Traces on the same threads, in pieces of the same size.
+fn run(bench: &RayBench, rays: &[TestRay], one: impl Fn(&TestRay) -> bool + Sync) -> Vec<bool> {
+    bench.install(|| rays.par_chunks(1024).flat_map_iter(|rays| rays.iter().map(&one)).collect())
+}
+
+fn seconds<T>(
+    run: impl FnOnce() -> Result<T, libloading::Error>,
+) -> Result<f64, libloading::Error> {
+    let start = Instant::now();
+    let result = run()?;
+    let time = start.elapsed().as_secs_f64();
+    drop(result);
+    Ok(time)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}

@@ -1,0 +1,237 @@
+//! How fast rays and paths are on this machine.
+//!
+//! Rays are those that cost most: after two diffuse bounces from a camera, in shuffled order, so that
+//! neighbours in the list share nothing. Any-hit rays go from the same points towards the lights.
+
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::{Affine3A, Vec2, Vec3};
+use lumencast_scene::Snapshot;
+use rayon::prelude::*;
+
+use crate::accel::{Accel, AccelCache, Hit, Kernel, Ray, Stack};
+use crate::bsdf::frame;
+use crate::path_trace::MaterialModel;
+use crate::reference::View;
+use crate::sampling::{Sampler, cosine_hemisphere, mix2};
+use crate::world::{World, WorldCache, itself};
+
+/// Rays that a thread takes at a time.
+const CHUNK: usize = 1024;
+
+/// A ray to be measured with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TestRay {
+    /// Metres.
+    pub origin: Vec3,
+    /// Unit.
+    pub direction: Vec3,
+    /// Metres; infinite for closest-hit rays.
+    pub t_max: f32,
+}
+
+/// Where a [`TestRay`] met a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TestHit {
+    /// Metres.
+    pub t: f32,
+    /// Number of the triangle in [`RayBench::triangles`].
+    pub triangle: u32,
+}
+
+/// A scene with rays to trace through it. Surfaces with holes count as whole.
+#[derive(Debug)]
+pub struct RayBench {
+    world: World,
+    pool: rayon::ThreadPool,
+    /// Number of each instance's primitives' first triangle.
+    first_triangle: Vec<Vec<u32>>,
+    /// Rays to find the nearest surface of.
+    pub closest: Vec<TestRay>,
+    /// Rays to find any surface on.
+    pub any: Vec<TestRay>,
+    /// Seconds that building all hierarchies took.
+    pub build_seconds: f64,
+}
+
+impl RayBench {
+    /// Builds, and finds about `count` rays of each kind; fewer where paths leave the scene.
+    ///
+    /// # Errors
+    /// Where the system gives no threads.
+    pub fn new(
+        scene: &Arc<Snapshot>,
+        view: View,
+        count: usize,
+        threads: Option<NonZeroUsize>,
+    ) -> std::io::Result<Self> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.map_or(0, NonZeroUsize::get))
+            .build()
+            .map_err(std::io::Error::other)?;
+        let start = Instant::now();
+        let world = pool.install(|| world(scene));
+        let build_seconds = start.elapsed().as_secs_f64();
+        let mut next = 0;
+        let mut count_from = |n: usize| {
+            next += n as u32;
+            next - n as u32
+        };
+        let first_triangle = scene.instances.iter().map(|instance| {
+            let primitives = instance.mesh.primitives.iter();
+            primitives.map(|p| count_from(p.triangles.len())).collect()
+        });
+        let first_triangle = first_triangle.collect();
+        let mut bench = Self {
+            world,
+            pool,
+            first_triangle,
+            closest: Vec::new(),
+            any: Vec::new(),
+            build_seconds,
+        };
+        bench.find_rays(view, count);
+        Ok(bench)
+    }
+
+    fn find_rays(&mut self, view: View, count: usize) {
+        let find = |stack: &mut Stack, i: usize| self.rays_of_path(view, i as u64, stack);
+        // About half of the paths reach their third surface in open scenes.
+        let attempts = 0..count.saturating_mul(8);
+        let mut found: Vec<(u64, TestRay, Option<TestRay>)> = self.pool.install(|| {
+            attempts.into_par_iter().map_init(Stack::default, find).flatten().collect()
+        });
+        found.sort_unstable_by_key(|(key, ..)| *key);
+        found.truncate(count);
+        self.any = found.iter().filter_map(|(_, _, shadow)| *shadow).collect();
+        self.closest = found.into_iter().map(|(_, ray, _)| ray).collect();
+    }
+
+    /// The bounce ray and the shadow ray that leave a camera path's second surface, and a key to
+    /// shuffle by.
+    fn rays_of_path(
+        &self,
+        view: View,
+        number: u64,
+        stack: &mut Stack,
+    ) -> Option<(u64, TestRay, Option<TestRay>)> {
+        let mut sampler = Sampler::new(77, number as u32, 0);
+        let (mut origin, mut direction) = view.ray(sampler.square(), 16.0 / 9.0);
+        let mut from = None;
+        for _ in 0..2 {
+            let ray = Ray { origin, direction, t_max: f32::INFINITY };
+            let hit = self.world.closest(&ray, from, 0, stack)?;
+            let point = self.world.point(hit, direction)?;
+            direction = frame(point.normal) * cosine_hemisphere(sampler.square());
+            origin = point.leave(direction);
+            from = Some(itself(&hit));
+            if point.position.is_nan() {
+                return None;
+            }
+        }
+        let ray = TestRay { origin, direction, t_max: f32::INFINITY };
+        let shadow = self.towards_light(origin, sampler.number(), sampler.square());
+        Some((mix2(5, number), ray, shadow))
+    }
+
+    fn towards_light(&self, from: Vec3, choice: f32, u: Vec2) -> Option<TestRay> {
+        self.world.aim(from, choice, u).map(|(direction, distance)| TestRay {
+            origin: from,
+            direction,
+            // A little short of emitters, so that they do not hide themselves.
+            t_max: distance * 0.999,
+        })
+    }
+
+    /// World-space corners of every triangle.
+    #[must_use]
+    pub fn triangles(&self) -> Vec<[Vec3; 3]> {
+        self.world.world_triangles()
+    }
+
+    /// The nearest triangle of each of the rays.
+    #[must_use]
+    pub fn trace_closest(&self, rays: &[TestRay]) -> Vec<Option<TestHit>> {
+        let accel = self.world.accel();
+        self.trace(rays, |ray, stack| {
+            let hit = accel.closest(ray, stack, |_| true)?;
+            let triangle = self.number(&hit);
+            Some(TestHit { t: hit.t, triangle })
+        })
+    }
+
+    /// Whether anything lies on each of the rays.
+    #[must_use]
+    pub fn trace_any(&self, rays: &[TestRay]) -> Vec<bool> {
+        let accel = self.world.accel();
+        self.trace(rays, |ray, stack| accel.occluded(ray, stack, |_| true))
+    }
+
+    fn trace<T: Send + Clone>(
+        &self,
+        rays: &[TestRay],
+        one: impl Fn(&Ray, &mut Stack) -> T + Sync,
+    ) -> Vec<T> {
+        let chunk = |stack: &mut Stack, rays: &[TestRay]| -> Vec<T> {
+            let ray =
+                |r: &TestRay| Ray { origin: r.origin, direction: r.direction, t_max: r.t_max };
+            rays.iter().map(|r| one(&ray(r), stack)).collect()
+        };
+        let found: Vec<Vec<T>> =
+            self.pool.install(|| rays.par_chunks(CHUNK).map_init(Stack::default, chunk).collect());
+        found.concat()
+    }
+
+    fn number(&self, hit: &Hit) -> u32 {
+        self.first_triangle[hit.instance as usize][hit.primitive as usize] + hit.triangle
+    }
+
+    /// Runs on the threads that rays are traced with.
+    pub fn install<T: Send>(&self, run: impl FnOnce() -> T + Send) -> T {
+        self.pool.install(run)
+    }
+}
+
+fn world(scene: &Arc<Snapshot>) -> World {
+    World::new(scene.clone(), MaterialModel::Lambert, Kernel::detect(), &mut WorldCache::default())
+}
+
+/// Seconds of building every hierarchy of a scene from nothing, and of rebuilding the top level
+/// over its instances, on the calling thread's pool.
+#[must_use]
+pub fn build_seconds(scene: &Snapshot) -> (f64, f64) {
+    let mut cache = AccelCache::default();
+    let start = Instant::now();
+    let first = cache.update(scene, Kernel::detect());
+    let built = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let second = cache.update(scene, Kernel::detect());
+    let rebuilt = start.elapsed().as_secs_f64();
+    drop((first, second));
+    (built, rebuilt)
+}
+
+/// Seconds of building the top level over `count` small instances that overlap a little.
+#[must_use]
+pub fn top_level_seconds(scene: &Snapshot, count: u32) -> f64 {
+    let Some(instance) = scene.instances.first() else { return 0.0 };
+    let mut cache = AccelCache::default();
+    let mut many = scene.clone();
+    many.instances = (0..count)
+        .map(|i| {
+            let mut sampler = Sampler::new(3, i, 0);
+            let at = sampler.square().extend(sampler.number()) * 100.0;
+            let mut copy = instance.clone();
+            copy.world_from_object = Affine3A::from_translation(at) * copy.world_from_object;
+            copy
+        })
+        .collect();
+    let _: Accel = cache.update(&many, Kernel::detect());
+    let start = Instant::now();
+    let accel = cache.update(&many, Kernel::detect());
+    let seconds = start.elapsed().as_secs_f64();
+    drop(accel);
+    seconds
+}

@@ -1,0 +1,112 @@
+//! What a picture has gathered so far.
+//!
+//! Samples go in turn to two halves that share nothing: their difference tells the noise of their
+//! mean, whatever the sampler does to spread its numbers.
+
+use glam::{DVec3, UVec2, Vec3};
+
+/// Sums of radiance, a pixel each, row by row from the upper left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    size: UVec2,
+    halves: [Half; 2],
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Half {
+    sums: Vec<Vec3>,
+    samples: u32,
+}
+
+/// How far a picture is from the one that endless samples would give, as far as its halves tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Root of the mean squared error, as a share of the picture's mean radiance.
+    pub relative_rms: f64,
+    /// PSNR (dB) that this noise alone would leave, gamma 2.2, peak 1, values clamped to 0..1, at the
+    /// exposure given.
+    pub psnr: f64,
+}
+
+impl Film {
+    /// Nothing seen yet.
+    #[must_use]
+    pub fn new(size: UVec2) -> Self {
+        let pixels = size.x as usize * size.y as usize;
+        let half = Half { sums: vec![Vec3::ZERO; pixels], samples: 0 };
+        Self { size, halves: [half.clone(), half] }
+    }
+
+    /// A film as [`Film::parts`] gave it; `None` where lengths do not agree.
+    #[must_use]
+    pub fn from_parts(size: UVec2, halves: [(Vec<Vec3>, u32); 2]) -> Option<Self> {
+        let pixels = size.x as usize * size.y as usize;
+        let sound = halves.iter().all(|(sums, _)| sums.len() == pixels);
+        sound.then(|| Self { size, halves: halves.map(|(sums, samples)| Half { sums, samples }) })
+    }
+
+    /// Sums and numbers of samples of both halves, to be kept and gone on with later.
+    #[must_use]
+    pub fn parts(&self) -> [(&[Vec3], u32); 2] {
+        self.halves.each_ref().map(|half| (half.sums.as_slice(), half.samples))
+    }
+
+    /// Pixels in width and height.
+    #[must_use]
+    pub fn size(&self) -> UVec2 {
+        self.size
+    }
+
+    /// Samples a pixel so far.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.halves[0].samples + self.halves[1].samples
+    }
+
+    /// The half that is behind, and its samples so far.
+    pub(super) fn next_half(&self) -> (usize, u32) {
+        let behind = usize::from(self.halves[1].samples < self.halves[0].samples);
+        (behind, self.halves[behind].samples)
+    }
+
+    /// Adds sums of `samples` samples a pixel to a half.
+    pub(super) fn add(&mut self, half: usize, sums: &[Vec3], samples: u32) {
+        let half = &mut self.halves[half];
+        half.sums.iter_mut().zip(sums).for_each(|(sum, more)| *sum += *more);
+        half.samples += samples;
+    }
+
+    /// Mean radiance a pixel, cd/m²; black before the first sample.
+    #[must_use]
+    pub fn picture(&self) -> Vec<Vec3> {
+        let scale = 1.0 / self.samples().max(1) as f32;
+        let [a, b] = &self.halves;
+        a.sums.iter().zip(&b.sums).map(|(a, b)| (*a + *b) * scale).collect()
+    }
+
+    /// The noise that is left, at a linear exposure; `None` before both halves have samples.
+    #[must_use]
+    pub fn noise(&self, exposure: f32) -> Option<Noise> {
+        let [a, b] = &self.halves;
+        if a.samples == 0 || b.samples == 0 {
+            return None;
+        }
+        let (scale_a, scale_b) = (1.0 / a.samples as f32, 1.0 / b.samples as f32);
+        let shown = |v: Vec3| (v * exposure).clamp(Vec3::ZERO, Vec3::ONE).powf(1.0 / 2.2);
+        let (mut mean, mut linear, mut display) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        for (a, b) in a.sums.iter().zip(&b.sums) {
+            let (a, b) = (*a * scale_a, *b * scale_b);
+            mean += (0.5 * (a + b)).as_dvec3();
+            linear += (a - b).as_dvec3().powf(2.0);
+            display += (shown(a) - shown(b)).as_dvec3().powf(2.0);
+        }
+        let pixels = a.sums.len().max(1) as f64;
+        let per_channel = |sum: DVec3| sum.element_sum() / (3.0 * pixels);
+        // The mean of two independent halves errs by half of what they differ by.
+        let rms = (0.25 * per_channel(linear)).sqrt();
+        Some(Noise {
+            relative_rms: if rms > 0.0 { rms / per_channel(mean) } else { 0.0 },
+            psnr: -10.0 * (0.25 * per_channel(display)).log10(),
+        })
+    }
+}

@@ -1,0 +1,240 @@
+//! Pictures by path tracing.
+
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use glam::{UVec2, Vec2, Vec3};
+use lumencast_scene::Snapshot;
+use rayon::prelude::*;
+
+use super::{Film, Filter, View};
+use crate::accel::{Kernel, Stack};
+use crate::path_trace::MaterialModel;
+use crate::path_trace::integrator::{Integrator, Paths, Seen};
+use crate::sampling::{Sampler, mix2};
+use crate::world::{World, WorldCache};
+
+/// Pixels along the side of what a thread takes at a time.
+const TILE: u32 = 16;
+/// Samples a pixel that are added to a film at once. Part of the result: sums are grouped by it.
+const PASS: u32 = 8;
+
+/// Which light a picture shows. Direct and indirect add up to all.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Parts {
+    /// What clients draw by themselves: light of punctual lights scattered once, emission and
+    /// environment where the camera sees them.
+    Direct,
+    /// What light fields hold: light of emissive surfaces and the environment, and all light
+    /// scattered more than once.
+    Indirect,
+    /// Both.
+    #[default]
+    All,
+}
+
+/// What to draw and how.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PictureSettings {
+    /// Pixels in width and height, at least 1.
+    pub size: UVec2,
+    /// Surface scattering events on a path: 1 is direct light.
+    pub bounces: u32,
+    /// As in [`crate::Job::clamp`]; directly seen light is not clamped.
+    pub clamp: f32,
+    /// Scattering events from which on paths may end by chance, in favour of others (Russian
+    /// roulette); none do before, and never where it is `u32::MAX`.
+    pub roulette_from: u32,
+    /// Which light.
+    pub parts: Parts,
+    /// Which materials to believe.
+    pub materials: MaterialModel,
+    /// What a pixel sees.
+    pub filter: Filter,
+    /// Other seeds give other, independent noise.
+    pub seed: u64,
+    /// Threads; as many as there are cores when absent. The result does not depend on it.
+    pub threads: Option<NonZeroUsize>,
+}
+
+impl Default for PictureSettings {
+    fn default() -> Self {
+        Self {
+            size: UVec2::new(1280, 720),
+            bounces: 4,
+            clamp: f32::INFINITY,
+            roulette_from: 4,
+            parts: Parts::All,
+            materials: MaterialModel::Full,
+            filter: Filter::Box,
+            seed: 1,
+            threads: None,
+        }
+    }
+}
+
+/// What a pass has done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traced {
+    /// Paths from the camera.
+    pub paths: u64,
+    /// Rays: camera, bounce and shadow rays.
+    pub rays: u64,
+}
+
+/// Draws one moment of a scene.
+///
+/// ```
+/// use glam::{UVec2, Vec3};
+/// use lumencast_gather::reference::{Film, PictureSettings, Renderer, View};
+/// use lumencast_scene::Scene;
+///
+/// let scene = Scene::open("cornell")?.snapshot();
+/// let view = View::look_at(Vec3::new(0.0, 1.0, 3.0), Vec3::Y, 0.7).expect("two points");
+/// let settings = PictureSettings { size: UVec2::new(32, 24), ..PictureSettings::default() };
+/// let renderer = Renderer::new(&scene, view, settings)?;
+/// let mut film = Film::new(settings.size);
+/// while film.samples() < 16 {
+///     renderer.pass(&mut film, 16, &|_| true);
+/// }
+/// assert!(film.picture().iter().all(|radiance| radiance.is_finite()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Renderer {
+    world: World,
+    view: View,
+    settings: PictureSettings,
+    pool: rayon::ThreadPool,
+}
+
+impl Renderer {
+    /// Makes the scene ready for tracing.
+    ///
+    /// # Errors
+    /// Where the system gives no threads.
+    pub fn new(
+        scene: &Arc<Snapshot>,
+        view: View,
+        settings: PictureSettings,
+    ) -> std::io::Result<Self> {
+        let threads = settings.threads.map_or(0, NonZeroUsize::get);
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|i| format!("render {i}"))
+            .build()
+            .map_err(std::io::Error::other)?;
+        let build = || {
+            World::new(
+                scene.clone(),
+                settings.materials,
+                Kernel::detect(),
+                &mut WorldCache::default(),
+            )
+        };
+        let world = pool.install(build);
+        Ok(Self { world, view, settings, pool })
+    }
+
+    /// Adds up to 8 samples a pixel to a film, but none beyond `until` a pixel. `going` is told, from
+    /// any thread, the share of the pass that is done, 0 to 1; when it answers no, the pass ends, the
+    /// film stays as it was and the result is `None`.
+    ///
+    /// What a film holds after a number of samples depends on the scene and the settings, not on
+    /// threads nor on when it was saved and gone on with.
+    pub fn pass(
+        &self,
+        film: &mut Film,
+        until: u32,
+        going: &(dyn Fn(f32) -> bool + Sync),
+    ) -> Option<Traced> {
+        let (half, first) = film.next_half();
+        // The end of each half is fixed by `until`, so that the last passes are whole as well.
+        let share = if half == 0 { until.div_ceil(2) } else { until / 2 };
+        let samples = share.saturating_sub(first).min(PASS);
+        let size = self.settings.size;
+        let tiles_across = size.x.div_ceil(TILE);
+        let tiles = tiles_across * size.y.div_ceil(TILE);
+        let (done, stopped, rays) = (AtomicU64::new(0), AtomicBool::new(false), AtomicU64::new(0));
+        let tile = |stack: &mut Stack, tile: u32| {
+            if stopped.load(Ordering::Relaxed) {
+                return Vec::new();
+            }
+            let corner = TILE * UVec2::new(tile % tiles_across, tile / tiles_across);
+            let (sums, traced) = self.tile(corner, half, first..first + samples, stack);
+            rays.fetch_add(traced, Ordering::Relaxed);
+            let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f32 / tiles as f32;
+            if !going(share) {
+                stopped.store(true, Ordering::Relaxed);
+            }
+            sums
+        };
+        let found: Vec<Vec<Vec3>> = self
+            .pool
+            .install(|| (0..tiles).into_par_iter().map_init(Stack::default, tile).collect());
+        if stopped.into_inner() && done.into_inner() < u64::from(tiles) {
+            return None;
+        }
+        film.add(half, &assemble(size, &found), samples);
+        let paths = u64::from(size.x) * u64::from(size.y) * u64::from(samples);
+        Some(Traced { paths, rays: rays.into_inner() })
+    }
+
+    /// Sums over some samples of the pixels of one tile, row by row, and the rays that it took.
+    fn tile(
+        &self,
+        corner: UVec2,
+        half: usize,
+        samples: std::ops::Range<u32>,
+        stack: &mut Stack,
+    ) -> (Vec<Vec3>, u64) {
+        let s = &self.settings;
+        let end = (corner + TILE).min(s.size);
+        let aspect = s.size.x as f32 / s.size.y as f32;
+        let seed = mix2(s.seed, half as u64);
+        let paths = Paths { bounces: s.bounces, clamp: s.clamp, roulette_from: s.roulette_from };
+        let mut integrator = Integrator::new(&self.world, paths, std::mem::take(stack));
+        let mut sums = Vec::with_capacity((TILE * TILE) as usize);
+        for y in corner.y..end.y {
+            for x in corner.x..end.x {
+                let mut sum = Vec3::ZERO;
+                for sample in samples.clone() {
+                    let mut sampler = Sampler::new(seed, y * s.size.x + x, sample);
+                    let place =
+                        Vec2::new(x as f32, y as f32) + 0.5 + s.filter.place(sampler.square());
+                    let (origin, direction) = self.view.ray(place / s.size.as_vec2(), aspect);
+                    let seen = integrator.radiance(origin, direction, &mut sampler);
+                    sum += part(&seen, s.parts);
+                }
+                sums.push(sum);
+            }
+        }
+        let rays = integrator.rays;
+        *stack = integrator.into_stack();
+        (sums, rays)
+    }
+}
+
+fn part(seen: &Seen, parts: Parts) -> Vec3 {
+    match parts {
+        Parts::Direct => seen.direct,
+        Parts::Indirect => seen.indirect,
+        Parts::All => seen.radiance(),
+    }
+}
+
+/// Rows of pixels out of tiles.
+fn assemble(size: UVec2, tiles: &[Vec<Vec3>]) -> Vec<Vec3> {
+    let across = size.x.div_ceil(TILE);
+    let mut pixels = Vec::with_capacity(size.x as usize * size.y as usize);
+    for y in 0..size.y {
+        for tile in 0..across {
+            let width = (size.x - tile * TILE).min(TILE) as usize;
+            let row = (y % TILE) as usize * width;
+            let of_tile = &tiles[(y / TILE * across + tile) as usize];
+            pixels.extend_from_slice(&of_tile[row..row + width]);
+        }
+    }
+    pixels
+}

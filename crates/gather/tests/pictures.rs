@@ -1,0 +1,153 @@
+//! Pictures: what they show in closed form, and that they are reproducible.
+
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+
+use glam::{UVec2, Vec3};
+use lumencast_gather::path_trace::MaterialModel;
+use lumencast_gather::reference::{Film, Filter, Parts, PictureSettings, Renderer, View};
+use lumencast_scene::{Environment, Light, LightKind, Scene, Snapshot};
+use lumencast_testkit::scenes::{Stage, lambert};
+
+fn settings() -> PictureSettings {
+    PictureSettings { size: UVec2::new(40, 28), ..PictureSettings::default() }
+}
+
+fn render(scene: &Arc<Snapshot>, view: View, settings: PictureSettings, samples: u32) -> Film {
+    let renderer = Renderer::new(scene, view, settings).unwrap();
+    let mut film = Film::new(settings.size);
+    while film.samples() < samples {
+        renderer.pass(&mut film, samples, &|_| true).unwrap();
+    }
+    film
+}
+
+fn cornell() -> (Arc<Snapshot>, View) {
+    let mut scene = Scene::open("cornell").unwrap();
+    let camera = &scene.cameras()[0];
+    let view =
+        View { world_from_camera: camera.world_from_camera, projection: camera.camera.projection };
+    (scene.snapshot(), view)
+}
+
+#[test]
+fn parts_add_up() {
+    let (scene, view) = cornell();
+    let of = |parts| render(&scene, view, PictureSettings { parts, ..settings() }, 8).picture();
+    let (all, direct, indirect) = (of(Parts::All), of(Parts::Direct), of(Parts::Indirect));
+    for ((all, direct), indirect) in all.iter().zip(&direct).zip(&indirect) {
+        assert!((*all - (*direct + *indirect)).abs().max_element() <= 1e-5 * all.max_element());
+    }
+    assert!(direct.iter().any(|v| v.max_element() > 0.0));
+    assert!(indirect.iter().any(|v| v.max_element() > 0.0));
+}
+
+#[test]
+fn results_depend_neither_on_threads_nor_on_interruption() {
+    let (scene, view) = cornell();
+    let with = |threads| {
+        let threads = NonZeroUsize::new(threads);
+        render(&scene, view, PictureSettings { threads, ..settings() }, 24)
+    };
+    let whole = with(1);
+    assert_eq!(whole, with(3));
+
+    let renderer = Renderer::new(&scene, view, settings()).unwrap();
+    let mut film = Film::new(settings().size);
+    renderer.pass(&mut film, 24, &|_| true).unwrap();
+    let before = film.clone();
+    assert_eq!(renderer.pass(&mut film, 24, &|done| done < 0.4), None);
+    assert_eq!(film, before, "a pass that was stopped leaves no trace");
+    let kept = film.parts().map(|(sums, samples)| (sums.to_vec(), samples));
+    let mut film = Film::from_parts(film.size(), kept).unwrap();
+    while film.samples() < 24 {
+        renderer.pass(&mut film, 24, &|_| true).unwrap();
+    }
+    assert_eq!(whole, film);
+    let other = render(&scene, view, PictureSettings { seed: 2, ..settings() }, 24);
+    assert_ne!(whole, other);
+}
+
+/// A floor of albedo ρ under one sun: radiance ρ E cos θ/π in direct light, none in indirect.
+#[test]
+fn sun_on_a_floor() {
+    let mut stage = Stage::default();
+    let material = stage.material(lambert(Vec3::new(0.2, 0.5, 0.8), Vec3::ZERO));
+    stage.quad(Vec3::new(-9.0, 0.0, 9.0), Vec3::X * 18.0, Vec3::NEG_Z * 18.0, material);
+    let sun =
+        Light { kind: LightKind::Directional, color: Vec3::ONE, intensity: 1000.0, range: None };
+    stage.light(sun, Vec3::ZERO, Vec3::new(0.0, -1.0, -1.0).normalize());
+    let view = View::look_at(Vec3::new(0.0, 3.0, 1.0), Vec3::ZERO, 0.8).unwrap();
+    let expected = Vec3::new(0.2, 0.5, 0.8) * 1000.0 * 0.5f32.sqrt() / std::f32::consts::PI;
+    for (filter, parts, factor) in [
+        (Filter::Box, Parts::Direct, 1.0),
+        (Filter::Tent, Parts::All, 1.0),
+        (Filter::Gaussian, Parts::Indirect, 0.0),
+    ] {
+        let settings = PictureSettings { filter, parts, ..settings() };
+        let film = render(&stage.snapshot(), view, settings, 2);
+        for seen in film.picture() {
+            let difference = (seen - factor * expected).abs().max_element();
+            assert!(difference <= 1e-5 * expected.max_element(), "{filter:?}: {seen}");
+        }
+    }
+}
+
+/// Roulette changes the noise, not the mean: a closed room of albedo ρ that emits L everywhere has
+/// L/(1 − ρ).
+#[test]
+fn roulette_is_unbiased() {
+    let mut stage = Stage::default();
+    let material = stage.material(lambert(Vec3::splat(0.6), Vec3::ONE));
+    stage.room(Vec3::ZERO, Vec3::splat(2.0), material);
+    let view = View::look_at(Vec3::ZERO, Vec3::new(0.3, 0.1, 1.0), 1.0).unwrap();
+    let of = |roulette_from| {
+        let settings = PictureSettings { bounces: 40, roulette_from, ..settings() };
+        let film = render(&stage.snapshot(), view, settings, 128);
+        let picture = film.picture();
+        let mean = picture.iter().map(|v| v.x).sum::<f32>() / picture.len() as f32;
+        let error = film.noise(1.0).unwrap().relative_rms as f32 / (picture.len() as f32).sqrt();
+        (mean / 2.5, error)
+    };
+    for roulette_from in [1, 4, u32::MAX] {
+        let (ratio, error) = of(roulette_from);
+        assert!((ratio - 1.0).abs() < 5.0 * error + 1e-4, "{roulette_from}: {ratio} ± {error}");
+        assert!(error < 2e-3, "the check has no teeth: ± {error}");
+    }
+}
+
+#[test]
+fn noise_is_what_more_samples_take_away() {
+    let (scene, view) = cornell();
+    // Without mirrors, so that no rare bright path decides.
+    let with_seed = |seed, samples| {
+        let materials = MaterialModel::Lambert;
+        render(&scene, view, PictureSettings { materials, seed, ..settings() }, samples)
+    };
+    let smooth = with_seed(99, 512);
+    let truth = smooth.picture();
+    let values = 3.0 * truth.len() as f64;
+    let mean = truth.iter().map(|v| f64::from(v.element_sum())).sum::<f64>() / values;
+    // A few pixels at the lamp's edge make most of the noise, so one picture tells little.
+    let (mut told, mut is) = (0.0, 0.0);
+    for seed in 0..16 {
+        let rough = with_seed(seed, 16);
+        told += rough.noise(1.0).unwrap().relative_rms.powi(2);
+        let errors = rough.picture().into_iter().zip(&truth).map(|(a, b)| a - *b);
+        is += errors.map(|e| f64::from(e.length_squared())).sum::<f64>() / values / (mean * mean);
+    }
+    let ratio = (told / is).sqrt();
+    assert!((0.85..1.15).contains(&ratio), "{ratio}");
+    assert!(smooth.noise(1.0).unwrap().relative_rms < 0.3 * (told / 16.0).sqrt());
+    assert_eq!(Film::new(UVec2::ONE).noise(1.0), None);
+}
+
+#[test]
+fn the_sky_is_seen_directly() {
+    let mut stage = Stage::default();
+    stage.environment(Environment::Constant { radiance: Vec3::new(1.0, 2.0, 3.0) });
+    let view = View::look_at(Vec3::ZERO, Vec3::Z, 1.0).unwrap();
+    let of = |parts| render(&stage.snapshot(), view, PictureSettings { parts, ..settings() }, 1);
+    assert!(of(Parts::Direct).picture().iter().all(|v| *v == Vec3::new(1.0, 2.0, 3.0)));
+    assert!(of(Parts::Indirect).picture().iter().all(|v| *v == Vec3::ZERO));
+}
