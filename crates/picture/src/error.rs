@@ -56,3 +56,35 @@ pub enum PictureError {
         source: io::Error,
     },
 }
+
+/// Two pictures that cannot be compared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CompareError {
+    /// They have different sizes.
+    #[error(
+        "the reference has {} × {} pixels and the picture {} × {}; render both at one size",
+        reference.0, reference.1, picture.0, picture.1
+    )]
+    Sizes {
+        /// Width and height of the reference.
+        reference: (u32, u32),
+        /// Width and height of the picture.
+        picture: (u32, u32),
+    },
+    /// A value is infinite or not a number.
+    #[error(
+        "{which} has {count} pixels that are not finite, the first at column {x}, row {y} from the \
+         top left; whatever made it has a fault"
+    )]
+    NotFinite {
+        /// Which of the two.
+        which: &'static str,
+        /// Such pixels.
+        count: usize,
+        /// Column of the first.
+        x: u32,
+        /// Row of the first.
+        y: u32,
+    },
+}

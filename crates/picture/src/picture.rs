@@ -1,6 +1,7 @@
 //! A picture in memory.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use crate::PictureError;
 
@@ -64,8 +65,8 @@ impl Picture {
 
     /// The picture with a function applied to every pixel.
     #[must_use]
-    pub fn map(&self, of: impl Fn(Vec3) -> Vec3) -> Self {
-        let pixels = self.pixels.iter().map(|&p| of(p)).collect();
+    pub fn map(&self, of: impl Fn(Vec3) -> Vec3 + Sync) -> Self {
+        let pixels = self.pixels.par_iter().map(|&p| of(p)).collect();
         Self { width: self.width, height: self.height, pixels }
     }
 }
