@@ -11,8 +11,8 @@ pub fn mse(pair: &Pair<'_>) -> f64 {
 }
 
 /// Mean of (picture − reference)² / (reference² + 0.01) over pixels and channels, as Rousselle et
-/// al. (*Adaptive sampling and reconstruction using greedy error minimization*, 2011, section 6)
-/// and many after them; the 0.01 is meant for pictures whose white is 1, so bring them to that
+/// al. (*Adaptive sampling and reconstruction using greedy error minimization*, 2011) and many after
+/// them; the 0.01 is meant for pictures whose white is 1, so bring them to that
 /// ([`crate::exposure`]) first.
 pub fn relative_mse(pair: &Pair<'_>) -> f64 {
     mean(pair, |reference| (reference * reference + 0.01).recip())

@@ -7,12 +7,13 @@ use super::observer::Observer;
 use crate::Picture;
 use crate::plane::Plane;
 
-/// CIE XYZ of Rec. 709 primaries with the white of D65, divided by the white: (1, 1, 1) goes to
-/// (1, 1, 1). Rows as in IEC 61966-2-1, by columns.
+/// CIE XYZ of Rec. 709 primaries, divided by that of white: (1, 1, 1) goes to (1, 1, 1). Derived
+/// from BT.709's chromaticities, white at (0.3127, 0.3290); matrices for the rounded white
+/// (0.95047, 1, 1.08883) are 7e-5 off, and a pixel's FLIP then 1e-4.
 const XYZ_FROM_RGB: Mat3 = {
-    const X: [f32; 3] = [0.412_456_4, 0.357_576_1, 0.180_437_5];
-    const Y: [f32; 3] = [0.212_672_9, 0.715_152_2, 0.072_175];
-    const Z: [f32; 3] = [0.019_333_9, 0.119_192, 0.950_304_1];
+    const X: [f32; 3] = [0.412_390_8, 0.357_584_34, 0.180_480_79];
+    const Y: [f32; 3] = [0.212_639, 0.715_168_7, 0.072_192_32];
+    const Z: [f32; 3] = [0.019_330_818, 0.119_194_78, 0.950_532_15];
     const fn column(i: usize) -> Vec3 {
         Vec3::new(
             X[i] / (X[0] + X[1] + X[2]),
@@ -36,7 +37,7 @@ impl Seen {
     /// Of linear colour, 0 to 1.
     pub(super) fn new(picture: &Picture, observer: &Observer) -> Self {
         // YCxCz without its factors and its offset, which filters that keep what is flat do not
-        // change (section 4.1.1).
+        // change.
         let xyz = picture.map(|p| XYZ_FROM_RGB * p);
         let luminance = Plane::of(&xyz, |c| c.y);
         let red_green = Plane::of(&xyz, |c| c.x - c.y);
@@ -61,7 +62,7 @@ impl Seen {
 }
 
 /// CIELAB of linear colour, a* and b* times L*/100: colours of dark things look less colourful
-/// (Hunt's effect; section 4.1.2).
+/// (Hunt's effect).
 fn hunt_lab(rgb: Vec3) -> Vec3 {
     let f = Vec3::from((XYZ_FROM_RGB * rgb).to_array().map(|t| {
         const DELTA: f32 = 6.0 / 29.0;
@@ -75,7 +76,7 @@ fn hunt_lab(rgb: Vec3) -> Vec3 {
     )
 }
 
-/// HyAB distance to the power of q_c = 0.7 (section 4.1.3).
+/// HyAB distance to the power of q_c = 0.7.
 pub(super) fn difference(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;
     (d.x.abs() + d.y.hypot(d.z)).powf(0.7)

@@ -8,10 +8,10 @@ use crate::tone::filmic;
 use crate::{Pair, Picture, luminance};
 
 /// The tone-mapped luminance that the brightest pixel has at the first exposure, and the median at
-/// the last (t in section 3.2 of the paper).
+/// the last (t).
 const TARGET: f64 = 0.85;
 /// The least luminance that counts, in whatever unit the picture has. Where half the reference is
-/// black there are some 24 exposures for a picture whose brightest pixel is 1.
+/// black there are some 23 exposures for a picture whose brightest pixel is 1.
 const LEAST: f32 = f32::EPSILON;
 
 /// What HDR-FLIP found.
@@ -29,7 +29,7 @@ pub struct HdrFlip {
 
 /// FLIP of linear colour: the maximum over the exposures at which anything of the reference can be
 /// seen, each tone-mapped by the ACES curve of [`crate::ToneMap::Filmic`]. Andersson et al.,
-/// *Visualizing Errors in Rendered High Dynamic Range Images* (2021), section 3. Negative light
+/// *Visualizing Errors in Rendered High Dynamic Range Images* (2021). Negative light
 /// counts as none. About the cost of [`super::flip`] per exposure.
 pub fn hdr_flip(linear: &Pair<'_>, pixels_per_degree: f32) -> HdrFlip {
     let observer = Observer::new(pixels_per_degree);

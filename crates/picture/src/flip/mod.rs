@@ -1,7 +1,7 @@
 //! FLIP: how strongly a person who flips between two pictures sees them differ.
 //!
-//! Andersson et al., *FLIP: A Difference Evaluator for Alternating Images* (2020); section and
-//! table numbers in this module are that paper's. Both pictures are filtered by the eye's contrast
+//! Andersson et al., *FLIP: A Difference Evaluator for Alternating Images* (2020); the symbols in
+//! brackets in this module are that paper's. Both pictures are filtered by the eye's contrast
 //! sensitivity for the distance they are seen from and compared in a uniform colour space; where
 //! edges or points differ too, the colour error counts for more.
 //!
@@ -25,7 +25,7 @@ use observer::Observer;
 pub const PIXELS_PER_DEGREE: f32 = 67.020_645;
 
 /// Pixels per degree of the visual field: from `distance` metres, on a monitor `width` metres wide
-/// that shows `pixels` in a row (section 4.1).
+/// that shows `pixels` in a row.
 pub fn pixels_per_degree(distance: f32, width: f32, pixels: u32) -> f32 {
     distance * pixels as f32 / width * std::f32::consts::PI / 180.0
 }
@@ -91,7 +91,7 @@ fn of_linear(reference: &Picture, picture: &Picture, observer: &Observer) -> Err
 /// Where the two parts of the colour error meet, as parts of its largest value and of 1 (p_c, p_t).
 const KNEE: (f32, f32) = (0.4, 0.95);
 
-/// Section 4.1.3: a difference between colours to 0 to 1; the large ones share the last 5 %.
+/// A difference between colours to 0 to 1; the large ones share the last 5 %.
 fn colour_error(difference: f32, largest: f32) -> f32 {
     let knee = KNEE.0 * largest;
     if difference < knee {
@@ -101,7 +101,7 @@ fn colour_error(difference: f32, largest: f32) -> f32 {
     }
 }
 
-/// Section 4.2.1: (Δ/√2)^q_f with q_f = ½.
+/// (Δ/√2)^q_f with q_f = ½: of features an eye tells small differences.
 fn feature_error(difference: f32) -> f32 {
     (difference * std::f32::consts::FRAC_1_SQRT_2).sqrt().min(1.0)
 }

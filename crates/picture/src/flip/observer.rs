@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::plane::{Plane, gaussian, offsets, single};
 
-/// Contrast sensitivities, table 1, of luminance, red–green and blue–yellow: each a sum of
+/// The paper's contrast sensitivities of luminance, red–green and blue–yellow: each a sum of
 /// Gaussians a √(π/b) exp(−π² d²/b) of d in degrees.
 const ACHROMATIC: &[(f64, f64)] = &[(1.0, 0.0047)];
 const RED_GREEN: &[(f64, f64)] = &[(1.0, 0.0053)];
@@ -12,7 +12,7 @@ const BLUE_YELLOW: &[(f64, f64)] = &[(34.1, 0.04), (13.5, 0.025)];
 /// The largest b of them, which sets how far all kernels reach.
 const WIDEST: f64 = 0.04;
 
-/// Degrees from one flank of a feature to the other (w, section 4.2).
+/// Degrees from one flank of a feature to the other (w).
 const FEATURE_WIDTH: f64 = 0.082;
 
 /// The kernels for one distance.
@@ -66,7 +66,7 @@ impl Contrast {
 }
 
 /// Detectors of edges and of points: a Gaussian's first and second derivative along one axis times
-/// the Gaussian along the other. Positive taps sum to 1, negative ones to −1 (section 4.2).
+/// the Gaussian along the other. Positive taps sum to 1, negative ones to −1.
 #[derive(Debug)]
 pub(super) struct Feature {
     blur: Vec<f32>,
