@@ -11,7 +11,7 @@ use crate::plane::Plane;
 /// from BT.709's chromaticities, white at (0.3127, 0.3290); matrices for the rounded white
 /// (0.95047, 1, 1.08883) are 7e-5 off, and a pixel's FLIP then 1e-4.
 const XYZ_FROM_RGB: Mat3 = {
-    const X: [f32; 3] = [0.412_390_8, 0.357_584_34, 0.180_480_79];
+    const X: [f32; 3] = [0.412_390_8, 0.357_584_34, 0.180_480_8];
     const Y: [f32; 3] = [0.212_639, 0.715_168_7, 0.072_192_32];
     const Z: [f32; 3] = [0.019_330_818, 0.119_194_78, 0.950_532_15];
     const fn column(i: usize) -> Vec3 {
