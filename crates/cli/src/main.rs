@@ -5,6 +5,7 @@
 mod arguments;
 mod bake;
 mod bench;
+mod compare;
 mod doctor;
 mod environment;
 mod inspect;
@@ -49,6 +50,7 @@ enum Command {
     Bake(bake::Bake),
     Inspect(inspect::Inspect),
     Probe(probe::Probe),
+    Compare(compare::Compare),
     Doctor(doctor::Doctor),
     Token(token::Token),
     #[command(subcommand)]
@@ -69,6 +71,7 @@ fn main() -> ExitCode {
         Command::Bake(command) => command.run(),
         Command::Inspect(command) => command.run(),
         Command::Probe(command) => command.run(),
+        Command::Compare(command) => command.run(),
         Command::Doctor(command) => command.run(),
         Command::Token(command) => command.run(),
         Command::Bench(command) => command.run(),

@@ -3,6 +3,8 @@
 mod common;
 
 use common::{Folder, run};
+use glam::Vec3;
+use lumencast_picture::{Loaded, Picture, ToneMap};
 use serde_json::{Value, json};
 
 #[test]
@@ -13,6 +15,7 @@ fn help_shows_examples_and_the_version_is_told() {
         &["bake", "--help"],
         &["inspect", "--help"],
         &["probe", "--help"],
+        &["compare", "--help"],
         &["doctor", "--help"],
         &["token", "--help"],
         &["bench", "tick", "--help"],
@@ -37,6 +40,9 @@ fn wrong_usage_exits_with_2() {
         &["probe", "cornell", "--at", "0,0"],
         &["probe", "cornell", "--at", "0,0,0", "--order", "5"],
         &["serve", "cornell", "--tls-cert", "cert.pem"],
+        &["compare", "a.exr"],
+        &["compare", "a.exr", "b.exr", "--exposure", "-1"],
+        &["compare", "a.exr", "b.exr", "--ppd", "0"],
     ] {
         let ran = run(arguments);
         assert_eq!(ran.code, Some(2), "{arguments:?}: {ran:?}");
@@ -143,6 +149,70 @@ fn probe_prints_coefficients_with_their_errors() {
         assert!(c0 > 0.0 && error > 0.0 && error < 0.2 * c0, "{c0} ± {error}");
     }
     assert!(report["probes"][1]["at"][0].as_f64().is_some_and(|x| (x + 0.5).abs() < 1e-6));
+}
+
+#[test]
+fn pictures_are_compared() {
+    let folder = Folder::new("compare");
+    let path = |name: &str| folder.0.join(name).to_str().expect("text").to_owned();
+    let picture = Picture::from_fn(24, 16, |x, y| Vec3::new(x as f32, y as f32, 5.0) * 10.0);
+    let write = |name: &str, picture: &Picture| {
+        picture.write_exr(path(name)).expect("written");
+        path(name)
+    };
+    let reference = write("reference.exr", &picture);
+    let darker = write("darker.exr", &picture.map(|p| p * 0.8));
+
+    let same = run(&["compare", &reference, &reference, "--json"]).json();
+    for key in ["psnr", "psnr_unclamped"] {
+        assert_eq!(same[key], Value::Null, "infinite");
+    }
+    for key in ["flip", "flip_hdr", "mse", "relative_mse"] {
+        assert_eq!(same[key], 0.0, "{key}");
+    }
+    assert_eq!((&same["ssim"], &same["width"]), (&json!(1.0), &json!(24)));
+    let exposure = same["exposure"].as_f64().expect("a number");
+    assert!((1.0 / 250.0..1.0 / 100.0).contains(&exposure), "{exposure}");
+
+    let difference = path("difference.png");
+    let ran = run(&["compare", &reference, &darker, "--json", "-o", &difference]);
+    let off = ran.json();
+    assert!((10.0..40.0).contains(&off["psnr"].as_f64().expect("a number")), "{off}");
+    assert!((0.01..0.5).contains(&off["flip_hdr"].as_f64().expect("a number")), "{off}");
+    let map = Loaded::read(&difference).expect("a PNG");
+    assert_eq!((map.stored().width(), map.stored().height()), (24, 16));
+    assert!(map.stored().pixels().iter().any(|p| p.x > 0.2), "errors are seen");
+    let text = run(&["compare", &reference, &reference]).stdout;
+    assert!(text.contains("PSNR          inf dB") && text.contains("HDR-FLIP"), "{text}");
+
+    // A PNG of the same light: what differs is its rounding.
+    let png = path("picture.png");
+    picture.write_png(&png, ToneMap::Srgb, exposure as f32).expect("written");
+    let mixed = run(&["compare", &reference, &png, "--json"]).json();
+    assert!(mixed["psnr"].as_f64().is_some_and(|psnr| psnr > 45.0), "{mixed}");
+    assert_eq!((&mixed["flip_hdr"], &mixed["ppd"]), (&Value::Null, &off["ppd"]));
+    let coded = run(&["compare", &png, &png, "--json", "--exposure", "3"]).json();
+    assert_eq!(coded["exposure"], 1.0);
+}
+
+#[test]
+fn pictures_that_cannot_be_compared_are_refused() {
+    let folder = Folder::new("compare-bad");
+    let path = |name: &str| folder.0.join(name).to_str().expect("text").to_owned();
+    let write = |name: &str, width: u32, value: f32| {
+        let picture = Picture::from_fn(width, 12, |x, _| Vec3::splat(x as f32 * value));
+        picture.write_exr(path(name)).expect("written");
+        path(name)
+    };
+    let (good, wide) = (write("good.exr", 20, 1.0), write("wide.exr", 21, 1.0));
+    run(&["compare", &good, &wide]).failed_saying(&["20 × 12", "21 × 12", "wide.exr"]);
+    let bad = write("bad.exr", 20, f32::NAN);
+    run(&["compare", &good, &bad]).failed_saying(&["bad.exr", "240 pixels", "column 0, row 0"]);
+    run(&["compare", &good, "no/such.exr"]).failed_saying(&["no/such.exr"]);
+    let words = folder.file("words.png", b"no picture");
+    run(&["compare", &words, &good]).failed_saying(&["words.png"]);
+    run(&["compare", &good, &good, "-o", &path("map.exr")]).failed_saying(&["map.exr", "PNG"]);
+    run(&["compare", &good, &good, "-o", "/no/such/map.png"]).failed_saying(&["/no/such/map.png"]);
 }
 
 #[test]

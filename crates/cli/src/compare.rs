@@ -1,0 +1,131 @@
+//! `lumencast compare`: how far a picture is from its reference.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use lumencast_picture::{Comparison, Loaded, PIXELS_PER_DEGREE, ToneMap, compare};
+use serde_json::{Value, json};
+
+use crate::output;
+
+/// Says how far a picture is from a reference: PSNR, FLIP, SSIM, MSE (.png, .exr, .hdr).
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  lumencast compare reference.exr picture.exr
+  lumencast compare reference.exr picture.exr --exposure 0.02 --json
+  lumencast compare reference.png picture.png -o difference.png
+
+PSNR, SSIM and FLIP are of display codes: those of a PNG as stored, v^(1/2.2) of linear values times
+the exposure, peak 1, clamped to 0 to 1 except for psnr_unclamped. HDR-FLIP is of linear values, where
+both files have them; it finds its exposures itself. MSE and relative MSE, (p−r)²/(r²+0.01), are of
+linear values times the exposure. A PNG beside a linear file is decoded by the curve of sRGB and
+encoded again as that file is; the exposure is not applied to it. FLIP and HDR-FLIP are means over
+pixels, 0 to 1. docs/math.md gives definitions and sources.
+
+In JSON a PSNR of equal pictures, which is infinite, is null; so are SSIM of pictures under 11 × 11
+pixels and HDR-FLIP with a PNG. exposure is the factor used.")]
+pub(crate) struct Compare {
+    /// What is held to be right.
+    reference: PathBuf,
+    /// What is judged; of the same size.
+    picture: PathBuf,
+    /// Factor on linear values: a number, or auto: 1 over the 99th percentile of the reference's
+    /// luminance, and 1 where the reference is a PNG.
+    #[arg(long, value_name = "auto|NUMBER", default_value = "auto")]
+    exposure: Exposure,
+    /// Pixels per degree of the visual field, for FLIP: 67 is a monitor 0.7 m wide of 3840 pixels,
+    /// seen from 0.7 m.
+    #[arg(long, value_name = "NUMBER", default_value = "67", value_parser = parse_ppd)]
+    ppd: f32,
+    /// Writes FLIP's error of every pixel in the colours of magma: black none, pale yellow largest.
+    #[arg(short, long, value_name = "DIFFERENCE.png")]
+    output: Option<PathBuf>,
+    /// Prints JSON only.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--exposure` says.
+#[derive(Clone, Copy, Debug)]
+struct Exposure(Option<f32>);
+
+impl FromStr for Exposure {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self(None));
+        }
+        match text.parse() {
+            Ok(factor) if factor > 0.0 && f32::is_finite(factor) => Ok(Self(Some(factor))),
+            _ => Err("give auto or a positive number".into()),
+        }
+    }
+}
+
+fn parse_ppd(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        // The paper's conditions are called 67 and are a little more.
+        Ok(67.0) => Ok(PIXELS_PER_DEGREE),
+        Ok(ppd) if (1.0..=1000.0).contains(&ppd) => Ok(ppd),
+        _ => Err("give a number from 1 to 1000".into()),
+    }
+}
+
+impl Compare {
+    pub(crate) fn run(self) -> Result<()> {
+        if let Some(output) = &self.output {
+            let is_png = output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
+            ensure!(is_png, "{}: the difference is written as PNG; name it so", output.display());
+        }
+        let (reference, picture) = (Loaded::read(&self.reference)?, Loaded::read(&self.picture)?);
+        let found = compare(&reference, &picture, self.exposure.0, self.ppd)
+            .with_context(|| format!("{}, {}", self.reference.display(), self.picture.display()))?;
+        if let Some(output) = &self.output {
+            found.flip.in_magma().write_png(output, ToneMap::Srgb, 1.0)?;
+        }
+        if self.json {
+            return output::json(&self.report(&reference, &found));
+        }
+        println!("PSNR          {:.3} dB", found.psnr);
+        println!("  unclamped   {:.3} dB", found.psnr_unclamped);
+        println!("FLIP          {:.5}", found.flip.mean());
+        if let Some(hdr) = &found.flip_hdr {
+            print!("HDR-FLIP      {:.5}", hdr.map.mean());
+            println!("   {} exposures, 2^{:.2} to 2^{:.2}", hdr.exposures, hdr.start, hdr.stop);
+        }
+        if let Some(ssim) = found.ssim {
+            println!("SSIM          {ssim:.5}");
+        }
+        println!("MSE           {:.4e}", found.mse);
+        println!("relative MSE  {:.4e}", found.relative_mse);
+        println!("exposure      {}", found.exposure);
+        Ok(())
+    }
+
+    fn report(&self, reference: &Loaded, found: &Comparison) -> Value {
+        let hdr = found.flip_hdr.as_ref();
+        json!({
+            "reference": self.reference,
+            "picture": self.picture,
+            "width": reference.stored().width(),
+            "height": reference.stored().height(),
+            "exposure": found.exposure,
+            "ppd": self.ppd,
+            // What is not finite becomes null.
+            "psnr": found.psnr,
+            "psnr_unclamped": found.psnr_unclamped,
+            "flip": found.flip.mean(),
+            "flip_hdr": hdr.map(|hdr| hdr.map.mean()),
+            "flip_hdr_exposures": hdr.map(|hdr| json!({
+                "start": hdr.start, "stop": hdr.stop, "count": hdr.exposures,
+            })),
+            "ssim": found.ssim,
+            "mse": found.mse,
+            "relative_mse": found.relative_mse,
+        })
+    }
+}

@@ -1,0 +1,166 @@
+//! Files: PNG and OpenEXR written, Radiance HDR read as well.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter};
+use std::path::Path;
+
+use glam::Vec3;
+use image::{
+    DynamicImage, ExtendedColorType, ImageEncoder, ImageError, ImageFormat, ImageReader, Limits,
+    codecs::{openexr::OpenExrEncoder, png::PngEncoder},
+};
+
+use crate::tone::{gamma_code, linear_from_srgb};
+use crate::{Picture, PictureError, ToneMap};
+
+/// The longest side that is read, pixels.
+const SIDE: u32 = 32_768;
+/// The most memory that reading may take, bytes: 16 k × 16 k pixels of 12 bytes.
+const MEMORY: u64 = 3 << 30;
+
+/// What a file holds, by its kind.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Loaded {
+    /// PNG: codes of sRGB as stored, 0 to 1.
+    Coded(Picture),
+    /// OpenEXR and Radiance HDR: linear.
+    Linear(Picture),
+}
+
+impl Loaded {
+    /// Reads a PNG (8 or 16 bits, colour or grey), OpenEXR or Radiance HDR file; its contents tell
+    /// which it is. Alpha is ignored, colours are not multiplied by it; colour profiles are too.
+    ///
+    /// # Errors
+    /// The file cannot be read, is of another kind, is broken, or takes more than 3 GiB.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, PictureError> {
+        let path = path.as_ref();
+        let fail = |source| PictureError::Read { file: path.into(), source };
+        let mut reader =
+            ImageReader::open(path).map_err(fail)?.with_guessed_format().map_err(fail)?;
+        let format = reader.format();
+        if !matches!(format, Some(ImageFormat::Png | ImageFormat::OpenExr | ImageFormat::Hdr)) {
+            return Err(PictureError::Kind { file: path.into() });
+        }
+        let mut limits = Limits::default();
+        limits.max_image_width = Some(SIDE);
+        limits.max_image_height = Some(SIDE);
+        limits.max_alloc = Some(MEMORY);
+        reader.limits(limits);
+        let decoded = reader.decode().map_err(|e| match e {
+            ImageError::IoError(source) if source.kind() != io::ErrorKind::UnexpectedEof => {
+                fail(source)
+            }
+            source => PictureError::Decode { file: path.into(), source },
+        })?;
+        let picture = from_image(decoded)?;
+        Ok(match format {
+            Some(ImageFormat::Png) => Self::Coded(picture),
+            _ => Self::Linear(picture),
+        })
+    }
+
+    /// Linear colour; codes are decoded by the curve of sRGB, so that 1 is the display's white.
+    pub fn linear(&self) -> Picture {
+        match self {
+            Self::Coded(codes) => codes.map(linear_from_srgb),
+            Self::Linear(picture) => picture.clone(),
+        }
+    }
+
+    /// Codes for a display: those stored, or v^(1/2.2) of linear colour times `exposure`. Nothing
+    /// is clamped; see [`gamma_code`] for negative light.
+    pub fn display(&self, exposure: f32) -> Picture {
+        match self {
+            Self::Coded(codes) => codes.clone(),
+            Self::Linear(picture) => picture.map(|p| gamma_code(p * exposure)),
+        }
+    }
+
+    /// What is stored, codes or linear colour.
+    pub fn stored(&self) -> &Picture {
+        match self {
+            Self::Coded(picture) | Self::Linear(picture) => picture,
+        }
+    }
+}
+
+impl Picture {
+    /// Writes a PNG of 8 bits a channel, shown by `tone_map` after a factor of `exposure`.
+    ///
+    /// # Errors
+    /// The file cannot be written; one that was there before is left as it was.
+    pub fn write_png(
+        &self,
+        path: impl AsRef<Path>,
+        tone_map: ToneMap,
+        exposure: f32,
+    ) -> Result<(), PictureError> {
+        let code = |p: &Vec3| {
+            let code = tone_map.encode(*p * exposure);
+            code.to_array().map(|v| (255.0 * v + 0.5) as u8)
+        };
+        let bytes: Vec<u8> = self.pixels().iter().flat_map(code).collect();
+        write_whole(path.as_ref(), |out| {
+            PngEncoder::new(out).write_image(
+                &bytes,
+                self.width(),
+                self.height(),
+                ExtendedColorType::Rgb8,
+            )
+        })
+    }
+
+    /// Writes an OpenEXR of 32-bit floats, channels R, G and B, linear as they are.
+    ///
+    /// # Errors
+    /// The file cannot be written; one that was there before is left as it was.
+    pub fn write_exr(&self, path: impl AsRef<Path>) -> Result<(), PictureError> {
+        let bytes: Vec<u8> =
+            self.pixels().iter().flat_map(|p| p.to_array()).flat_map(f32::to_ne_bytes).collect();
+        write_whole(path.as_ref(), |out| {
+            OpenExrEncoder::new(out).write_image(
+                &bytes,
+                self.width(),
+                self.height(),
+                ExtendedColorType::Rgb32F,
+            )
+        })
+    }
+}
+
+fn from_image(decoded: DynamicImage) -> Result<Picture, PictureError> {
+    let image = decoded.into_rgb32f();
+    let (width, height) = image.dimensions();
+    let pixels = image.as_chunks::<3>().0.iter().map(|p| Vec3::from(*p)).collect();
+    Picture::new(width, height, pixels)
+}
+
+/// Writes a file beside `path` and renames it to that, so that there is a whole file or none.
+fn write_whole(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), ImageError>,
+) -> Result<(), PictureError> {
+    let fail = |source| PictureError::Write { file: path.into(), source };
+    let Some(name) = path.file_name() else {
+        return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, "it has no file name")));
+    };
+    let mut temporary = std::ffi::OsString::from(".");
+    temporary.push(name);
+    temporary.push(format!(".{}.tmp", std::process::id()));
+    let temporary = path.with_file_name(temporary);
+    let written = || -> io::Result<()> {
+        let mut out = BufWriter::new(File::create(&temporary)?);
+        write(&mut out).map_err(|e| match e {
+            ImageError::IoError(e) => e,
+            e => io::Error::other(e),
+        })?;
+        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+        fs::rename(&temporary, path)
+    };
+    written().map_err(|source| {
+        // What is left of it is of no use; that it may not be there is no second fault.
+        let _ = fs::remove_file(&temporary);
+        fail(source)
+    })
+}
