@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
-use glam::{Quat, UVec3, Vec3};
+use glam::{Quat, UVec2, UVec3, Vec3};
 use lumencast_gather::Gather;
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, MaterialModel, Options};
@@ -165,6 +165,24 @@ impl fmt::Display for Materials {
     }
 }
 
+/// A factor on radiance, or none where it is to be found from a picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Exposure(pub(crate) Option<f32>);
+
+impl FromStr for Exposure {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self(None));
+        }
+        match text.parse() {
+            Ok(factor) if factor > 0.0 && f32::is_finite(factor) => Ok(Self(Some(factor))),
+            _ => Err("give auto or a positive number".into()),
+        }
+    }
+}
+
 /// Reads a script of edits.
 fn read_script(path: &Path) -> Result<Script> {
     let text = std::fs::read_to_string(path)
@@ -257,6 +275,18 @@ fn parse_samples(text: &str) -> Result<SampleRange> {
     }
 }
 
+/// `WxH`
+pub(crate) fn parse_size(text: &str) -> Result<UVec2, String> {
+    const LARGEST: u32 = 16_384;
+    let wrong = || format!("{text:?}: a size is given as 1280x720, each side from 1 to {LARGEST}");
+    let (width, height) = text.split_once('x').ok_or_else(wrong)?;
+    let side = |text: &str| match text.parse() {
+        Ok(n) if (1..=LARGEST).contains(&n) => Ok(n),
+        _ => Err(wrong()),
+    };
+    Ok(UVec2::new(side(width)?, side(height)?))
+}
+
 /// More than 0, at most 1.
 fn parse_share(text: &str) -> Result<f32> {
     let share: f32 = text.parse()?;
@@ -265,7 +295,7 @@ fn parse_share(text: &str) -> Result<f32> {
 }
 
 /// A number above 0, or `inf`.
-fn parse_positive(text: &str) -> Result<f32> {
+pub(crate) fn parse_positive(text: &str) -> Result<f32> {
     let number: f32 = text.parse()?;
     ensure!(number > 0.0, "more than 0");
     Ok(number)

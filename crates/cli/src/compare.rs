@@ -1,13 +1,13 @@
 //! `lumencast compare`: how far a picture is from its reference.
 
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use lumencast_picture::{Comparison, Loaded, PIXELS_PER_DEGREE, ToneMap, compare};
 use serde_json::{Value, json};
 
+use crate::arguments::Exposure;
 use crate::output;
 
 /// Says how far a picture is from a reference: PSNR, FLIP, SSIM, MSE (.png, .exr, .hdr).
@@ -46,24 +46,6 @@ pub(crate) struct Compare {
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
-}
-
-/// What `--exposure` says.
-#[derive(Clone, Copy, Debug)]
-struct Exposure(Option<f32>);
-
-impl FromStr for Exposure {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if text == "auto" {
-            return Ok(Self(None));
-        }
-        match text.parse() {
-            Ok(factor) if factor > 0.0 && f32::is_finite(factor) => Ok(Self(Some(factor))),
-            _ => Err("give auto or a positive number".into()),
-        }
-    }
 }
 
 fn parse_ppd(text: &str) -> Result<f32, String> {

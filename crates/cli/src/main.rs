@@ -5,13 +5,16 @@
 mod arguments;
 mod bake;
 mod bench;
+mod camera;
 mod compare;
 mod doctor;
 mod environment;
 mod inspect;
+mod interrupt;
 mod output;
 mod probe;
 mod remote;
+mod render;
 mod serve;
 mod token;
 
@@ -50,6 +53,7 @@ enum Command {
     Bake(bake::Bake),
     Inspect(inspect::Inspect),
     Probe(probe::Probe),
+    Render(Box<render::Render>),
     Compare(compare::Compare),
     Doctor(doctor::Doctor),
     Token(token::Token),
@@ -71,6 +75,7 @@ fn main() -> ExitCode {
         Command::Bake(command) => command.run(),
         Command::Inspect(command) => command.run(),
         Command::Probe(command) => command.run(),
+        Command::Render(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Doctor(command) => command.run(),
         Command::Token(command) => command.run(),

@@ -30,6 +30,17 @@ pub(crate) fn bar(length: u64, message: &'static str) -> ProgressBar {
     ProgressBar::new(length).with_style(style).with_message(message)
 }
 
+/// Positions of a [`share_bar`].
+pub(crate) const SHARE_BAR_LENGTH: f64 = 10_000.0;
+
+/// A bar of work whose parts are not worth counting: percent and the time left; on standard error,
+/// and only if that is a terminal.
+pub(crate) fn share_bar(message: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {percent} %, {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(SHARE_BAR_LENGTH as u64).with_style(style).with_message(message)
+}
+
 /// Bytes for people.
 pub(crate) fn bytes(n: u64) -> String {
     match n {

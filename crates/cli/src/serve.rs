@@ -10,7 +10,7 @@ use lumencast_transport::{Access, Key, Tls};
 use serde_json::json;
 
 use crate::arguments::{DEFAULT_PORT, GatherArguments, SceneArguments, TickArguments};
-use crate::output;
+use crate::{interrupt, output};
 
 /// Loads a scene, computes its light continuously and casts it; serves the page that shows it.
 #[derive(Debug, Args)]
@@ -86,7 +86,7 @@ impl Serve {
         runtime.block_on(async {
             let server = Server::bind(scene, gatherer, config).await?;
             self.announce(&server);
-            server.run(interrupted()).await?;
+            server.run(interrupt::first()).await?;
             Ok(())
         })
     }
@@ -142,34 +142,4 @@ impl Serve {
         }
         println!("Ctrl-C stops the server.");
     }
-}
-
-/// Ends at the first Ctrl-C (or SIGTERM); the second one ends the program.
-async fn interrupted() {
-    signal().await;
-    eprintln!("Stopping; Ctrl-C again stops at once.");
-    tokio::spawn(async {
-        signal().await;
-        std::process::exit(130);
-    });
-}
-
-#[cfg(unix)]
-async fn signal() {
-    use tokio::signal::unix::{SignalKind, signal};
-    let terminated = async {
-        match signal(SignalKind::terminate()) {
-            Ok(mut signal) => drop(signal.recv().await),
-            Err(_) => std::future::pending().await,
-        }
-    };
-    tokio::select! {
-        _ = tokio::signal::ctrl_c() => {}
-        () = terminated => {}
-    }
-}
-
-#[cfg(not(unix))]
-async fn signal() {
-    let _ = tokio::signal::ctrl_c().await;
 }

@@ -18,7 +18,10 @@ fn help_shows_examples_and_the_version_is_told() {
         &["compare", "--help"],
         &["doctor", "--help"],
         &["token", "--help"],
+        &["render", "--help"],
         &["bench", "tick", "--help"],
+        &["bench", "rays", "--help"],
+        &["bench", "paths", "--help"],
     ] {
         let ran = run(arguments);
         assert_eq!(ran.code, Some(0), "{arguments:?}: {ran:?}");
@@ -40,6 +43,13 @@ fn wrong_usage_exits_with_2() {
         &["probe", "cornell", "--at", "0,0"],
         &["probe", "cornell", "--at", "0,0,0", "--order", "5"],
         &["serve", "cornell", "--tls-cert", "cert.pem"],
+        &["render", "cornell"],
+        &["render", "cornell", "-o", "x.png", "--size", "0x3"],
+        &["render", "cornell", "-o", "x.png", "--size", "1280"],
+        &["render", "cornell", "-o", "x.png", "--spp", "0"],
+        &["render", "cornell", "-o", "x.png", "--camera", "0,0,0,0,0,0"],
+        &["render", "cornell", "-o", "x.png", "--exposure", "-1"],
+        &["render", "cornell", "-o", "x.png", "--time", "nan"],
         &["compare", "a.exr"],
         &["compare", "a.exr", "b.exr", "--exposure", "-1"],
         &["compare", "a.exr", "b.exr", "--ppd", "0"],
@@ -296,4 +306,31 @@ fn bench_prints_figures() {
         let value = figures.pointer(pointer).and_then(Value::as_f64);
         assert!(value.is_some_and(|v| v > 0.0), "{pointer}: {figures}");
     }
+}
+
+#[test]
+fn bench_rays_and_paths_print_figures() {
+    let ran = run(&["bench", "rays", "cornell", "--rays", "2000", "--rounds", "2", "--json"]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let figures = ran.json();
+    for pointer in [
+        "/triangles",
+        "/hits/closest",
+        "/closest_a_second/median",
+        "/any_a_second/median",
+        "/build_ms/median",
+        "/top_level_ms/median",
+        "/bytes_a_triangle",
+    ] {
+        let value = figures.pointer(pointer).and_then(Value::as_f64);
+        assert!(value.is_some_and(|v| v > 0.0), "{pointer}: {figures}");
+    }
+    let ran = run(&["bench", "paths", "cornell", "--size", "32x24", "--rounds", "2", "--json"]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let figures = ran.json();
+    for pointer in ["/samples", "/paths_a_second/median", "/segments_a_second/median"] {
+        let value = figures.pointer(pointer).and_then(Value::as_f64);
+        assert!(value.is_some_and(|v| v > 0.0), "{pointer}: {figures}");
+    }
+    run(&["bench", "rays", "cornell", "--camera", "0,50,0,0,99,0"]).failed_saying(&["--camera"]);
 }

@@ -188,6 +188,12 @@ impl RayBench {
         self.first_triangle[hit.instance as usize][hit.primitive as usize] + hit.triangle
     }
 
+    /// Bytes that the acceleration structures take.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.world.accel().bytes()
+    }
+
     /// Runs on the threads that rays are traced with.
     pub fn install<T: Send>(&self, run: impl FnOnce() -> T + Send) -> T {
         self.pool.install(run)

@@ -87,6 +87,11 @@ impl MeshBvh {
         Self { nodes: Pages::new(nodes), blocks: Pages::new(blocks), bounds: root.bounds(), cost }
     }
 
+    /// Bytes of its nodes and triangles.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val::<[Node]>(&self.nodes) + size_of_val::<[Block]>(&self.blocks)
+    }
+
     /// Object-space bounds.
     pub(crate) fn bounds(&self) -> Aabb {
         self.bounds

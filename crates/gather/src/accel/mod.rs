@@ -103,6 +103,15 @@ impl Accel {
         self.bounds
     }
 
+    /// Bytes that it takes, hierarchies that instances share counted once.
+    pub(crate) fn bytes(&self) -> usize {
+        let mut seen = std::collections::HashSet::new();
+        let shared = self.placed.iter().filter(|p| seen.insert(Arc::as_ptr(&p.bvh)));
+        size_of_val(self.nodes.as_slice())
+            + size_of_val(self.placed.as_slice())
+            + shared.map(|p| p.bvh.bytes()).sum::<usize>()
+    }
+
     /// The nearest surface that `accept` lets count.
     #[inline]
     pub(crate) fn closest(

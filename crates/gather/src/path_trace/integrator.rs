@@ -175,6 +175,9 @@ impl<'a> Integrator<'a> {
 
     /// Light of one point of an emissive triangle or of the environment, scattered once.
     fn area(&mut self, vertex: &Vertex<'_>, key: u64, sampler: &mut Sampler) -> Vec3 {
+        if self.world.lights.are_punctual() {
+            return Vec3::ZERO;
+        }
         let (choice, u) = (sampler.number(), sampler.square());
         let Some(sample) = self.world.lights.sample_area(vertex.point.position, choice, u) else {
             return Vec3::ZERO;

@@ -8,6 +8,6 @@ mod probe;
 mod view;
 
 pub use film::{Film, Noise};
-pub use picture::{Parts, PictureSettings, Renderer, Traced};
+pub use picture::{PASS, Parts, PictureSettings, Renderer, Traced};
 pub use probe::{ProbeEstimate, ProbeSettings, probe_sh};
 pub use view::{Filter, View};

@@ -18,7 +18,7 @@ use crate::world::{World, WorldCache};
 /// Pixels along the side of what a thread takes at a time.
 const TILE: u32 = 16;
 /// Samples a pixel that are added to a film at once. Part of the result: sums are grouped by it.
-const PASS: u32 = 8;
+pub const PASS: u32 = 4;
 
 /// Which light a picture shows. Direct and indirect add up to all.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -137,7 +137,7 @@ impl Renderer {
         Ok(Self { world, view, settings, pool })
     }
 
-    /// Adds up to 8 samples a pixel to a film, but none beyond `until` a pixel. `going` is told, from
+    /// Adds up to [`PASS`] samples a pixel to a film, but none beyond `until` a pixel. `going` is told, from
     /// any thread, the share of the pass that is done, 0 to 1; when it answers no, the pass ends, the
     /// film stays as it was and the result is `None`.
     ///

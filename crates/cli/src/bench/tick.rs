@@ -1,29 +1,16 @@
-//! `lumencast bench`: figures of this machine.
+//! `lumencast bench tick`: the server's tick.
 
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use clap::{Args, Subcommand};
+use clap::Args;
 use lumencast_codec::{EncodedRegion, Epoch, ProbeHeader};
 use lumencast_server::{Mail, Outlet, Report, Stage, Tick};
 use serde_json::{Value, json};
 
+use super::quantile;
 use crate::arguments::{GatherArguments, SceneArguments, TickArguments};
 use crate::output;
-
-/// Measures what this machine does.
-#[derive(Debug, Subcommand)]
-pub(crate) enum Bench {
-    Tick(BenchTick),
-}
-
-impl Bench {
-    pub(crate) fn run(self) -> Result<()> {
-        match self {
-            Self::Tick(command) => command.run(),
-        }
-    }
-}
 
 /// Runs the server's tick without network and prints its times, samples and bytes.
 #[derive(Debug, Args)]
@@ -174,14 +161,6 @@ impl Outlet for Sent {
         let probes = ProbeHeader::read(&frame.bytes).map_or(0, |header| header.probes()) as f64;
         self.squared_error += f64::from(frame.error).powi(2) * probes;
         self.weight += probes;
-    }
-}
-
-/// The value below which the share `q` of sorted values lies.
-fn quantile(sorted: &[f64], q: f64) -> f64 {
-    match sorted.len() {
-        0 => f64::NAN,
-        n => sorted[((n - 1) as f64 * q).round() as usize],
     }
 }
 

@@ -1,0 +1,53 @@
+//! `lumencast bench`: figures of this machine.
+
+mod paths;
+mod rays;
+mod tick;
+
+use anyhow::Result;
+use clap::Subcommand;
+
+/// Measures what this machine does.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Bench {
+    Tick(tick::BenchTick),
+    Rays(rays::BenchRays),
+    Paths(paths::BenchPaths),
+}
+
+impl Bench {
+    pub(crate) fn run(self) -> Result<()> {
+        match self {
+            Self::Tick(command) => command.run(),
+            Self::Rays(command) => command.run(),
+            Self::Paths(command) => command.run(),
+        }
+    }
+}
+
+/// The value below which the share `q` of sorted values lies.
+fn quantile(sorted: &[f64], q: f64) -> f64 {
+    match sorted.len() {
+        0 => f64::NAN,
+        n => sorted[((n - 1) as f64 * q).round() as usize],
+    }
+}
+
+/// Least, median and largest of some rounds.
+#[derive(Debug, serde::Serialize)]
+struct Spread {
+    min: f64,
+    median: f64,
+    max: f64,
+}
+
+impl Spread {
+    fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        Self {
+            min: quantile(&values, 0.0),
+            median: quantile(&values, 0.5),
+            max: quantile(&values, 1.0),
+        }
+    }
+}

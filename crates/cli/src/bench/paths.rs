@@ -1,0 +1,108 @@
+//! `lumencast bench paths`: camera paths a second.
+
+use std::num::NonZeroUsize;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use glam::UVec2;
+use lumencast_gather::reference::{Film, PictureSettings, Renderer};
+use serde_json::json;
+
+use super::Spread;
+use crate::arguments::{Materials, SceneSource, parse_size};
+use crate::camera::{self, CameraArgument};
+use crate::output;
+
+/// Measures camera paths and path segments a second.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  lumencast bench paths sponza.glb
+  lumencast bench paths sponza.glb --materials lambert --bounces 4 --json
+
+Every path goes on to its last bounce, without Russian roulette, unless it leaves the scene. Segments are
+rays of all kinds: from the camera, after bounces, and towards lights.")]
+pub(crate) struct BenchPaths {
+    #[command(flatten)]
+    scene: SceneSource,
+    /// Surface scattering events on a path, seen from the camera.
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(0..=1024))]
+    bounces: u32,
+    /// Width and height, pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
+    size: UVec2,
+    /// A camera of the scene, as for `render`; its first unless given.
+    #[arg(long, value_name = "NAME|INDEX|EYE,TARGET[,FOV]", allow_hyphen_values = true)]
+    camera: Option<CameraArgument>,
+    /// How surfaces reflect: as their materials say, or all as opaque two-sided Lambert.
+    #[arg(long, value_enum, default_value_t = Materials::Full)]
+    materials: Materials,
+    /// Threads; all cores unless given.
+    #[arg(long)]
+    threads: Option<NonZeroUsize>,
+    /// Passes that are measured, of 4 samples a pixel each.
+    #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    rounds: u32,
+    /// Prints JSON only.
+    #[arg(long)]
+    json: bool,
+}
+
+impl BenchPaths {
+    pub(crate) fn run(self) -> Result<()> {
+        let mut scene = self.scene.open()?;
+        let view = camera::view(&scene, self.camera.as_ref())?;
+        let settings = PictureSettings {
+            size: self.size,
+            bounces: self.bounces,
+            materials: self.materials.model(),
+            roulette_from: u32::MAX,
+            threads: self.threads,
+            ..PictureSettings::default()
+        };
+        let renderer = Renderer::new(&scene.snapshot(), view, settings)
+            .context("cannot start the threads that trace")?;
+        let mut film = Film::new(self.size);
+        let bar = output::bar(self.rounds.into(), "Tracing");
+        let (mut paths, mut segments) = (Vec::new(), Vec::new());
+        for _ in 0..self.rounds {
+            let start = Instant::now();
+            // Never told to stop.
+            let traced = renderer.pass(&mut film, u32::MAX, &|_| true).unwrap_or_default();
+            let seconds = start.elapsed().as_secs_f64();
+            paths.push(traced.paths as f64 / seconds);
+            segments.push(traced.rays as f64 / seconds);
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        let (paths, segments) = (Spread::of(paths), Spread::of(segments));
+        let relative_rms = film.noise(1.0).map(|noise| noise.relative_rms);
+        if self.json {
+            return output::json(&json!({
+                "scene": scene.name(),
+                "width": self.size.x,
+                "height": self.size.y,
+                "bounces": self.bounces,
+                "materials": self.materials.to_string(),
+                "samples": film.samples(),
+                "paths_a_second": paths,
+                "segments_a_second": segments,
+                "noise_relative_rms": relative_rms,
+            }));
+        }
+        println!("{}: {} × {}, {} bounces", scene.name(), self.size.x, self.size.y, self.bounces);
+        for (name, rates) in [("paths", &paths), ("segments", &segments)] {
+            println!(
+                "{name:<9} {:.3} M a second ({:.3} to {:.3})",
+                1e-6 * rates.median,
+                1e-6 * rates.min,
+                1e-6 * rates.max
+            );
+        }
+        if let Some(rms) = relative_rms {
+            println!("noise     {:.1} % of the mean after {} samples", 100.0 * rms, film.samples());
+        }
+        Ok(())
+    }
+}

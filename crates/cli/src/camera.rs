@@ -1,0 +1,135 @@
+//! Where a picture is taken from.
+
+use std::str::FromStr;
+
+use anyhow::{Result, bail};
+use glam::{EulerRot, Quat, Vec3};
+use lumencast_gather::reference::View;
+use lumencast_scene::Scene;
+
+/// Vertical field of view where none is given, degrees.
+const FIELD_OF_VIEW: f32 = 50.0;
+
+/// A camera as given on the command line.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum CameraArgument {
+    /// A camera of the scene, by its name, its node's name or its number.
+    Named(String),
+    /// Eye, target, and vertical field of view in degrees.
+    LookAt(Vec3, Vec3, f32),
+}
+
+impl FromStr for CameraArgument {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+        match numbers.as_deref() {
+            Ok([a, b, c, d, e, f, rest @ ..]) if rest.len() <= 1 => {
+                let fov = rest.first().copied().unwrap_or(FIELD_OF_VIEW);
+                let (eye, target) = (Vec3::new(*a, *b, *c), Vec3::new(*d, *e, *f));
+                match View::look_at(eye, target, fov.to_radians()) {
+                    Some(_) => Ok(Self::LookAt(eye, target, fov)),
+                    None => Err("eye and target have to differ, the field of view to lie between \
+                                 0 and 180 degrees"
+                        .into()),
+                }
+            }
+            Ok([_, _, ..]) => {
+                Err("a camera is given as NAME, INDEX or EX,EY,EZ,TX,TY,TZ[,FOV]".into())
+            }
+            _ => Ok(Self::Named(text.to_owned())),
+        }
+    }
+}
+
+/// The view of the camera asked for; of the scene's first where none was; of the whole scene where
+/// it has none.
+pub(crate) fn view(scene: &Scene, camera: Option<&CameraArgument>) -> Result<View> {
+    let cameras = scene.cameras();
+    let found = match camera {
+        Some(CameraArgument::LookAt(eye, target, fov)) => {
+            return Ok(look_at(*eye, *target, *fov));
+        }
+        None => match cameras.first() {
+            Some(first) => first,
+            None => return Ok(overview(scene)),
+        },
+        Some(CameraArgument::Named(name)) => {
+            let named = cameras.iter().find(|c| c.camera.name == *name || c.node_name == name);
+            let numbered = || cameras.get(name.parse::<usize>().ok()?);
+            match named.or_else(numbered) {
+                Some(camera) => camera,
+                None if cameras.is_empty() => {
+                    bail!("the scene has no cameras; give --camera EX,EY,EZ,TX,TY,TZ[,FOV]")
+                }
+                None => {
+                    let known: Vec<_> = cameras
+                        .iter()
+                        .enumerate()
+                        .map(|(i, c)| format!("{i} ({})", c.node_name))
+                        .collect();
+                    bail!("there is no camera {name:?}; there are {}", known.join(", "))
+                }
+            }
+        }
+    };
+    Ok(View { world_from_camera: found.world_from_camera, projection: found.camera.projection })
+}
+
+fn look_at(eye: Vec3, target: Vec3, fov: f32) -> View {
+    // Only numbers that `from_str` has tried come here, and the overview's, which are sound.
+    View::look_at(eye, target, fov.to_radians()).unwrap_or_else(|| overview_of(eye, 1.0))
+}
+
+/// All of the scene, from above one of its corners.
+fn overview(scene: &Scene) -> View {
+    let bounds = scene.bounds();
+    let radius = (0.5 * (bounds.max - bounds.min).length()).max(1e-3);
+    overview_of(0.5 * (bounds.min + bounds.max), radius)
+}
+
+fn overview_of(center: Vec3, radius: f32) -> View {
+    let fov = FIELD_OF_VIEW.to_radians();
+    let turn = Quat::from_euler(EulerRot::YXZ, 35f32.to_radians(), -25f32.to_radians(), 0.0);
+    let rotation = glam::Mat3::from_quat(turn);
+    let eye = center + rotation * Vec3::Z * (radius / (0.5 * fov).sin());
+    View {
+        world_from_camera: glam::Affine3A::from_mat3_translation(rotation, eye),
+        projection: lumencast_scene::Projection::Perspective {
+            yfov: fov,
+            aspect_ratio: None,
+            near: 0.01,
+            far: None,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cameras() {
+        let parse = |text: &str| text.parse::<CameraArgument>();
+        assert_eq!(parse("nave"), Ok(CameraArgument::Named("nave".into())));
+        assert_eq!(parse("1"), Ok(CameraArgument::Named("1".into())));
+        let given = CameraArgument::LookAt(Vec3::new(0.0, 1.0, 3.0), Vec3::Y, 50.0);
+        assert_eq!(parse("0,1,3,0,1,0"), Ok(given));
+        let given = CameraArgument::LookAt(Vec3::new(0.0, 1.0, -3.5), Vec3::Y, 35.0);
+        assert_eq!(parse("0, 1, -3.5, 0, 1, 0, 35"), Ok(given));
+        for wrong in ["1,2", "1,2,3,1,2,3", "0,0,0,1,1,1,180", "0,0,nan,1,1,1", "1,2,3,4,5,6,7,8"] {
+            assert!(parse(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn found_in_a_scene() {
+        let scene = Scene::open("cornell").expect("a built-in scene");
+        let first = view(&scene, None).expect("its first");
+        let zero = view(&scene, Some(&CameraArgument::Named("0".into()))).expect("the same");
+        assert_eq!(first, zero);
+        let error = view(&scene, Some(&CameraArgument::Named("x".into()))).expect_err("none");
+        assert!(error.to_string().contains("0 ("), "{error}");
+    }
+}

@@ -1,0 +1,95 @@
+//! A picture that is not finished, kept beside it.
+//!
+//! One line that names the format, then little-endian numbers: a key of all that the picture depends
+//! on (u64), width and height (u32), samples of both halves (u32), the sums of both (f32), a hash of
+//! all before (u64).
+
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use glam::{UVec2, Vec3};
+use lumencast_gather::reference::Film;
+
+const MAGIC: &[u8] = b"lumencast picture 1\n";
+
+/// Where the unfinished picture of a file is kept.
+pub(super) fn path_of(output: &Path) -> PathBuf {
+    let mut name = output.as_os_str().to_owned();
+    name.push(".part");
+    name.into()
+}
+
+/// Writes a film; a crash leaves either the old file or the new one.
+pub(super) fn write(path: &Path, key: u64, film: &Film) -> Result<()> {
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend(key.to_le_bytes());
+    let [a, b] = film.parts();
+    for number in [film.size().x, film.size().y, a.1, b.1] {
+        bytes.extend(number.to_le_bytes());
+    }
+    for sum in a.0.iter().chain(b.0) {
+        sum.to_array().iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+    }
+    bytes.extend(hash(&bytes).to_le_bytes());
+    let temporary = path.with_extension("part.tmp");
+    fs::write(&temporary, bytes)
+        .and_then(|()| fs::rename(&temporary, path))
+        .with_context(|| format!("cannot keep the unfinished picture in {}", path.display()))
+}
+
+/// The film kept in a file, if there is one, it is whole, and its key is this.
+pub(super) fn read(path: &Path, key: u64, size: UVec2) -> Option<Film> {
+    let bytes = fs::read(path).ok()?;
+    let (content, end) = bytes.split_last_chunk::<8>()?;
+    let rest = content.strip_prefix(MAGIC)?;
+    let (found, rest) = rest.split_first_chunk::<8>()?;
+    let (numbers, sums) = rest.split_first_chunk::<16>()?;
+    let number = |i: usize| Some(u32::from_le_bytes(*numbers[4 * i..].first_chunk()?));
+    let same = u64::from_le_bytes(*found) == key
+        && UVec2::new(number(0)?, number(1)?) == size
+        && u64::from_le_bytes(*end) == hash(content);
+    let (values, rest) = sums.as_chunks::<4>();
+    if !same || !rest.is_empty() {
+        return None;
+    }
+    let values: Vec<f32> = values.iter().map(|v| f32::from_le_bytes(*v)).collect();
+    let mut sums: Vec<Vec3> = values.chunks_exact(3).map(Vec3::from_slice).collect();
+    let second = sums.split_off(sums.len() / 2);
+    Film::from_parts(size, [(sums, number(2)?), (second, number(3)?)])
+}
+
+fn hash(bytes: &[u8]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    bytes.hash(&mut hasher);
+    hasher.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comes_back_or_not_at_all() {
+        let path = std::env::temp_dir().join(format!("lumencast-{}.part", std::process::id()));
+        let size = UVec2::new(3, 2);
+        let sums = |f: f32| (0..6).map(|i| Vec3::splat(f * i as f32)).collect::<Vec<_>>();
+        let film = Film::from_parts(size, [(sums(0.5), 8), (sums(2.0), 5)]).expect("six pixels");
+        write(&path, 7, &film).expect("a folder for temporary files");
+        assert_eq!(read(&path, 7, size), Some(film));
+        assert_eq!(read(&path, 8, size), None, "other settings");
+        assert_eq!(read(&path, 7, UVec2::new(2, 3)), None, "other size");
+        let whole = fs::read(&path).expect("just written");
+        for length in 0..whole.len() {
+            fs::write(&path, &whole[..length]).expect("as before");
+            assert_eq!(read(&path, 7, size), None, "cut to {length}");
+        }
+        let mut turned = whole;
+        turned[60] ^= 1;
+        fs::write(&path, turned).expect("as before");
+        assert_eq!(read(&path, 7, size), None, "one bit turned");
+        fs::remove_file(&path).expect("there");
+        assert_eq!(read(&path, 7, size), None, "no file");
+    }
+}

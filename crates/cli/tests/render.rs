@@ -1,0 +1,130 @@
+//! `lumencast render`: pictures, and going on with them.
+
+mod common;
+
+use std::path::Path;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use common::{Folder, Program, run};
+use lumencast_picture::{Loaded, Picture, compare};
+
+fn linear(path: &Path) -> Picture {
+    Loaded::read(path).expect("a picture").linear()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("text")
+}
+
+#[test]
+fn parts_of_a_picture_add_up() {
+    let folder = Folder::new("render-parts");
+    let draw = |parts: &str| {
+        let exr = folder.0.join(format!("{parts}.exr"));
+        let png = folder.0.join(format!("{parts}.png"));
+        let ran = run(&[
+            "render",
+            "cornell",
+            "--size",
+            "48x32",
+            "--spp",
+            "8",
+            "--parts",
+            parts,
+            "-o",
+            text(&exr),
+            "-o",
+            text(&png),
+            "--json",
+        ]);
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        let report = ran.json();
+        assert_eq!((report["samples"].as_u64(), report["width"].as_u64()), (Some(8), Some(48)));
+        assert!(report["noise_relative_rms"].as_f64().is_some_and(|noise| noise > 0.0));
+        assert!(!folder.0.join(format!("{parts}.exr.part")).exists());
+        assert_eq!(linear(&png).width(), 48);
+        linear(&exr)
+    };
+    let (all, direct, indirect) = (draw("all"), draw("direct"), draw("indirect"));
+    let sum = Picture::from_fn(48, 32, |x, y| {
+        direct.pixel(x, y).expect("inside") + indirect.pixel(x, y).expect("inside")
+    });
+    let difference = |a: &Picture, b: &Picture| {
+        let pairs = a.pixels().iter().zip(b.pixels());
+        pairs.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max)
+    };
+    assert!(all.pixels().iter().all(|v| v.is_finite()));
+    assert!(difference(&all, &sum) < 1e-4 * lumencast_picture::luminance(all.pixels()[0]).max(1.0));
+    assert!(difference(&all, &direct) > 1e-3, "there is indirect light");
+}
+
+#[test]
+fn goes_on_after_an_interruption() {
+    let folder = Folder::new("render-resume");
+    let (picture, whole) = (folder.0.join("a.exr"), folder.0.join("b.exr"));
+    let partial = folder.0.join("a.exr.part");
+    let arguments = |path: &Path, spp: &str| -> Vec<String> {
+        let all =
+            ["render", "cornell", "--size", "64x48", "-o", text(path), "--spp", spp, "--json"];
+        all.map(str::to_owned).to_vec()
+    };
+    let start = |path: &Path, spp: &str| {
+        let arguments = arguments(path, spp);
+        Program::start(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    let finish = |path: &Path, spp: &str| {
+        let arguments = arguments(path, spp);
+        run(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    // However long it takes to load, there are samples at last.
+    let began = Instant::now();
+    for wait in [1, 2, 4, 8, 16] {
+        let mut program = start(&picture, "1000000");
+        thread::sleep(Duration::from_secs(wait));
+        program.interrupt();
+        assert_eq!(program.wait().code(), Some(130));
+        if partial.exists() {
+            break;
+        }
+    }
+    assert!(partial.exists(), "nothing was kept in {:?}", began.elapsed());
+    assert!(!picture.exists());
+
+    // Far more than were kept would take too long; as many as there are is enough.
+    let ran = finish(&picture, "1");
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let report = ran.json();
+    let samples = report["samples"].as_u64().expect("a number");
+    assert!(samples > 1, "{report}");
+    assert_eq!(report["samples_taken_before"].as_u64(), Some(samples));
+    assert!(!partial.exists());
+
+    let ran = finish(&whole, &samples.to_string());
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let [resumed, at_once] = [&picture, &whole].map(|path| Loaded::read(path).expect("a picture"));
+    let psnr = compare(&at_once, &resumed, None, 67.0).expect("same size").psnr;
+    assert!(psnr > 35.0, "{psnr} dB apart after {samples} samples");
+}
+
+#[test]
+fn a_partial_picture_of_something_else_is_not_used() {
+    let folder = Folder::new("render-other");
+    let picture = folder.0.join("a.png");
+    std::fs::write(folder.0.join("a.png.part"), b"lumencast picture 1\nrubbish").expect("written");
+    let ran = run(&["render", "cornell", "--size", "16x12", "--spp", "2", "-o", text(&picture)]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    assert!(ran.stderr.contains("beginning anew"), "{ran:?}");
+    assert!(picture.exists());
+}
+
+#[test]
+fn says_what_is_wrong_before_it_begins() {
+    let folder = Folder::new("render-wrong");
+    let picture = folder.0.join("a.png");
+    run(&["render", "cornell", "-o", "a.jpg"]).failed_saying(&["a.jpg", ".exr or .png"]);
+    run(&["render", "cornell", "-o", "/no/such/folder/a.png"]).failed_saying(&["no such folder"]);
+    run(&["render", "cornell", "-o", text(&picture), "--camera", "attic"])
+        .failed_saying(&["attic", "0 ("]);
+    run(&["render", "/no/such/scene.glb", "-o", text(&picture)]).failed_saying(&["scene.glb"]);
+}
