@@ -93,3 +93,9 @@ fn sponza() {
     compare("sponza_1", 0.005);
     compare("sponza_3", 0.005);
 }
+
+#[test]
+fn breakfast_room() {
+    compare("breakfast_room_1", 0.005);
+    compare("breakfast_room_3", 0.005);
+}

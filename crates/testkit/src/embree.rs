@@ -6,6 +6,7 @@
 #![expect(unsafe_code, reason = "a C library that is loaded at run time")]
 
 use std::ffi::{c_char, c_uint, c_void};
+use std::mem::ManuallyDrop;
 use std::path::Path;
 
 use glam::Vec3;
@@ -67,8 +68,8 @@ pub struct Embree {
     occluded: unsafe extern "C" fn(Handle, *mut RayHit, *const c_void),
     release_scene: unsafe extern "C" fn(Handle),
     release_device: unsafe extern "C" fn(Handle),
-    /// Outlives what came from it.
-    _library: Library,
+    /// Never unloaded: threads of its own may still run its code.
+    _library: ManuallyDrop<Library>,
 }
 
 // SAFETY: queries on a committed scene may run on any number of threads (Embree's manual, "Ray
@@ -140,7 +141,7 @@ impl Embree {
                 occluded: function!(b"rtcOccluded1", fn(Handle, *mut RayHit, *const c_void)),
                 release_scene: function!(b"rtcReleaseScene", fn(Handle)),
                 release_device: function!(b"rtcReleaseDevice", fn(Handle)),
-                _library: library,
+                _library: ManuallyDrop::new(library),
             })
         }
     }
@@ -188,7 +189,7 @@ impl Embree {
 
 impl Drop for Embree {
     fn drop(&mut self) {
-        // SAFETY: both were made by this library, which is unloaded afterwards.
+        // SAFETY: both were made by this library, and nobody else has them.
         unsafe {
             (self.release_scene)(self.scene);
             (self.release_device)(self.device);
