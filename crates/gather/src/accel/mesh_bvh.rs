@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3A;
 use lumencast_scene::{Mesh, Vertices};
+use rayon::prelude::*;
 
 use super::Aabb;
 use super::build::{Item, tree};
@@ -71,8 +72,12 @@ impl MeshBvh {
             }
         }
         let mut root = tree(&mut items, LANES);
-        let mut blocks = Vec::new();
+        let mut leaves = Vec::with_capacity(ids.len() / LANES);
         let nodes = collapse(&mut root, &mut |items| {
+            leaves.push(items);
+            leaves.len() as u32 - 1
+        });
+        let block = |items: &&[Item]| {
             let mut block = Block::EMPTY;
             for (lane, item) in items.iter().enumerate() {
                 let (p, t) = ids[item.index as usize];
@@ -80,9 +85,9 @@ impl MeshBvh {
                 block.triangle[lane] = t;
                 block.set(lane, source.corners(p, t));
             }
-            blocks.push(block);
-            blocks.len() as u32 - 1
-        });
+            block
+        };
+        let blocks: Vec<_> = leaves.par_iter().with_min_len(256).map(block).collect();
         let cost = cost(&nodes);
         Self { nodes: Pages::new(nodes), blocks: Pages::new(blocks), bounds: root.bounds(), cost }
     }

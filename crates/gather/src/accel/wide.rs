@@ -70,8 +70,11 @@ impl Node {
 /// Which inner nodes vanish is chosen so that the expected cost of a ray is least, by dynamic
 /// programming over the tree (Ylitie, Karras and Laine 2017, "Efficient incoherent ray traversal on
 /// GPUs through compressed wide BVHs", section 3.2).
-pub(super) fn collapse(root: &mut Tree<'_>, leaf: &mut impl FnMut(&[Item]) -> u32) -> Vec<Node> {
-    plan(root);
+pub(super) fn collapse<'a>(
+    root: &mut Tree<'a>,
+    leaf: &mut impl FnMut(&'a [Item]) -> u32,
+) -> Vec<Node> {
+    plan(root, 0);
     let mut nodes = Vec::new();
     emit(root, &mut nodes, leaf);
     nodes
@@ -80,13 +83,20 @@ pub(super) fn collapse(root: &mut Tree<'_>, leaf: &mut impl FnMut(&[Item]) -> u3
 /// Cost of visiting a node, of visiting a leaf: one.
 const NODE_COST: f32 = 1.0;
 
+/// Down to this depth, subtrees are planned on several threads.
+const PARALLEL_DEPTH: u32 = 6;
+
 /// Least cost of a subtree as a forest of at most 1, 2, … 8 children. Notes at every inner node how
 /// many of them go to its left side.
-fn plan(tree: &mut Tree<'_>) -> [f32; 8] {
+fn plan(tree: &mut Tree<'_>, depth: u32) -> [f32; 8] {
     let area = tree.bounds().half_area();
     let Tree::Inner(_, pair, cut) = tree else { return [area; 8] };
     let [left, right] = &mut **pair;
-    let (left, right) = (plan(left), plan(right));
+    let (left, right) = if depth < PARALLEL_DEPTH {
+        rayon::join(|| plan(left, depth + 1), || plan(right, depth + 1))
+    } else {
+        (plan(left, depth + 1), plan(right, depth + 1))
+    };
     let mut costs = [0.0; 8];
     for roots in 2..=8 {
         // The first that is cheapest.
@@ -114,9 +124,9 @@ fn plan(tree: &mut Tree<'_>) -> [f32; 8] {
 }
 
 fn emit<'a>(
-    tree: &'a Tree<'a>,
+    tree: &Tree<'a>,
     nodes: &mut Vec<Node>,
-    leaf: &mut impl FnMut(&[Item]) -> u32,
+    leaf: &mut impl FnMut(&'a [Item]) -> u32,
 ) -> u32 {
     let index = nodes.len();
     nodes.push(Node::EMPTY);
@@ -143,7 +153,7 @@ fn emit<'a>(
 }
 
 /// The forest of at most `roots` children that [`plan`] chose.
-fn open<'a>(tree: &'a Tree<'a>, roots: usize, children: &mut Vec<&'a Tree<'a>>) {
+fn open<'t, 'a>(tree: &'t Tree<'a>, roots: usize, children: &mut Vec<&'t Tree<'a>>) {
     match tree {
         Tree::Inner(_, pair, cut) if roots > 1 => match usize::from(cut[roots - 1]) {
             0 => open(tree, roots - 1, children),
