@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
-use glam::{Quat, UVec2, UVec3, Vec3};
+use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::Gather;
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, MaterialModel, Options};
@@ -273,18 +273,6 @@ fn parse_samples(text: &str) -> Result<SampleRange> {
             Ok(SampleRange { min, max })
         }
     }
-}
-
-/// `WxH`
-pub(crate) fn parse_size(text: &str) -> Result<UVec2, String> {
-    const LARGEST: u32 = 16_384;
-    let wrong = || format!("{text:?}: a size is given as 1280x720, each side from 1 to {LARGEST}");
-    let (width, height) = text.split_once('x').ok_or_else(wrong)?;
-    let side = |text: &str| match text.parse() {
-        Ok(n) if (1..=LARGEST).contains(&n) => Ok(n),
-        _ => Err(wrong()),
-    };
-    Ok(UVec2::new(side(width)?, side(height)?))
 }
 
 /// More than 0, at most 1.

@@ -1,11 +1,48 @@
-//! Where a picture is taken from.
+//! From where a picture is taken, how large it is, and how far its paths go.
 
+use std::num::NonZeroUsize;
 use std::str::FromStr;
 
 use anyhow::{Result, bail};
-use glam::{EulerRot, Quat, Vec3};
-use lumencast_gather::reference::View;
+use clap::Args;
+use glam::{EulerRot, Quat, UVec2, Vec3};
+use lumencast_gather::reference::{PictureSettings, View};
 use lumencast_scene::Scene;
+
+use crate::arguments::Materials;
+
+/// What every path-traced picture needs to know.
+#[derive(Debug, Args)]
+pub(crate) struct PictureArguments {
+    /// Surface scattering events on a path, seen from the camera.
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(0..=1024))]
+    pub(crate) bounces: u32,
+    /// Width and height, pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
+    pub(crate) size: UVec2,
+    /// A camera of the scene by name or number, or eye, target and vertical field of view in
+    /// degrees; the scene's first camera unless given.
+    #[arg(long, value_name = "NAME|INDEX|EYE,TARGET[,FOV]", allow_hyphen_values = true)]
+    pub(crate) camera: Option<CameraArgument>,
+    /// How surfaces reflect: as their materials say, or all as opaque two-sided Lambert.
+    #[arg(long, value_enum, default_value_t = Materials::Full)]
+    pub(crate) materials: Materials,
+    /// Threads; all cores unless given.
+    #[arg(long)]
+    pub(crate) threads: Option<NonZeroUsize>,
+}
+
+impl PictureArguments {
+    pub(crate) fn settings(&self) -> PictureSettings {
+        PictureSettings {
+            size: self.size,
+            bounces: self.bounces,
+            materials: self.materials.model(),
+            threads: self.threads,
+            ..PictureSettings::default()
+        }
+    }
+}
 
 /// Vertical field of view where none is given, degrees.
 const FIELD_OF_VIEW: f32 = 50.0;
@@ -103,6 +140,18 @@ fn overview_of(center: Vec3, radius: f32) -> View {
             far: None,
         },
     }
+}
+
+/// `WxH`
+fn parse_size(text: &str) -> Result<UVec2, String> {
+    const LARGEST: u32 = 16_384;
+    let wrong = || format!("{text:?}: a size is given as 1280x720, each side from 1 to {LARGEST}");
+    let (width, height) = text.split_once('x').ok_or_else(wrong)?;
+    let side = |text: &str| match text.parse() {
+        Ok(n) if (1..=LARGEST).contains(&n) => Ok(n),
+        _ => Err(wrong()),
+    };
+    Ok(UVec2::new(side(width)?, side(height)?))
 }
 
 #[cfg(test)]

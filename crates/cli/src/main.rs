@@ -62,6 +62,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    output::end_quietly_where_nobody_reads();
     let cli = Cli::parse();
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(LOGGED));
     tracing_subscriber::fmt()

@@ -1,18 +1,38 @@
 //! What goes to the terminal.
 
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::time::Duration;
 
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 
+/// Ends the program as Unix's own do when nobody reads on, `lumencast inspect FILE | head` for
+/// instance: quietly, with the code of SIGPIPE. For `println!`, which panics then, and for all other
+/// panics the usual message.
+pub(crate) fn end_quietly_where_nobody_reads() {
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let message = panic.payload_as_str().unwrap_or_default();
+        if message.starts_with("failed printing to stdout") && message.contains("Broken pipe") {
+            std::process::exit(BROKEN_PIPE);
+        }
+        report(panic);
+    }));
+}
+
+/// Exit code of a program that SIGPIPE ended.
+const BROKEN_PIPE: i32 = 141;
+
 /// Prints JSON, and nothing but it, to standard output.
 pub(crate) fn json(value: &serde_json::Value) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    serde_json::to_writer_pretty(&mut out, value)
+    let written = serde_json::to_writer_pretty(&mut out, value)
         .map_err(std::io::Error::from)
-        .and_then(|()| writeln!(out))
-        .context("cannot write to standard output")
+        .and_then(|()| writeln!(out));
+    match written {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(BROKEN_PIPE),
+        written => written.context("cannot write to standard output"),
+    }
 }
 
 /// A line that turns while something of unknown length goes on; on standard error, and only if

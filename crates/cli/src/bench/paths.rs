@@ -1,17 +1,15 @@
 //! `lumencast bench paths`: camera paths a second.
 
-use std::num::NonZeroUsize;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use glam::UVec2;
 use lumencast_gather::reference::{Film, PictureSettings, Renderer};
 use serde_json::json;
 
 use super::Spread;
-use crate::arguments::{Materials, SceneSource, parse_size};
-use crate::camera::{self, CameraArgument};
+use crate::arguments::SceneSource;
+use crate::camera::{self, PictureArguments};
 use crate::output;
 
 /// Measures camera paths and path segments a second.
@@ -26,21 +24,8 @@ rays of all kinds: from the camera, after bounces, and towards lights.")]
 pub(crate) struct BenchPaths {
     #[command(flatten)]
     scene: SceneSource,
-    /// Surface scattering events on a path, seen from the camera.
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(0..=1024))]
-    bounces: u32,
-    /// Width and height, pixels.
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
-    size: UVec2,
-    /// A camera of the scene, as for `render`; its first unless given.
-    #[arg(long, value_name = "NAME|INDEX|EYE,TARGET[,FOV]", allow_hyphen_values = true)]
-    camera: Option<CameraArgument>,
-    /// How surfaces reflect: as their materials say, or all as opaque two-sided Lambert.
-    #[arg(long, value_enum, default_value_t = Materials::Full)]
-    materials: Materials,
-    /// Threads; all cores unless given.
-    #[arg(long)]
-    threads: Option<NonZeroUsize>,
+    #[command(flatten)]
+    picture: PictureArguments,
     /// Passes that are measured, of 4 samples a pixel each.
     #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
@@ -52,18 +37,11 @@ pub(crate) struct BenchPaths {
 impl BenchPaths {
     pub(crate) fn run(self) -> Result<()> {
         let mut scene = self.scene.open()?;
-        let view = camera::view(&scene, self.camera.as_ref())?;
-        let settings = PictureSettings {
-            size: self.size,
-            bounces: self.bounces,
-            materials: self.materials.model(),
-            roulette_from: u32::MAX,
-            threads: self.threads,
-            ..PictureSettings::default()
-        };
+        let view = camera::view(&scene, self.picture.camera.as_ref())?;
+        let settings = PictureSettings { roulette_from: u32::MAX, ..self.picture.settings() };
         let renderer = Renderer::new(&scene.snapshot(), view, settings)
             .context("cannot start the threads that trace")?;
-        let mut film = Film::new(self.size);
+        let mut film = Film::new(self.picture.size);
         let bar = output::bar(self.rounds.into(), "Tracing");
         let (mut paths, mut segments) = (Vec::new(), Vec::new());
         for _ in 0..self.rounds {
@@ -81,17 +59,23 @@ impl BenchPaths {
         if self.json {
             return output::json(&json!({
                 "scene": scene.name(),
-                "width": self.size.x,
-                "height": self.size.y,
-                "bounces": self.bounces,
-                "materials": self.materials.to_string(),
+                "width": self.picture.size.x,
+                "height": self.picture.size.y,
+                "bounces": self.picture.bounces,
+                "materials": self.picture.materials.to_string(),
                 "samples": film.samples(),
                 "paths_a_second": paths,
                 "segments_a_second": segments,
                 "noise_relative_rms": relative_rms,
             }));
         }
-        println!("{}: {} × {}, {} bounces", scene.name(), self.size.x, self.size.y, self.bounces);
+        println!(
+            "{}: {} × {}, {} bounces",
+            scene.name(),
+            self.picture.size.x,
+            self.picture.size.y,
+            self.picture.bounces
+        );
         for (name, rates) in [("paths", &paths), ("segments", &segments)] {
             println!(
                 "{name:<9} {:.3} M a second ({:.3} to {:.3})",

@@ -4,7 +4,6 @@ mod partial;
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -19,8 +18,8 @@ use lumencast_picture::{Picture, ToneMap, exposure};
 use lumencast_scene::{FileContents, Scene};
 use serde_json::{Value, json};
 
-use crate::arguments::{Exposure, Materials, SceneSource, parse_positive, parse_size};
-use crate::camera::{self, CameraArgument};
+use crate::arguments::{Exposure, SceneSource, parse_positive};
+use crate::camera::{self, PictureArguments};
 use crate::{interrupt, output};
 
 /// Draws a picture of a scene.
@@ -49,22 +48,11 @@ pub(crate) struct Render {
     #[arg(long, value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     spp: u32,
-    /// Surface scattering events on a path, seen from the camera.
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(0..=1024))]
-    bounces: u32,
-    /// Width and height, pixels.
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
-    size: UVec2,
-    /// A camera of the scene by name or number, or eye, target and vertical field of view in
-    /// degrees; the scene's first camera unless given.
-    #[arg(long, value_name = "NAME|INDEX|EYE,TARGET[,FOV]", allow_hyphen_values = true)]
-    camera: Option<CameraArgument>,
+    #[command(flatten)]
+    picture: PictureArguments,
     /// Which light: direct is what clients draw themselves, indirect what light fields hold.
     #[arg(long, value_enum, default_value_t = PartsArgument::All)]
     parts: PartsArgument,
-    /// How surfaces reflect: as their materials say, or all as opaque two-sided Lambert.
-    #[arg(long, value_enum, default_value_t = Materials::Full)]
-    materials: Materials,
     /// How a pixel weighs what it sees.
     #[arg(long, value_enum, default_value_t = FilterArgument::Box)]
     filter: FilterArgument,
@@ -87,9 +75,6 @@ pub(crate) struct Render {
     /// Another seed gives other, independent noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Threads; all cores unless given.
-    #[arg(long)]
-    threads: Option<NonZeroUsize>,
     /// Begins anew where an unfinished picture is there.
     #[arg(long)]
     restart: bool,
@@ -131,7 +116,7 @@ impl Render {
         self.check_outputs()?;
         let mut scene = self.scene.open()?;
         scene.advance(self.time);
-        let view = camera::view(&scene, self.camera.as_ref())?;
+        let view = camera::view(&scene, self.picture.camera.as_ref())?;
         let settings = self.settings();
         let key = self.key(&scene, view, settings);
         let partial = partial::path_of(&self.output[0]);
@@ -161,7 +146,7 @@ impl Render {
             }
         };
         let seconds = start.elapsed().as_secs_f64();
-        let picture = Picture::new(self.size.x, self.size.y, film.picture())?;
+        let picture = Picture::new(self.picture.size.x, self.picture.size.y, film.picture())?;
         let exposure = self.exposure.0.unwrap_or_else(|| exposure(&picture));
         self.write(&picture, exposure)?;
         if partial.exists() {
@@ -193,8 +178,6 @@ impl Render {
 
     fn settings(&self) -> PictureSettings {
         PictureSettings {
-            size: self.size,
-            bounces: self.bounces,
             clamp: self.clamp,
             roulette_from: self.roulette_from,
             parts: match self.parts {
@@ -202,14 +185,13 @@ impl Render {
                 PartsArgument::Direct => Parts::Direct,
                 PartsArgument::Indirect => Parts::Indirect,
             },
-            materials: self.materials.model(),
             filter: match self.filter {
                 FilterArgument::Box => Filter::Box,
                 FilterArgument::Tent => Filter::Tent,
                 FilterArgument::Gaussian => Filter::Gaussian,
             },
             seed: self.seed,
-            threads: self.threads,
+            ..self.picture.settings()
         }
     }
 
@@ -235,7 +217,8 @@ impl Render {
 
     /// The film to go on with.
     fn begun(&self, partial: &Path, key: u64) -> Film {
-        let kept = (!self.restart).then(|| partial::read(partial, key, self.size)).flatten();
+        let kept =
+            (!self.restart).then(|| partial::read(partial, key, self.picture.size)).flatten();
         match kept {
             Some(film) => {
                 eprintln!("Going on from {} samples in {}.", film.samples(), partial.display());
@@ -248,7 +231,7 @@ impl Render {
                         partial.display()
                     );
                 }
-                Film::new(self.size)
+                Film::new(self.picture.size)
             }
         }
     }
@@ -308,16 +291,16 @@ impl Render {
         println!("{}", files.join(", "));
         println!(
             "{} × {}, {} samples a pixel, {} bounces, {:.1} s",
-            self.size.x,
-            self.size.y,
+            self.picture.size.x,
+            self.picture.size.y,
             done.film.samples(),
-            self.bounces,
+            self.picture.bounces,
             done.seconds
         );
-        if done.paths(self.size) > 0.0 {
+        if done.paths(self.picture.size) > 0.0 {
             println!(
                 "{:.3} M paths, {:.3} M rays a second",
-                1e-6 * done.paths(self.size) / done.seconds,
+                1e-6 * done.paths(self.picture.size) / done.seconds,
                 1e-6 * done.rays as f64 / done.seconds
             );
         }
@@ -334,14 +317,14 @@ impl Render {
         let noise = done.film.noise(done.exposure);
         json!({
             "files": self.output,
-            "width": self.size.x,
-            "height": self.size.y,
+            "width": self.picture.size.x,
+            "height": self.picture.size.y,
             "samples": done.film.samples(),
-            "bounces": self.bounces,
-            "materials": self.materials.to_string(),
+            "bounces": self.picture.bounces,
+            "materials": self.picture.materials.to_string(),
             "seconds": done.seconds,
             "samples_taken_before": done.before,
-            "paths_a_second": done.paths(self.size) / done.seconds,
+            "paths_a_second": done.paths(self.picture.size) / done.seconds,
             "rays_a_second": done.rays as f64 / done.seconds,
             "exposure": done.exposure,
             "noise_relative_rms": noise.map(|n| n.relative_rms),
