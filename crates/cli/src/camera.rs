@@ -52,8 +52,8 @@ const FIELD_OF_VIEW: f32 = 50.0;
 pub(crate) enum CameraArgument {
     /// A camera of the scene, by its name, its node's name or its number.
     Named(String),
-    /// Eye, target, and vertical field of view in degrees.
-    LookAt(Vec3, Vec3, f32),
+    /// From an eye to a target.
+    LookAt(View),
 }
 
 impl FromStr for CameraArgument {
@@ -66,7 +66,7 @@ impl FromStr for CameraArgument {
                 let fov = rest.first().copied().unwrap_or(FIELD_OF_VIEW);
                 let (eye, target) = (Vec3::new(*a, *b, *c), Vec3::new(*d, *e, *f));
                 match View::look_at(eye, target, fov.to_radians()) {
-                    Some(_) => Ok(Self::LookAt(eye, target, fov)),
+                    Some(view) => Ok(Self::LookAt(view)),
                     None => Err("eye and target have to differ, the field of view to lie between \
                                  0 and 180 degrees"
                         .into()),
@@ -85,9 +85,7 @@ impl FromStr for CameraArgument {
 pub(crate) fn view(scene: &Scene, camera: Option<&CameraArgument>) -> Result<View> {
     let cameras = scene.cameras();
     let found = match camera {
-        Some(CameraArgument::LookAt(eye, target, fov)) => {
-            return Ok(look_at(*eye, *target, *fov));
-        }
+        Some(CameraArgument::LookAt(view)) => return Ok(*view),
         None => match cameras.first() {
             Some(first) => first,
             None => return Ok(overview(scene)),
@@ -114,19 +112,11 @@ pub(crate) fn view(scene: &Scene, camera: Option<&CameraArgument>) -> Result<Vie
     Ok(View { world_from_camera: found.world_from_camera, projection: found.camera.projection })
 }
 
-fn look_at(eye: Vec3, target: Vec3, fov: f32) -> View {
-    // Only numbers that `from_str` has tried come here, and the overview's, which are sound.
-    View::look_at(eye, target, fov.to_radians()).unwrap_or_else(|| overview_of(eye, 1.0))
-}
-
 /// All of the scene, from above one of its corners.
 fn overview(scene: &Scene) -> View {
     let bounds = scene.bounds();
     let radius = (0.5 * (bounds.max - bounds.min).length()).max(1e-3);
-    overview_of(0.5 * (bounds.min + bounds.max), radius)
-}
-
-fn overview_of(center: Vec3, radius: f32) -> View {
+    let center = 0.5 * (bounds.min + bounds.max);
     let fov = FIELD_OF_VIEW.to_radians();
     let turn = Quat::from_euler(EulerRot::YXZ, 35f32.to_radians(), -25f32.to_radians(), 0.0);
     let rotation = glam::Mat3::from_quat(turn);
@@ -163,10 +153,12 @@ mod tests {
         let parse = |text: &str| text.parse::<CameraArgument>();
         assert_eq!(parse("nave"), Ok(CameraArgument::Named("nave".into())));
         assert_eq!(parse("1"), Ok(CameraArgument::Named("1".into())));
-        let given = CameraArgument::LookAt(Vec3::new(0.0, 1.0, 3.0), Vec3::Y, 50.0);
-        assert_eq!(parse("0,1,3,0,1,0"), Ok(given));
-        let given = CameraArgument::LookAt(Vec3::new(0.0, 1.0, -3.5), Vec3::Y, 35.0);
-        assert_eq!(parse("0, 1, -3.5, 0, 1, 0, 35"), Ok(given));
+        let given = |eye: Vec3, fov: f32| {
+            let view = View::look_at(eye, Vec3::Y, fov.to_radians()).expect("two points");
+            Ok(CameraArgument::LookAt(view))
+        };
+        assert_eq!(parse("0,1,3,0,1,0"), given(Vec3::new(0.0, 1.0, 3.0), 50.0));
+        assert_eq!(parse("0, 1, -3.5, 0, 1, 0, 35"), given(Vec3::new(0.0, 1.0, -3.5), 35.0));
         for wrong in ["1,2", "1,2,3,1,2,3", "0,0,0,1,1,1,180", "0,0,nan,1,1,1", "1,2,3,4,5,6,7,8"] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }

@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let build = |robust| Embree::new(library.as_ref(), &triangles, Quality::Medium, robust, pool);
     let mut builds = Vec::new();
     for _ in 0..ROUNDS {
-        let ours = bench.install(|| build_seconds(&snapshot)).0;
+        let ours = bench.install(|| build_seconds(&snapshot));
         let theirs = seconds(|| build(true).map(drop))?;
         builds.push(theirs / ours);
     }

@@ -11,7 +11,7 @@ use glam::{Affine3A, Vec2, Vec3};
 use lumencast_scene::Snapshot;
 use rayon::prelude::*;
 
-use crate::accel::{Accel, AccelCache, Hit, Kernel, Ray, Stack};
+use crate::accel::{AccelCache, Hit, Kernel, Ray, Stack};
 use crate::bsdf::frame;
 use crate::path_trace::MaterialModel;
 use crate::reference::View;
@@ -20,6 +20,9 @@ use crate::world::{World, WorldCache, itself};
 
 /// Rays that a thread takes at a time.
 const CHUNK: usize = 1024;
+
+/// As many paths as rays are wanted are tried at most so often, since in open scenes many leave.
+const ROUNDS: usize = 8;
 
 /// A ray to be measured with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,8 +55,6 @@ pub struct RayBench {
     pub closest: Vec<TestRay>,
     /// Rays to find any surface on.
     pub any: Vec<TestRay>,
-    /// Seconds that building all hierarchies took.
-    pub build_seconds: f64,
 }
 
 impl RayBench {
@@ -71,9 +72,7 @@ impl RayBench {
             .num_threads(threads.map_or(0, NonZeroUsize::get))
             .build()
             .map_err(std::io::Error::other)?;
-        let start = Instant::now();
         let world = pool.install(|| world(scene));
-        let build_seconds = start.elapsed().as_secs_f64();
         let mut next = 0;
         let mut count_from = |n: usize| {
             next += n as u32;
@@ -84,25 +83,25 @@ impl RayBench {
             primitives.map(|p| count_from(p.triangles.len())).collect()
         });
         let first_triangle = first_triangle.collect();
-        let mut bench = Self {
-            world,
-            pool,
-            first_triangle,
-            closest: Vec::new(),
-            any: Vec::new(),
-            build_seconds,
-        };
+        let mut bench = Self { world, pool, first_triangle, closest: Vec::new(), any: Vec::new() };
         bench.find_rays(view, count);
         Ok(bench)
     }
 
     fn find_rays(&mut self, view: View, count: usize) {
         let find = |stack: &mut Stack, i: usize| self.rays_of_path(view, i as u64, stack);
-        // About half of the paths reach their third surface in open scenes.
-        let attempts = 0..count.saturating_mul(8);
-        let mut found: Vec<(u64, TestRay, Option<TestRay>)> = self.pool.install(|| {
-            attempts.into_par_iter().map_init(Stack::default, find).flatten().collect()
-        });
+        let mut found: Vec<(u64, TestRay, Option<TestRay>)> = Vec::new();
+        for round in 0..ROUNDS {
+            if found.len() >= count {
+                break;
+            }
+            let attempts = (round * count..(round + 1) * count).into_par_iter();
+            found.extend(
+                self.pool.install(|| {
+                    attempts.map_init(Stack::default, find).flatten().collect::<Vec<_>>()
+                }),
+            );
+        }
         found.sort_unstable_by_key(|(key, ..)| *key);
         found.truncate(count);
         self.any = found.iter().filter_map(|(_, _, shadow)| *shadow).collect();
@@ -204,19 +203,10 @@ fn world(scene: &Arc<Snapshot>) -> World {
     World::new(scene.clone(), MaterialModel::Lambert, Kernel::detect(), &mut WorldCache::default())
 }
 
-/// Seconds of building every hierarchy of a scene from nothing, and of rebuilding the top level
-/// over its instances, on the calling thread's pool.
+/// Seconds of building every hierarchy of a scene from nothing, on the calling thread's pool.
 #[must_use]
-pub fn build_seconds(scene: &Snapshot) -> (f64, f64) {
-    let mut cache = AccelCache::default();
-    let start = Instant::now();
-    let first = cache.update(scene, Kernel::detect());
-    let built = start.elapsed().as_secs_f64();
-    let start = Instant::now();
-    let second = cache.update(scene, Kernel::detect());
-    let rebuilt = start.elapsed().as_secs_f64();
-    drop((first, second));
-    (built, rebuilt)
+pub fn build_seconds(scene: &Snapshot) -> f64 {
+    update_seconds(&mut AccelCache::default(), scene)
 }
 
 /// Seconds of building the top level over `count` small instances that overlap a little.
@@ -234,9 +224,14 @@ pub fn top_level_seconds(scene: &Snapshot, count: u32) -> f64 {
             copy
         })
         .collect();
-    let _: Accel = cache.update(&many, Kernel::detect());
+    update_seconds(&mut cache, &many);
+    update_seconds(&mut cache, &many)
+}
+
+/// Seconds of bringing a cache to a scene; dropping the result is not counted.
+fn update_seconds(cache: &mut AccelCache, scene: &Snapshot) -> f64 {
     let start = Instant::now();
-    let accel = cache.update(&many, Kernel::detect());
+    let accel = cache.update(scene, Kernel::detect());
     let seconds = start.elapsed().as_secs_f64();
     drop(accel);
     seconds

@@ -6,12 +6,11 @@ import { execFileSync } from 'node:child_process';
 import { createHash, X509Certificate } from 'node:crypto';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
-import { join, resolve } from 'node:path';
+import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
-import { build } from 'vite';
 import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { openPage } from './browser.js';
+import { buildPage, openPage } from './browser.js';
 import { freePort, lumencastProgram, Server } from './server.js';
 
 const NAME = 'lumencast.test';
@@ -34,11 +33,7 @@ describe('a page on another machine', () => {
 
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), 'lumencast-access-'));
-    await build({
-      root: resolve(import.meta.dirname, '..'),
-      logLevel: 'error',
-      build: { outDir: file('page'), emptyOutDir: true },
-    });
+    await buildPage(file('page'));
   }, 120_000);
 
   afterEach(async () => {

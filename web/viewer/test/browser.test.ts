@@ -6,12 +6,11 @@
  */
 import { mkdirSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
-import { join, resolve } from 'node:path';
+import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
-import { build } from 'vite';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { openPage } from './browser.js';
+import { buildPage, openPage } from './browser.js';
 import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
 
 /** Small: every pixel is drawn by the processor. */
@@ -33,11 +32,7 @@ describe('the page', () => {
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), 'lumencast-page-'));
     if (SHOTS) mkdirSync(SHOTS, { recursive: true });
-    await build({
-      root: resolve(import.meta.dirname, '..'),
-      logLevel: 'error',
-      build: { outDir: folder, emptyOutDir: true },
-    });
+    await buildPage(folder);
     browser = await launchBrowser();
     server = await start('cornell', await freePort());
     page = await openPage(browser, server.address, VIEWPORT);

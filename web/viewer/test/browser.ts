@@ -1,4 +1,15 @@
+import { resolve } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
+import { build } from 'vite';
+
+/** Builds the page into a folder, for `lumencast serve --page`. */
+export async function buildPage(folder: string): Promise<void> {
+  await build({
+    root: resolve(import.meta.dirname, '..'),
+    logLevel: 'error',
+    build: { outDir: folder, emptyOutDir: true },
+  });
+}
 
 /**
  * Opens the page and waits for its first light, at a fixed exposure. From then on it draws when asked

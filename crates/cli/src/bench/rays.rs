@@ -71,7 +71,7 @@ impl BenchRays {
             let occluded = bench.trace_any(&bench.any);
             any.push(bench.any.len() as f64 / start.elapsed().as_secs_f64());
             hits = (found.iter().flatten().count(), occluded.iter().filter(|o| **o).count());
-            build.push(1e3 * bench.install(|| build_seconds(&snapshot)).0);
+            build.push(1e3 * bench.install(|| build_seconds(&snapshot)));
             top.push(1e3 * bench.install(|| top_level_seconds(&snapshot, INSTANCES)));
             bar.inc(1);
         }
