@@ -106,11 +106,15 @@ impl Bsdf {
 
     /// The scattering from l to v. `l` may lie on either side.
     pub(crate) fn eval(&self, v: Vec3, l: Vec3) -> Scatter {
-        let [p_diffuse, p_specular, p_transmission] = self.chances(v);
         let mut s = Scatter::default();
         if v.z <= 0.0 {
             return s;
         }
+        if self.is_lambert() {
+            let pdf = FRAC_1_PI * l.z.max(0.0);
+            return Scatter { value: self.diffuse * pdf, pdf };
+        }
+        let [p_diffuse, p_specular, p_transmission] = self.chances(v);
         if l.z > 0.0 {
             s.value += self.diffuse * (self.coupling(v, l) * FRAC_1_PI * l.z);
             s.pdf += p_diffuse * FRAC_1_PI * l.z;
@@ -129,6 +133,12 @@ impl Bsdf {
 
     /// Chooses a direction; `None` where no light comes from. `choice` picks the lobe.
     pub(crate) fn sample(&self, v: Vec3, choice: f32, u: Vec2) -> Option<Chosen> {
+        if self.is_lambert() {
+            let direction = cosine_hemisphere(u);
+            let pdf = FRAC_1_PI * direction.z;
+            let is_found = v.z > 0.0 && pdf > 0.0 && self.diffuse != Vec3::ZERO;
+            return is_found.then_some(Chosen { direction, weight: self.diffuse, pdf });
+        }
         let [p_diffuse, p_specular, p_transmission] = self.chances(v);
         if v.z <= 0.0 || p_diffuse + p_specular + p_transmission <= 0.0 {
             return None;
@@ -149,6 +159,11 @@ impl Bsdf {
         };
         let Scatter { value, pdf } = self.eval(v, direction);
         (pdf > 0.0 && pdf.is_finite()).then(|| Chosen { direction, weight: value / pdf, pdf })
+    }
+
+    /// Whether there is but the diffuse lobe, and nothing above it that reflects.
+    fn is_lambert(&self) -> bool {
+        self.f90 == 0.0 && self.f0 == Vec3::ZERO && self.transmission == Vec3::ZERO
     }
 
     /// Chance of each lobe to be sampled, by what it will about contribute.

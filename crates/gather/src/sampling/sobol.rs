@@ -13,21 +13,23 @@ use super::{ONE_MINUS_EPSILON, mix, mix2};
 pub(crate) struct Sampler {
     /// Of the sequence: seed and receiver.
     sequence: u64,
-    sample: u32,
+    /// Index of the sample, bits reversed.
+    reversed: u32,
     drawn: u64,
 }
 
 impl Sampler {
     #[inline]
     pub(crate) fn new(seed: u64, receiver: u32, sample: u32) -> Self {
-        Self { sequence: mix2(seed, u64::from(receiver)), sample, drawn: 0 }
+        let reversed = sample.reverse_bits();
+        Self { sequence: mix2(seed, u64::from(receiver)), reversed, drawn: 0 }
     }
 
     /// A point of the unit square; over the samples of a receiver these are well spread.
     #[inline]
     pub(crate) fn square(&mut self) -> Vec2 {
         let (order, scramble) = self.keys();
-        let i = shuffled(self.sample, order);
+        let i = shuffled(self.reversed, order);
         let x = owen_reversed(i, scramble as u32).reverse_bits();
         let y = owen_reversed(sobol_reversed(i), (scramble >> 32) as u32).reverse_bits();
         Vec2::new(unit(x), unit(y))
@@ -37,13 +39,13 @@ impl Sampler {
     #[inline]
     pub(crate) fn number(&mut self) -> f32 {
         let (order, scramble) = self.keys();
-        unit(owen_reversed(shuffled(self.sample, order), scramble as u32).reverse_bits())
+        unit(owen_reversed(shuffled(self.reversed, order), scramble as u32).reverse_bits())
     }
 
     /// A key of this path, for decisions by hash.
     #[inline]
     pub(crate) fn key(&self) -> u64 {
-        mix2(self.sequence, u64::from(self.sample))
+        mix2(self.sequence, u64::from(self.reversed))
     }
 
     #[inline]
@@ -51,7 +53,7 @@ impl Sampler {
         self.drawn += 1;
         let key = self.sequence.wrapping_add(self.drawn.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let scramble = mix(key);
-        (mix(scramble ^ 0x5851_f42d_4c95_7f2d) as u32, scramble)
+        ((scramble.wrapping_mul(0x5851_f42d_4c95_7f2d) >> 32) as u32, scramble)
     }
 }
 
@@ -63,8 +65,8 @@ fn unit(bits: u32) -> f32 {
 /// The sample's place in the shuffled order: an Owen scramble of the index, which keeps every
 /// prefix of a power of two well spread.
 #[inline]
-fn shuffled(index: u32, key: u32) -> u32 {
-    owen_reversed(index.reverse_bits(), key).reverse_bits()
+fn shuffled(reversed: u32, key: u32) -> u32 {
+    owen_reversed(reversed, key).reverse_bits()
 }
 
 /// Owen scrambling of a fraction given in reversed bits would need each bit to depend on the bits
