@@ -185,13 +185,36 @@ impl World {
 
     #[cold]
     fn covers_in_part(&self, hit: &Hit, key: u64) -> bool {
-        let triangle = Triangle::new(self.instance(hit.instance), hit.primitive, hit.triangle);
-        let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
-        let coverage = triangle.coverage(self.material(hit.instance, hit.primitive), weights);
+        let material = self.material(hit.instance, hit.primitive);
+        let coverage = self.triangle(hit).coverage(material, hit.weights());
         let place = u64::from(hit.instance) << 40
             ^ u64::from(hit.primitive) << 32
             ^ u64::from(hit.triangle);
         coverage >= 1.0 || unit(mix2(key, place) as u32) < coverage
+    }
+
+    /// Asks for a hit's indices of vertices. What is asked for arrives while other work is done;
+    /// [`Self::point`] and its scattering read, one after the other, indices, vertices, texels.
+    #[inline]
+    pub(crate) fn fetch_triangle(&self, hit: &Hit) {
+        Triangle::fetch(self.instance(hit.instance), hit.primitive, hit.triangle);
+    }
+
+    /// Asks for a hit's vertices.
+    #[inline]
+    pub(crate) fn fetch_vertices(&self, hit: &Hit) {
+        self.triangle(hit).fetch_vertices();
+    }
+
+    /// Asks for the texels at a hit.
+    #[inline]
+    pub(crate) fn fetch_texels(&self, hit: &Hit) {
+        let material = self.material(hit.instance, hit.primitive);
+        self.triangle(hit).fetch_texels(material, hit.weights(), self.model);
+    }
+
+    fn triangle(&self, hit: &Hit) -> Triangle<'_> {
+        Triangle::new(self.instance(hit.instance), hit.primitive, hit.triangle)
     }
 
     /// The point of a hit.

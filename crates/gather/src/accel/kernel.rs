@@ -266,7 +266,7 @@ fn enter<const ANY: bool>(
 
 /// Asks for a node or block that will be visited soon: most come from the third level of cache.
 #[inline(always)]
-fn fetch_ahead<T>(value: &T) {
+pub(crate) fn fetch_ahead<T>(value: &T) {
     #[cfg(target_arch = "x86_64")]
     for line in (0..size_of::<T>()).step_by(64) {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

@@ -26,7 +26,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
 pub(crate) use cache::AccelCache;
-pub(crate) use kernel::{Kernel, Stack};
+pub(crate) use kernel::{Kernel, Stack, fetch_ahead};
 pub(crate) use mesh_bvh::MeshBvh;
 
 use wide::Node;
@@ -66,6 +66,14 @@ struct Placed {
     instance: u32,
     object_from_world: Affine3A,
     bvh: Arc<MeshBvh>,
+}
+
+impl Hit {
+    /// Barycentric weights of the triangle's vertices.
+    #[inline]
+    pub(crate) fn weights(&self) -> Vec3 {
+        Vec3::new(1.0 - self.u - self.v, self.u, self.v)
+    }
 }
 
 /// The acceleration structure of one snapshot.

@@ -7,8 +7,7 @@ use glam::{DVec3, Vec3};
 use lumencast_light::sh;
 use rayon::prelude::*;
 
-use super::integrator::{Integrator, Paths};
-use crate::accel::Stack;
+use super::integrator::{Integrator, Look, Paths};
 use crate::sampling::{Sampler, lattice};
 use crate::world::World;
 use crate::{Job, Sums};
@@ -46,13 +45,15 @@ struct TileSums {
 /// Gathers; `None` when cancelled. Returns the sums and the number of rays.
 pub(super) fn gather(job: &Job, world: &World, watch: &Watch) -> Option<(Vec<Sums>, u64)> {
     let tiles = tiles(job);
+    let paths = Paths { bounces: job.bounces, clamp: job.clamp, roulette_from: u32::MAX };
+    let integrator = || Integrator::new(world, paths);
     let found: Option<Vec<TileSums>> = tiles
         .par_iter()
-        .map_init(Stack::default, |stack, tile| {
+        .map_init(integrator, |integrator, tile| {
             if watch.cancelled.load(Ordering::Relaxed) {
                 return None;
             }
-            let sums = trace(job, world, tile, stack);
+            let sums = trace(job, tile, integrator);
             watch.samples_done.fetch_add(u64::from(tile.end - tile.first), Ordering::Relaxed);
             Some(sums)
         })
@@ -81,11 +82,10 @@ fn tiles(job: &Job) -> Vec<Tile> {
     tiles
 }
 
-fn trace(job: &Job, world: &World, tile: &Tile, stack: &mut Stack) -> TileSums {
+fn trace(job: &Job, tile: &Tile, integrator: &mut Integrator<'_>) -> TileSums {
     let receiver = &job.receivers[tile.receiver as usize];
     let turn = lattice::turn(job.seed, tile.receiver);
-    let paths = Paths { bounces: job.bounces, clamp: job.clamp, roulette_from: u32::MAX };
-    let mut integrator = Integrator::new(world, paths, std::mem::take(stack));
+    let rays_before = integrator.rays;
     let mut t = TileSums {
         sum: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
         squares: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
@@ -94,10 +94,15 @@ fn trace(job: &Job, world: &World, tile: &Tile, stack: &mut Stack) -> TileSums {
         backs: 0,
         rays: 0,
     };
-    for sample in tile.first..tile.end {
-        let direction = (turn * lattice::direction(sample, receiver.samples)).normalize();
-        let mut sampler = Sampler::new(job.seed, tile.receiver, sample);
-        let seen = integrator.radiance(receiver.position, direction, &mut sampler);
+    let samples = tile.first..tile.end;
+    let direction = |sample| (turn * lattice::direction(sample, receiver.samples)).normalize();
+    let looks = samples.clone().map(|sample| Look {
+        origin: receiver.position,
+        direction: direction(sample),
+        sampler: Sampler::new(job.seed, tile.receiver, sample),
+    });
+    for (seen, sample) in integrator.radiance(looks).zip(samples) {
+        let direction = direction(sample);
         let radiance = seen.radiance();
         let basis = sh::basis(job.order, direction);
         for (k, y) in basis.iter().enumerate().take(job.order.coefficients()) {
@@ -111,8 +116,7 @@ fn trace(job: &Job, world: &World, tile: &Tile, stack: &mut Stack) -> TileSums {
             t.backs += u32::from(seen.back);
         }
     }
-    t.rays = integrator.rays;
-    *stack = integrator.into_stack();
+    t.rays = integrator.rays - rays_before;
     t
 }
 

@@ -4,6 +4,7 @@ pub(crate) mod integrator;
 mod job;
 #[cfg(test)]
 mod tests;
+mod vertex;
 
 use std::collections::HashMap;
 use std::num::NonZeroUsize;

@@ -6,10 +6,9 @@ use lumencast_light::Order;
 use lumencast_scene::{Environment, HdrImage, Light, LightKind, Material, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
-use super::integrator::{Integrator, Paths};
+use super::integrator::{Integrator, Look, Paths};
 use super::*;
 use crate::Receiver as Probe;
-use crate::accel::Stack;
 use crate::sampling::Sampler;
 
 const BLACK: Vec3 = Vec3::ZERO;
@@ -29,14 +28,13 @@ fn look(
         &mut WorldCache::default(),
     );
     let paths = Paths { bounces, clamp, roulette_from: u32::MAX };
-    let mut integrator = Integrator::new(&world, paths, Stack::default());
+    let mut integrator = Integrator::new(&world, paths);
     let (groups, samples) = (32, 512);
     let means: Vec<Vec3> = (0..groups)
         .map(|group| {
-            let one = |s| {
-                integrator.radiance(origin, direction, &mut Sampler::new(4, group, s)).radiance()
-            };
-            (0..samples).map(one).sum::<Vec3>() / samples as f32
+            let look = |s| Look { origin, direction, sampler: Sampler::new(4, group, s) };
+            let seen = integrator.radiance((0..samples).map(look));
+            seen.map(|seen| seen.radiance()).sum::<Vec3>() / samples as f32
         })
         .collect();
     let mean = means.iter().sum::<Vec3>() / groups as f32;
@@ -233,6 +231,29 @@ fn lit_room() -> Arc<Snapshot> {
     stage.snapshot()
 }
 
+/// Paths are followed many at a time, and each finds what it finds alone.
+#[test]
+fn paths_do_not_depend_on_each_other() {
+    let scene = lit_room();
+    let world =
+        World::new(scene, MaterialModel::Full, Kernel::detect(), &mut WorldCache::default());
+    let paths = Paths { bounces: 4, clamp: f32::INFINITY, roulette_from: 2 };
+    let look = |sample| {
+        let mut sampler = Sampler::new(3, 0, sample);
+        let direction = crate::sampling::sphere(sampler.square());
+        Look { origin: Vec3::new(0.5, 0.2, 0.0), direction, sampler }
+    };
+    let mut integrator = Integrator::new(&world, paths);
+    let together: Vec<_> = integrator.radiance((0..100).map(look)).collect();
+    let rays = integrator.rays;
+    for (sample, seen) in (0..).zip(together) {
+        let alone = Integrator::new(&world, paths).radiance([look(sample)]).next();
+        assert_eq!(alone, Some(seen), "{sample}");
+    }
+    assert_eq!(integrator.radiance([]).len(), 0);
+    assert_eq!(integrator.rays, rays, "nothing asked for, nothing done");
+}
+
 fn tracer(threads: usize) -> CpuPathTracer {
     CpuPathTracer::new(Options { threads: NonZeroUsize::new(threads), ..Options::default() })
         .unwrap()
@@ -298,10 +319,10 @@ fn lambert_model_takes_only_base_colour() {
     let model = MaterialModel::Lambert;
     let world = World::new(stage.snapshot(), model, Kernel::detect(), &mut WorldCache::default());
     let paths = Paths { bounces: 1, clamp: f32::INFINITY, roulette_from: u32::MAX };
-    let mut integrator = Integrator::new(&world, paths, Stack::default());
+    let mut integrator = Integrator::new(&world, paths);
     for (origin, direction) in [(Vec3::Y, down()), (Vec3::NEG_Y, -down())] {
-        for s in 0..64 {
-            let seen = integrator.radiance(origin, direction, &mut Sampler::new(1, 1, s));
+        let look = |s| Look { origin, direction, sampler: Sampler::new(1, 1, s) };
+        for seen in integrator.radiance((0..64).map(look)) {
             assert!((seen.radiance() - Vec3::splat(0.5)).abs().max_element() < 1e-5);
         }
     }

@@ -4,14 +4,14 @@ use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use glam::{UVec2, Vec2, Vec3};
+use glam::{UVec2, Vec3};
 use lumencast_scene::Snapshot;
 use rayon::prelude::*;
 
 use super::{Film, Filter, View};
-use crate::accel::{Kernel, Stack};
+use crate::accel::Kernel;
 use crate::path_trace::MaterialModel;
-use crate::path_trace::integrator::{Integrator, Paths, Seen};
+use crate::path_trace::integrator::{Integrator, Look, Paths, Seen};
 use crate::sampling::{Sampler, mix2};
 use crate::world::{World, WorldCache};
 
@@ -157,12 +157,15 @@ impl Renderer {
         let tiles_across = size.x.div_ceil(TILE);
         let tiles = tiles_across * size.y.div_ceil(TILE);
         let (done, stopped, rays) = (AtomicU64::new(0), AtomicBool::new(false), AtomicU64::new(0));
-        let tile = |stack: &mut Stack, tile: u32| {
+        let s = &self.settings;
+        let paths = Paths { bounces: s.bounces, clamp: s.clamp, roulette_from: s.roulette_from };
+        let integrator = || Integrator::new(&self.world, paths);
+        let tile = |integrator: &mut Integrator<'_>, tile: u32| {
             if stopped.load(Ordering::Relaxed) {
                 return Vec::new();
             }
             let corner = TILE * UVec2::new(tile % tiles_across, tile / tiles_across);
-            let (sums, traced) = self.tile(corner, half, first..first + samples, stack);
+            let (sums, traced) = self.tile(corner, half, first..first + samples, integrator);
             rays.fetch_add(traced, Ordering::Relaxed);
             let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f32 / tiles as f32;
             if !going(share) {
@@ -170,9 +173,8 @@ impl Renderer {
             }
             sums
         };
-        let found: Vec<Vec<Vec3>> = self
-            .pool
-            .install(|| (0..tiles).into_par_iter().map_init(Stack::default, tile).collect());
+        let found: Vec<Vec<Vec3>> =
+            self.pool.install(|| (0..tiles).into_par_iter().map_init(integrator, tile).collect());
         if stopped.into_inner() && done.into_inner() < u64::from(tiles) {
             return None;
         }
@@ -187,32 +189,27 @@ impl Renderer {
         corner: UVec2,
         half: usize,
         samples: std::ops::Range<u32>,
-        stack: &mut Stack,
+        integrator: &mut Integrator<'_>,
     ) -> (Vec<Vec3>, u64) {
         let s = &self.settings;
         let end = (corner + TILE).min(s.size);
         let aspect = s.size.x as f32 / s.size.y as f32;
         let seed = mix2(s.seed, half as u64);
-        let paths = Paths { bounces: s.bounces, clamp: s.clamp, roulette_from: s.roulette_from };
-        let mut integrator = Integrator::new(&self.world, paths, std::mem::take(stack));
-        let mut sums = Vec::with_capacity((TILE * TILE) as usize);
-        for y in corner.y..end.y {
-            for x in corner.x..end.x {
-                let mut sum = Vec3::ZERO;
-                for sample in samples.clone() {
-                    let mut sampler = Sampler::new(seed, y * s.size.x + x, sample);
-                    let place =
-                        Vec2::new(x as f32, y as f32) + 0.5 + s.filter.place(sampler.square());
-                    let (origin, direction) = self.view.ray(place / s.size.as_vec2(), aspect);
-                    let seen = integrator.radiance(origin, direction, &mut sampler);
-                    sum += part(&seen, s.parts);
-                }
-                sums.push(sum);
-            }
-        }
-        let rays = integrator.rays;
-        *stack = integrator.into_stack();
-        (sums, rays)
+        let rays_before = integrator.rays;
+        let pixels =
+            (corner.y..end.y).flat_map(|y| (corner.x..end.x).map(move |x| UVec2::new(x, y)));
+        let looks = pixels
+            .flat_map(|pixel| samples.clone().map(move |sample| (pixel, sample)))
+            .map(|(pixel, sample)| {
+                let mut sampler = Sampler::new(seed, pixel.y * s.size.x + pixel.x, sample);
+                let place = pixel.as_vec2() + 0.5 + s.filter.place(sampler.square());
+                let (origin, direction) = self.view.ray(place / s.size.as_vec2(), aspect);
+                Look { origin, direction, sampler }
+            });
+        let found: Vec<Vec3> =
+            integrator.radiance(looks).map(|seen| part(&seen, s.parts)).collect();
+        let sums = found.chunks_exact(samples.len().max(1)).map(|c| c.iter().sum()).collect();
+        (sums, integrator.rays - rays_before)
     }
 }
 

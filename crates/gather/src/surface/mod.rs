@@ -5,7 +5,7 @@ pub(crate) mod texture;
 use glam::{Affine3A, Mat3, Mat3A, Vec2, Vec3, Vec3A};
 use lumencast_scene::{AlphaMode, Instance, Material, Primitive, TextureRef, Vertices};
 
-use crate::accel::{Hit, abs};
+use crate::accel::{Hit, abs, fetch_ahead};
 use crate::bsdf::{Bsdf, Substance, frame};
 use texture::{Coding, interpolate_normal, interpolate_uv, sample};
 
@@ -89,6 +89,41 @@ impl<'a> Triangle<'a> {
         let primitive = &instance.mesh.primitives[p];
         let vertices = instance.deformed.as_ref().map_or(&primitive.vertices, |d| &d[p]);
         Self { primitive, vertices, corners: primitive.triangles[triangle as usize] }
+    }
+
+    /// Asks for the indices that [`Self::new`] reads.
+    pub(crate) fn fetch(instance: &Instance, primitive: u32, triangle: u32) {
+        let primitive = &instance.mesh.primitives[primitive as usize];
+        fetch_ahead(&primitive.triangles[triangle as usize]);
+    }
+
+    /// Asks for the vertices.
+    pub(crate) fn fetch_vertices(&self) {
+        for corner in self.corners {
+            let i = corner as usize;
+            fetch_ahead(&self.vertices.positions[i]);
+            fetch_ahead(&self.vertices.normals[i]);
+            for uv in &self.primitive.uv {
+                uv.get(i).map(fetch_ahead);
+            }
+            self.vertices.tangents.get(i).map(fetch_ahead);
+        }
+    }
+
+    /// Asks for the texels.
+    pub(crate) fn fetch_texels(&self, material: &Material, weights: Vec3, model: MaterialModel) {
+        let full = [
+            &material.emissive_texture,
+            &material.normal_texture,
+            &material.metallic_roughness_texture,
+            &material.specular_texture,
+            &material.specular_color_texture,
+            &material.transmission_texture,
+        ];
+        let others = full.into_iter().filter(|_| model == MaterialModel::Full);
+        for map in [&material.base_color_texture].into_iter().chain(others).flatten() {
+            texture::fetch_texels(map, self.uv(map.tex_coord, weights));
+        }
     }
 
     /// Object-space positions.
@@ -203,7 +238,7 @@ impl<'a> Point<'a> {
         let triangle = Triangle::new(instance, hit.primitive, hit.triangle);
         let corners = triangle.positions();
         let [a, b, c] = corners;
-        let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
+        let weights = hit.weights();
         let position = frames.position(weights.x * a + weights.y * b + weights.z * c);
         let front_normal = frames.normal(scaled_cross(b - a, c - a));
         if front_normal == Vec3::ZERO {

@@ -6,6 +6,8 @@ use std::sync::LazyLock;
 use glam::{IVec2, Vec2, Vec3, Vec4};
 use lumencast_scene::{Filter, Image, TextureRef, Vertices, Wrap};
 
+use crate::accel::fetch_ahead;
+
 /// sRGB codes to linear, IEC 61966-2-1.
 static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
     std::array::from_fn(|code| {
@@ -47,6 +49,19 @@ pub(crate) fn sample(texture: &TextureRef, uv: Vec2, coding: Coding) -> Vec4 {
     }
 }
 
+/// Asks for the texels that [`sample`] reads; the next in a row is mostly in the same line.
+pub(crate) fn fetch_texels(texture: &TextureRef, uv: Vec2) {
+    let image = &*texture.image;
+    let size = Vec2::new(image.width as f32, image.height as f32);
+    let at = texture.texture_from_mesh.transform_point2(uv) * size - 0.5;
+    let p = at.floor().as_ivec2();
+    let x = wrapped(p.x, image.width, texture.wrap[0]);
+    for y in [p.y, p.y.wrapping_add(1)] {
+        let y = wrapped(y, image.height, texture.wrap[1]);
+        image.texels.get(y * image.width as usize + x).map(fetch_ahead);
+    }
+}
+
 fn fetch(image: &Image, p: IVec2, wrap: [Wrap; 2], coding: Coding) -> Vec4 {
     let x = wrapped(p.x, image.width, wrap[0]);
     let y = wrapped(p.y, image.height, wrap[1]);
@@ -64,6 +79,9 @@ fn fetch(image: &Image, p: IVec2, wrap: [Wrap; 2], coding: Coding) -> Vec4 {
 }
 
 fn wrapped(i: i32, size: u32, wrap: Wrap) -> usize {
+    if i >= 0 && (i as u32) < size {
+        return i as usize;
+    }
     let (i, n) = (i64::from(i), i64::from(size));
     let j = match wrap {
         Wrap::Repeat => i.rem_euclid(n),
