@@ -57,9 +57,9 @@ pub struct Light<'a> {
     pub age: Option<f64>,
     /// Seconds since the oldest region's light was computed.
     pub oldest_age: Option<f64>,
-    /// Tick of the newest light.
+    /// Tick of the newest light of the catalog's own server.
     pub tick: Option<u64>,
-    /// Version of the scene that the newest light was computed from.
+    /// Version of the scene that that light was computed from.
     pub scene_version: Option<u64>,
 }
 
@@ -94,9 +94,9 @@ impl Cache {
         self.edits.client()
     }
 
-    /// Takes in a frame of the `catalog` track. A new epoch makes the cache forget updates,
-    /// acknowledgements and clock of the old one; the light stays until new light is there. Fields
-    /// and regions that are no longer listed are forgotten.
+    /// Takes in a frame of the `catalog` track. A new epoch makes the cache forget acknowledgements
+    /// and clock of the old one, a field's new epoch makes it forget that field's updates; the light
+    /// stays until new light is there. Fields and regions that are no longer listed are forgotten.
     ///
     /// # Errors
     /// [`CacheError::Decode`].
@@ -127,38 +127,30 @@ impl Cache {
     }
 
     fn set_catalog(&mut self, catalog: Catalog, saved: bool) {
-        let restarted = self.catalog.as_ref().is_some_and(|old| old.epoch != catalog.epoch);
+        let before = self.catalog.take();
+        let restarted = before.as_ref().is_some_and(|old| old.epoch != catalog.epoch);
         if restarted || self.saved {
             self.clock = ServerClock::default();
             self.state = None;
             if !self.saved {
                 self.edits.restart();
             }
-            for (id, regions) in &mut self.fields {
-                if let Some(field) = self.catalog.as_ref().and_then(|old| old.field(*id)) {
-                    regions.values_mut().for_each(|region| region.forget_updates(field.order));
-                }
-            }
         }
         let mut fields = BTreeMap::new();
         let mut volumes = Vec::with_capacity(catalog.fields.len());
         for field in &catalog.fields {
-            let same = self
-                .catalog
-                .as_ref()
-                .and_then(|old| old.field(field.id))
-                .is_some_and(|old| old == field);
+            let same = before.as_ref().and_then(|before| {
+                let old = before.field(field.id).filter(|old| old.has_shape_of(field))?;
+                Some(before.epoch_of(old))
+            });
             let known = self.light.volumes().iter().find(|volume| volume.id.0 == field.id);
-            match (same, self.fields.remove(&field.id), known) {
-                (true, Some(regions), Some(volume)) => {
-                    fields.insert(field.id, regions);
-                    volumes.push(volume.clone());
-                }
-                _ => {
-                    fields.insert(field.id, BTreeMap::new());
-                    volumes.push(lit_by(&self.light, field));
-                }
-            }
+            volumes.push(match known {
+                Some(volume) if same.is_some() => volume.clone(),
+                _ => lit_by(&self.light, field),
+            });
+            let goes_on = same == Some(catalog.epoch_of(field)) && !self.saved;
+            let regions = self.fields.remove(&field.id).filter(|_| goes_on);
+            fields.insert(field.id, regions.unwrap_or_default());
         }
         self.fields = fields;
         self.light = LightField::new(volumes);
@@ -225,27 +217,45 @@ impl Cache {
                 region.show(now, volume);
             }
         }
-        let all = || self.fields.values().flat_map(|r| r.values()).filter_map(RegionCache::newest);
-        let newest = all().max_by_key(|newest| newest.header.info.tick);
-        let oldest = all().min_by_key(|newest| newest.header.info.tick);
+        let ages = || self.newest().filter_map(|(field, newest)| self.age(field, newest, now));
+        // Ticks of another server count something else.
+        let newest = self
+            .newest()
+            .filter(|(field, _)| self.is_own(field))
+            .map(|(_, newest)| newest.header.info)
+            .max_by_key(|info| info.tick);
         Light {
             field: &self.light,
-            age: newest.and_then(|newest| self.age(newest, now)),
-            oldest_age: oldest.and_then(|oldest| self.age(oldest, now)),
-            tick: newest.map(|newest| newest.header.info.tick),
-            scene_version: newest.map(|newest| newest.header.info.scene_version),
+            age: ages().min_by(f64::total_cmp),
+            oldest_age: ages().max_by(f64::total_cmp),
+            tick: newest.map(|info| info.tick),
+            scene_version: newest.map(|info| info.scene_version),
         }
     }
 
-    /// Seconds since light was computed; since it came, where the server's clock is not known.
-    fn age(&self, light: &Newest, now: f64) -> Option<f64> {
+    /// The newest light of every region that has any.
+    fn newest(&self) -> impl Iterator<Item = (&Field, &Newest)> {
+        let fields = self.catalog.iter().flat_map(|catalog| &catalog.fields);
+        fields.flat_map(|field| {
+            let regions = self.fields.get(&field.id).into_iter().flat_map(|r| r.values());
+            regions.filter_map(move |region| Some((field, region.newest()?)))
+        })
+    }
+
+    /// Whether a field comes from the server whose clock and ticks the state track tells.
+    fn is_own(&self, field: &Field) -> bool {
+        self.catalog.as_ref().is_some_and(|catalog| catalog.epoch_of(field) == catalog.epoch)
+    }
+
+    /// Seconds since light was computed; since it came, where its server's clock is not known.
+    fn age(&self, field: &Field, light: &Newest, now: f64) -> Option<f64> {
         if self.saved {
             return None;
         }
         let tick_seconds = self.catalog.as_ref()?.tick_seconds;
         let computed = self.clock.of_tick(light.header.info.tick, tick_seconds);
         let age = match (self.clock.at(now), computed) {
-            (Some(time), Some(computed)) => time - computed,
+            (Some(time), Some(computed)) if self.is_own(field) => time - computed,
             _ => now - light.arrived,
         };
         Some(age.max(0.0))

@@ -49,11 +49,6 @@ impl RegionCache {
         self.newest.as_ref()
     }
 
-    /// Forgets numbers of updates and what deltas refer to; the volume keeps its light.
-    pub(crate) fn forget_updates(&mut self, order: Order) {
-        *self = Self::new(self.region, order);
-    }
-
     /// Takes a frame in; whether it is newer than what was there. `volume` is what is shown.
     pub(crate) fn add(
         &mut self,

@@ -52,6 +52,8 @@ impl Server {
             cells_min: IVec3::ZERO,
             regions: encoder.regions().collect(),
             layers: 3,
+            source: "a test".into(),
+            epoch: None,
         };
         assert_eq!(field.regions.len(), 2);
         let scene = SceneInfo { name: "room".into(), root: "room.glb".into() };
@@ -302,6 +304,59 @@ fn a_restarted_server_is_known_by_its_epoch() {
     assert!(matches!(cache.scene_events()[..], [SceneEvent::Snapshot(_)]));
 }
 
+/// One server lists the fields, others compute them: each is forgotten by its own epoch.
+#[test]
+fn a_field_s_own_epoch_tells_when_its_updates_begin_anew() {
+    let mut cache = Cache::new();
+    let computes = |epoch: u64| {
+        let mut server = Server::new(1);
+        server.catalog.fields[0].epoch = Some(Epoch(epoch));
+        server
+    };
+    let feed = |cache: &mut Cache, server: &mut Server, now: f64| {
+        server.tick(now).iter().for_each(|sent| take_in(cache, sent, now).unwrap());
+    };
+    let mut server = computes(8);
+    cache.catalog(&server.catalog.encode(), 0.0).unwrap();
+    server.shine(5.0);
+    for tick in 0..50 {
+        feed(&mut cache, &mut server, f64::from(tick) * TICK);
+    }
+    // Its ticks are not those of the state track: age counts from arrival.
+    let light = cache.light(3.0);
+    assert!((light.age.unwrap() - (3.0 - 49.0 * TICK)).abs() < 1e-9);
+    assert_eq!((light.tick, light.scene_version), (None, None));
+
+    // The catalog's server has restarted, the field's has not: its deltas go on.
+    server.catalog.epoch = Epoch(2);
+    cache.catalog(&server.catalog.encode(), 3.0).unwrap();
+    assert_eq!(cache.server_time(3.0), None);
+    assert!(cache.light(3.0).age.is_some());
+    server.shine(2.0);
+    feed(&mut cache, &mut server, 3.0);
+    assert!(near(shown(&mut cache, 4.0), 2.0));
+
+    // The field's server has restarted, the catalog's has not: update 0 is news again.
+    let mut fresh = computes(9);
+    fresh.catalog.epoch = Epoch(2);
+    cache.catalog(&fresh.catalog.encode(), 4.0).unwrap();
+    assert!(cache.server_time(4.0).is_some());
+    assert_eq!(cache.light(4.0).age, None);
+    assert!(near(shown(&mut cache, 4.0), 2.0), "the light stays until new light is there");
+    fresh.shine(7.0);
+    for sent in &fresh.tick(4.0)[1..] {
+        take_in(&mut cache, sent, 4.0).unwrap();
+    }
+    assert!(near(shown(&mut cache, 5.0), 7.0));
+
+    // Another word for the source, or the same epoch said elsewhere, is no restart.
+    fresh.catalog.fields[0].source = "another word".into();
+    fresh.catalog.epoch = Epoch(9);
+    fresh.catalog.fields[0].epoch = None;
+    cache.catalog(&fresh.catalog.encode(), 5.0).unwrap();
+    assert_eq!(cache.light(5.0).tick, Some(0));
+}
+
 #[test]
 fn a_reconnection_to_the_same_server_goes_on() {
     let mut server = Server::new(1);
@@ -332,7 +387,7 @@ fn a_saved_field_shows_until_a_server_s_light_comes() {
     server.shine(4.0);
     let scene = server.catalog.scene.clone();
     let file =
-        LightFile::of_volumes(Epoch(9), scene, TICK, [&server.volume], UpdateInfo::default());
+        LightFile::of_volumes(Epoch(9), scene, TICK, "", [&server.volume], UpdateInfo::default());
     let mut cache = Cache::new();
     cache.load(&file.write(), 0.0).unwrap();
     assert!(near(shown(&mut cache, 0.0), 4.0));

@@ -91,6 +91,11 @@ impl GatherArguments {
         GatherOptions { bounces: self.bounces, clamp: self.clamp, blend }
     }
 
+    /// What computes the light, for the catalog.
+    pub(crate) fn source(&self) -> String {
+        "cpu path tracing".into()
+    }
+
     pub(crate) fn gatherer(&self) -> Result<Box<dyn Gather>> {
         let options = Options { materials: self.materials.model(), threads: None };
         let tracer = CpuPathTracer::new(options).context("cannot start the threads that trace")?;
@@ -134,6 +139,7 @@ impl TickArguments {
             gather: gather.options(blend),
             volumes: volumes.volumes(scene)?,
             script: self.edits.as_deref().map(read_script).transpose()?,
+            source: gather.source(),
         })
     }
 }

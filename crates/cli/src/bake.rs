@@ -59,7 +59,8 @@ impl Bake {
             scene_version: snapshot.version,
             ..UpdateInfo::default()
         };
-        let bytes = LightFile::of_volumes(Epoch(0), info, 1.0, &light, at).write();
+        let source = format!("{}, baked, {} samples", self.gather.source(), self.samples);
+        let bytes = LightFile::of_volumes(Epoch(0), info, 1.0, &source, &light, at).write();
         std::fs::write(&self.output, &bytes)
             .with_context(|| format!("cannot write {}", self.output.display()))?;
         let probes: usize = light.iter().map(|volume| volume.grid.probe_count()).sum();

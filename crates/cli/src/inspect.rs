@@ -82,6 +82,8 @@ fn light_report(
             let volume = volumes.iter().find(|volume| volume.id.0 == field.id);
             json!({
                 "id": field.id,
+                "source": Some(&field.source).filter(|source| !source.is_empty()),
+                "epoch": catalog.epoch_of(field),
                 "order": field.order,
                 "use": field.usage,
                 "grid": field.grid,

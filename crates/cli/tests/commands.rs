@@ -253,6 +253,10 @@ fn what_was_baked_can_be_inspected() {
     assert_eq!(report["scene"]["name"], "cornell");
     let field = &report["fields"][0];
     assert_eq!((&field["probes"], &field["order"]), (&60.into(), &1.into()));
+    assert_eq!(field["source"], "cpu path tracing, baked, 128 samples");
+    assert_eq!(field["epoch"], report["epoch"]);
+    let words = run(&["inspect", &path]).stdout;
+    assert!(words.contains("source cpu path tracing, baked, 128 samples"), "{words}");
     let [min, mean, max] = ["min", "mean", "max"].map(|k| field["c0"][k].as_f64().expect(k));
     assert!(0.0 <= min && min < mean && mean < max, "{min} {mean} {max}");
 

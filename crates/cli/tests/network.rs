@@ -335,6 +335,8 @@ fn inspect_shows_a_running_server() {
     assert_eq!(ran.code, Some(0), "{ran:?}");
     let report = ran.json();
     assert_eq!(report["epoch"], server.ready["epoch"]);
+    assert_eq!(report["fields"][0]["epoch"], server.ready["epoch"]);
+    assert_eq!(report["fields"][0]["source"], "cpu path tracing");
     assert_eq!(report["fields"][0]["probes"], 27);
     assert!(report["fields"][0]["c0"]["mean"].as_f64().is_some_and(|c0| c0 > 0.0), "{report}");
     assert!(report["state"]["tick"].is_u64());

@@ -88,6 +88,14 @@ pub struct Field {
     pub regions: Vec<Region>,
     /// Temporal layers, 1 to 3.
     pub layers: u8,
+    /// What computes it, in words: `cpu path tracing`. At most [`limits::SOURCE_BYTES`] bytes, no
+    /// control characters; empty where nobody says.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub source: String,
+    /// The run of the server that computes it, where that is not the catalog's; see
+    /// [`Catalog::epoch_of`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub epoch: Option<Epoch>,
 }
 
 /// Which instances a field is for.
@@ -180,12 +188,23 @@ impl Catalog {
     pub fn field(&self, id: u32) -> Option<&Field> {
         self.fields.iter().find(|field| field.id == id)
     }
+
+    /// The run that numbers a field's updates and ticks: its own, or else the catalog's.
+    pub fn epoch_of(&self, field: &Field) -> Epoch {
+        field.epoch.unwrap_or(self.epoch)
+    }
 }
 
 impl Field {
     /// The region of a number.
     pub fn region(&self, id: u32) -> Option<Region> {
         self.regions.iter().copied().find(|region| region.id == id)
+    }
+
+    /// Whether light of the one fits the other: all but source and epoch are equal.
+    pub fn has_shape_of(&self, other: &Self) -> bool {
+        let shape = |field: &Self| Self { source: String::new(), epoch: None, ..field.clone() };
+        shape(self) == shape(other)
     }
 
     fn validated(mut self) -> Result<Self, DecodeError> {
@@ -207,6 +226,11 @@ impl Field {
         }
         if !(1..=3).contains(&self.layers) {
             return Err(DecodeError::Malformed("layers"));
+        }
+        DecodeError::limit("bytes of a field's source", self.source.len(), limits::SOURCE_BYTES)?;
+        // It is printed on terminals.
+        if self.source.chars().any(char::is_control) {
+            return Err(DecodeError::Malformed("control characters in a field's source"));
         }
         self.check_regions()?;
         Ok(self)
@@ -277,6 +301,8 @@ mod tests {
                 cells_min: IVec3::ZERO,
                 regions: crate::regions(grid.resolution),
                 layers: 3,
+                source: "cpu path tracing".into(),
+                epoch: Some(Epoch(5)),
             }],
         }
     }
@@ -296,8 +322,25 @@ mod tests {
     }
 
     #[test]
+    fn source_and_epoch_may_be_absent() {
+        let mut value: Value = serde_json::from_slice(&catalog().encode()).unwrap();
+        let field = value["fields"][0].as_object_mut().unwrap();
+        assert_eq!(field.remove("source"), Some(json!("cpu path tracing")));
+        assert_eq!(field.remove("epoch"), Some(json!("0000000000000005")));
+        let old = Catalog::decode(value.to_string().as_bytes()).unwrap();
+        let field = &old.fields[0];
+        assert_eq!((field.source.as_str(), old.epoch_of(field)), ("", old.epoch));
+        let written: Value = serde_json::from_slice(&old.encode()).unwrap();
+        assert_eq!(written, value, "and are then not written");
+        let new = catalog();
+        assert_eq!(new.epoch_of(&new.fields[0]), Epoch(5));
+        assert!(field.has_shape_of(&new.fields[0]));
+        assert!(!field.has_shape_of(&Field { layers: 2, ..new.fields[0].clone() }));
+    }
+
+    #[test]
     fn contradictions_and_excesses_are_refused() {
-        let cases: [(&str, Value, &str); 16] = [
+        let cases: [(&str, Value, &str); 20] = [
             ("/lumencast", json!(2), "version"),
             ("/lumencast", json!("1"), "malformed"),
             ("/epoch", json!(null), "json"),
@@ -305,6 +348,10 @@ mod tests {
             ("/tick_seconds", json!(0), "malformed"),
             ("/fields/0/order", json!(5), "json"),
             ("/fields/0/layers", json!(4), "malformed"),
+            ("/fields/0/source", json!("x".repeat(129)), "limit"),
+            ("/fields/0/source", json!("\u{1b}[2J"), "malformed"),
+            ("/fields/0/source", json!(1), "json"),
+            ("/fields/0/epoch", json!("5"), "json"),
             ("/fields/0/grid/resolution", json!([0, 6, 7]), "malformed"),
             (
                 "/fields/0/grid/resolution",

@@ -33,11 +33,13 @@ pub struct SavedFrame {
 }
 
 impl LightFile {
-    /// Encodes volumes; `info` says when and from what they were computed (its `update` becomes 0).
+    /// Encodes volumes; `source` says what computed them ([`Field::source`]), `info` when and from
+    /// which scene (its `update` becomes 0).
     pub fn of_volumes<'a>(
         epoch: Epoch,
         scene: SceneInfo,
         tick_seconds: f64,
+        source: &str,
         volumes: impl IntoIterator<Item = &'a ProbeVolume>,
         info: UpdateInfo,
     ) -> Self {
@@ -53,6 +55,8 @@ impl LightFile {
                 cells_min: glam::IVec3::ZERO,
                 regions: encoder.regions().collect(),
                 layers: 3,
+                source: source.to_owned(),
+                epoch: None,
             });
             let encoded = encoder.encode(volume, UpdateInfo { update: 0, ..info }, |_| true);
             frames.extend(encoded.into_iter().map(|frame| SavedFrame {
@@ -176,7 +180,8 @@ mod tests {
             })
             .collect();
         let scene = SceneInfo { name: "a".into(), root: "a.glb".into() };
-        let file = LightFile::of_volumes(Epoch(1), scene, 0.04, &volumes, UpdateInfo::default());
+        let file =
+            LightFile::of_volumes(Epoch(1), scene, 0.04, "a test", &volumes, UpdateInfo::default());
         (volumes, file)
     }
 

@@ -13,6 +13,8 @@ pub const FIELD_PROBES: usize = 1 << 18;
 pub const CATALOG_PROBES: usize = 1 << 19;
 /// Cells of a region along an axis.
 pub const REGION_CELLS: u32 = 16;
+/// Bytes of the text that names a field's source.
+pub const SOURCE_BYTES: usize = 128;
 /// Edits of a snapshot.
 pub const SNAPSHOT_EDITS: usize = 1 << 16;
 /// Edits of a delta, and refusals.

@@ -272,6 +272,7 @@ fn no_bytes_make_a_decoder_panic() {
         lumencast_codec::Epoch(1),
         lumencast_codec::SceneInfo { name: "a".into(), root: "b".into() },
         0.04,
+        "a test",
         [&volume],
         UpdateInfo::default(),
     );

@@ -19,6 +19,12 @@ pub enum ServerError {
     /// More fields than a catalog holds.
     #[error("{0} volumes; a scene has at most {max}", max = lumencast_codec::limits::FIELDS)]
     TooManyVolumes(usize),
+    /// A source that does not fit a catalog.
+    #[error(
+        "source {0:?}: at most {max} bytes of text, no control characters",
+        max = lumencast_codec::limits::SOURCE_BYTES
+    )]
+    Source(String),
     /// The folder of the page cannot be read.
     #[error("cannot read the page in {folder}: {source}")]
     Page {

@@ -52,7 +52,7 @@ impl Field {
     }
 
     /// The field as the catalog lists it.
-    pub(crate) fn describe(&self) -> codec::Field {
+    pub(crate) fn describe(&self, source: &str) -> codec::Field {
         codec::Field {
             id: self.volume.id.0,
             order: self.volume.order,
@@ -61,7 +61,13 @@ impl Field {
             cells_min: IVec3::ZERO,
             regions: self.encoder.regions().collect(),
             layers: 3,
+            source: source.to_owned(),
+            epoch: None,
         }
+    }
+
+    pub(crate) fn region_count(&self) -> usize {
+        self.encoder.regions().count()
     }
 
     pub(crate) fn probe_count(&self) -> usize {

@@ -33,6 +33,8 @@ pub struct TickOptions {
     pub volumes: Vec<VolumeSpec>,
     /// Edits at set times.
     pub script: Option<Script>,
+    /// What computes the light, for the catalog ([`lumencast_codec::Field::source`]).
+    pub source: String,
 }
 
 impl Default for TickOptions {
@@ -44,6 +46,7 @@ impl Default for TickOptions {
             gather: GatherOptions::default(),
             volumes: Vec::new(),
             script: None,
+            source: String::new(),
         }
     }
 }
@@ -92,13 +95,17 @@ impl Tick {
     /// Prepares a scene. `epoch` tells this run of the server from others.
     ///
     /// # Errors
-    /// A volume beyond the limits of the wire format.
+    /// A volume beyond the limits of the wire format, or a source's name.
     pub fn new(
         scene: Scene,
         gatherer: Box<dyn Gather>,
         options: TickOptions,
         epoch: Epoch,
     ) -> Result<Self, ServerError> {
+        let source = &options.source;
+        if source.len() > limits::SOURCE_BYTES || source.chars().any(char::is_control) {
+            return Err(ServerError::Source(source.clone()));
+        }
         let volumes =
             if options.volumes.is_empty() { scene.volumes() } else { options.volumes.clone() };
         let fields: Vec<Field> = (0..)
@@ -131,7 +138,7 @@ impl Tick {
                 root: self.scene.root_file().to_owned(),
             },
             tick_seconds: self.options.period,
-            fields: self.fields.iter().map(Field::describe).collect(),
+            fields: self.fields.iter().map(|f| f.describe(&self.options.source)).collect(),
         }
     }
 
@@ -329,7 +336,7 @@ fn check_limits(fields: &[Field]) -> Result<(), ServerError> {
     let mut total = 0;
     for field in fields {
         total += field.probe_count();
-        let regions = field.describe().regions.len();
+        let regions = field.region_count();
         let reason = if field.probe_count() > limits::FIELD_PROBES {
             format!("{} probes; at most {}", field.probe_count(), limits::FIELD_PROBES)
         } else if total > limits::CATALOG_PROBES {

@@ -2,7 +2,7 @@ import type { AcceptedEdit, FieldLight, LightState, RefusedEdit } from './api.js
 import { ServerClock } from './cache/clock.js';
 import { FieldCache } from './cache/field.js';
 import { type PendingEdit, PendingEdits } from './cache/pending.js';
-import { type Catalog, parseCatalog } from './codec/catalog.js';
+import { type Catalog, epochOf, parseCatalog } from './codec/catalog.js';
 import { readLightFile } from './codec/file.js';
 import type { ProbeHeader } from './codec/probe-header.js';
 import { parseState, type StateFrame } from './codec/state.js';
@@ -32,7 +32,7 @@ const LONGEST_RUN = 1;
 export class Cache {
   private current: Catalog | undefined;
   private fields = new Map<number, FieldCache>();
-  /** Fields of the time before a restart that the new catalog lacks, shown until there is new light. */
+  /** Fields of the time before a restart whose light fits none of now; shown until there is new light. */
   private leftover: FieldCache[] = [];
   private clock = new ServerClock(1);
   private newest: StateFrame | undefined;
@@ -83,27 +83,38 @@ export class Cache {
   private setCatalog(catalog: Catalog): void {
     const before = this.current;
     const restarted = before !== undefined && (this.saved || before.epoch !== catalog.epoch);
-    if (restarted) this.restart();
-    this.saved = false;
-    if (!before || restarted) this.clock = new ServerClock(catalog.tickSeconds);
     const old = this.fields;
     this.fields = new Map();
     for (const field of catalog.fields) {
       const same = old.get(field.id);
-      const kept = same?.sameShape(field) ? same : undefined;
-      if (kept) old.delete(field.id);
-      this.fields.set(field.id, kept ?? new FieldCache(field, catalog.tickSeconds));
+      // Each field's updates are numbered by its own server's run.
+      const anew = this.saved || (before && same && epochOf(before, same.field) !== epochOf(catalog, field));
+      if (same && anew) same.forgetUpdates();
+      if (same?.sameShape(field)) {
+        same.field = field;
+        this.fields.set(field.id, same);
+        old.delete(field.id);
+      } else {
+        if (same && anew) this.leftover.push(same);
+        this.fields.set(field.id, new FieldCache(field, catalog.tickSeconds));
+      }
     }
-    if (restarted) this.leftover.push(...old.values());
+    if (restarted) {
+      const gone = [...old.values()].filter(({ field }) => !this.fields.has(field.id));
+      for (const cache of gone) cache.forgetUpdates();
+      this.leftover.push(...gone);
+      this.restart();
+    }
+    if (!before || restarted) this.clock = new ServerClock(catalog.tickSeconds);
+    this.saved = false;
     this.current = catalog;
     this.happened.push({ kind: 'catalog', catalog, restarted });
   }
 
-  /** Forgets what the old epoch numbered; the light stays. */
+  /** Forgets what the catalog's old epoch numbered, but for the light. */
   private restart(): void {
     this.newest = undefined;
     this.following = false;
-    for (const field of this.fields.values()) field.forgetUpdates();
     // A file has no server that could have had them.
     if (this.saved) return;
     for (const { seq } of this.edits.restart()) this.happened.push({ kind: 'lost', seq });
@@ -165,7 +176,12 @@ export class Cache {
     const cache = this.fields.get(field);
     if (!cache?.has(region)) return undefined;
     const added = cache.add(region, bytes, now);
-    if (added.news) this.leftover = [];
+    if (added.news) {
+      // New light takes the place of its field's old light, and of that of fields that are gone.
+      this.leftover = this.leftover.filter(
+        (left) => left.field.id !== field && this.fields.has(left.field.id),
+      );
+    }
     return added;
   }
 
@@ -173,7 +189,7 @@ export class Cache {
   light(now: number): LightState {
     const fields: FieldLight[] = [];
     for (const cache of [...this.fields.values(), ...this.leftover]) {
-      const light = cache.light(now, (tick, arrived) => this.ageOf(tick, arrived, now));
+      const light = cache.light(now, (tick, arrived) => this.ageOf(cache.field.id, tick, arrived, now));
       if (light) fields.push(light);
     }
     return { fields, age: this.age(now) };
@@ -182,17 +198,25 @@ export class Cache {
   /** Seconds since the newest light was computed; `undefined` when none came from a server. */
   age(now: number): number | undefined {
     const ages = [...this.fields.values()]
-      .map((cache) => cache.span()?.newest)
-      .map((newest) => newest && this.ageOf(newest.header.tick, newest.arrived, now))
+      .map((cache) => {
+        const newest = cache.span()?.newest;
+        return newest && this.ageOf(cache.field.id, newest.header.tick, newest.arrived, now);
+      })
       .filter((age) => age !== undefined);
     return ages.length > 0 ? Math.min(...ages) : undefined;
   }
 
-  /** Seconds since a tick's light was computed; since it came, where the server's clock is unknown. */
-  private ageOf(tick: number, arrived: number, now: number): number | undefined {
+  /** Whether a field comes from the server whose clock and ticks the state track tells. */
+  private isOwn(id: number): boolean {
+    const field = this.fields.get(id)?.field;
+    return this.current && field ? epochOf(this.current, field) === this.current.epoch : false;
+  }
+
+  /** Seconds since a tick's light was computed; since it came, where its server's clock is unknown. */
+  private ageOf(field: number, tick: number, arrived: number, now: number): number | undefined {
     if (this.saved) return undefined;
     const time = this.clock.at(now);
-    const computed = this.clock.of(tick);
+    const computed = this.isOwn(field) ? this.clock.of(tick) : undefined;
     return Math.max(0, time === undefined || computed === undefined ? now - arrived : time - computed);
   }
 
@@ -201,14 +225,17 @@ export class Cache {
     return this.clock.at(now);
   }
 
-  /** The server's clock at the end of a tick, if its state frame has come. */
-  clockOfTick(tick: number): number | undefined {
-    return this.clock.sent(tick);
+  /** The server's clock at the end of a tick of a field, if its state frame has come. */
+  clockOfTick(field: number, tick: number): number | undefined {
+    return this.isOwn(field) ? this.clock.sent(tick) : undefined;
   }
 
-  /** Seconds from the end of a tick on the server's clock to `now`, up to a constant; for its changes. */
-  delayOf(tick: number, now: number): number | undefined {
-    const clock = this.clock.of(tick);
+  /**
+   * Seconds from the end of a tick of a field to `now`, up to a constant; for its changes. `undefined`
+   * where its server's clock is unknown.
+   */
+  delayOf(field: number, tick: number, now: number): number | undefined {
+    const clock = this.isOwn(field) ? this.clock.of(tick) : undefined;
     return clock === undefined ? undefined : now - clock;
   }
 

@@ -14,6 +14,7 @@ export { Cache, type CacheEvent } from './cache.js';
 export { capabilities, type Capabilities } from './capabilities.js';
 export {
   type Catalog,
+  epochOf,
   type Field,
   type Grid,
   parseCatalog,

@@ -257,7 +257,7 @@ class LiveSession implements Session, Sink {
     const decoded = performance.timeOrigin + performance.now();
     const bytes = frame.length;
     this.meter.update(update, { field, region, layer, tick, arrived, decoded, bytes }, now);
-    const delay = this.cache.delayOf(tick, now);
+    const delay = this.cache.delayOf(field, tick, now);
     if (delay !== undefined) this.reading?.layers.arrived(update, delay, bytes, now);
     if (added.news) this.emitter.emit('light', { field, region, tick });
   }
@@ -357,7 +357,7 @@ class LiveSession implements Session, Sink {
   }
 
   timings(): readonly Timing[] {
-    return this.meter.timings((tick) => this.cache.clockOfTick(tick));
+    return this.meter.timings((field, tick) => this.cache.clockOfTick(field, tick));
   }
 
   close(): void {

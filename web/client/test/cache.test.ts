@@ -345,8 +345,22 @@ describe('a restarted server', () => {
     const fresh = new FakeServer({ epoch: '00000000000000bb', regions: 2, brightness: () => 80 });
     cache.addCatalog(fresh.catalog);
     expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([1]);
+    expect(cache.light(1).fields[0].tick).toBeUndefined();
     feed(cache, fresh.step(), 1);
     expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([2]);
+  });
+
+  it('without a field that it had shows that one too until there is new light', () => {
+    const old = new FakeServer();
+    const cache = joined(old);
+    feed(cache, old.step(), 0);
+    const fresh = new FakeServer({ epoch: '00000000000000bb' });
+    const renumbered = JSON.parse(new TextDecoder().decode(fresh.catalog));
+    renumbered.fields[0].id = 4;
+    cache.addCatalog(json(renumbered));
+    expect(cache.light(1).fields).toMatchObject([{ field: { id: 0 }, tick: undefined, age: undefined }]);
+    for (const { bytes } of fresh.step().probes) cache.addProbes(4, 0, bytes, 1);
+    expect(cache.light(1).fields).toMatchObject([{ field: { id: 4 }, tick: 0 }]);
   });
 
   it('that changes its fields without restarting has those forgotten that are gone', () => {
@@ -357,6 +371,54 @@ describe('a restarted server', () => {
     catalog.fields = [];
     cache.addCatalog(json(catalog));
     expect(cache.light(1).fields).toEqual([]);
+  });
+});
+
+describe('a field with an epoch of its own', () => {
+  const own = { epoch: '00000000000000aa', fieldEpoch: '00000000000000f1' };
+
+  it('goes on when the server of the catalog restarts', () => {
+    const server = new FakeServer(own);
+    const cache = joined(server);
+    for (let i = 0; i < 50; i++) feed(cache, server.step(), i * TICK);
+    // Its ticks are not those of the state track: age counts from arrival.
+    expect(cache.age(3)).toBeCloseTo(3 - 49 * TICK, 9);
+    expect(cache.delayOf(0, 49, 3)).toBeUndefined();
+    const catalog = new FakeServer({ ...own, epoch: '00000000000000bb' }).catalog;
+    cache.addCatalog(catalog);
+    expect(cache.events().at(-1)).toMatchObject({ kind: 'catalog', restarted: true });
+    expect(cache.serverTime(3)).toBeUndefined();
+    expect(cache.age(3)).toBeCloseTo(3 - 49 * TICK, 9);
+    // A delta that builds on what came before.
+    feed(cache, { probes: server.step().probes }, 3);
+    expect(shown(cache, 4)).toBeCloseTo(51, 2);
+  });
+
+  it('begins anew when its own server restarts', () => {
+    const server = new FakeServer(own);
+    const cache = joined(server);
+    for (let i = 0; i < 50; i++) feed(cache, server.step(), i * TICK);
+    cache.events();
+    const fresh = new FakeServer({ ...own, fieldEpoch: '00000000000000f2', brightness: () => 80 });
+    cache.addCatalog(fresh.catalog);
+    expect(cache.events()).toMatchObject([{ kind: 'catalog', restarted: false }]);
+    expect(cache.serverTime(3)).toBeDefined();
+    expect(cache.age(3)).toBeUndefined();
+    expect(shown(cache, 3)).toBeCloseTo(50, 2);
+    feed(cache, { probes: fresh.step().probes }, 3);
+    expect(shown(cache, 4)).toBeCloseTo(80, 2);
+  });
+
+  it('in another shape shows the old light until its own new light is there', () => {
+    const server = new FakeServer(own);
+    const cache = joined(server);
+    feed(cache, server.step(), 0);
+    const fresh = new FakeServer({ ...own, fieldEpoch: '00000000000000f2', regions: 2 });
+    cache.addCatalog(fresh.catalog);
+    expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([1]);
+    expect(cache.light(1).fields[0].tick).toBeUndefined();
+    feed(cache, { probes: fresh.step().probes }, 1);
+    expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([2]);
   });
 });
 

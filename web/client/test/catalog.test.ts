@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 
-import { parseCatalog } from '../src/codec/catalog.js';
+import { epochOf, parseCatalog } from '../src/codec/catalog.js';
 import { parseState } from '../src/codec/state.js';
 import { FakeServer, json } from './support/fake-server.js';
 import { random } from './support/random.js';
@@ -20,6 +20,16 @@ describe('a catalog', () => {
     expect(fields[0].regions[1]).toEqual({ id: 1, min: [2, 0, 0], size: [2, 2, 2] });
   });
 
+  it('tells what computes a field, and its epoch where it is another', () => {
+    const old = parseCatalog(catalog());
+    expect('source' in old.fields[0] || 'epoch' in old.fields[0]).toBe(false);
+    expect(epochOf(old, old.fields[0])).toBe('00000000000000aa');
+    const fieldEpoch = '00000000000000cc';
+    const read = parseCatalog(catalog((_, f) => Object.assign(f, { source: 'é', epoch: fieldEpoch })));
+    expect(read.fields[0].source).toBe('é');
+    expect(epochOf(read, read.fields[0])).toBe(fieldEpoch);
+  });
+
   it('has its rotation made a unit quaternion', () => {
     const { fields } = parseCatalog(catalog((_, field) => (field.grid.rotation = [0, 0.6001, 0, 0.8])));
     expect(Math.hypot(...fields[0].grid.rotation)).toBeCloseTo(1, 12);
@@ -35,6 +45,10 @@ describe('a catalog', () => {
     ['order 5', 'malformed', (_, f) => (f.order = 5)],
     ['an unknown use', 'malformed', (_, f) => (f.use = 'some')],
     ['no layers', 'malformed', (_, f) => (f.layers = 0)],
+    ['a source of 130 bytes', 'limit', (_, f) => (f.source = 'é'.repeat(65))],
+    ['an escape sequence as source', 'malformed', (_, f) => (f.source = '\u001b[2J')],
+    ['a number as source', 'malformed', (_, f) => (f.source = 1)],
+    ['a short epoch of a field', 'malformed', (_, f) => (f.epoch = 'abc')],
     ['a flat box', 'malformed', (_, f) => (f.grid.size = [1, 0, 1])],
     ['a rotation of length 2', 'malformed', (_, f) => (f.grid.rotation = [0, 0, 0, 2])],
     ['too many probes', 'limit', (_, f) => (f.grid.resolution = [65, 64, 64])],

@@ -99,6 +99,12 @@ describe('temporal layers', () => {
     expect(control.layers).toBeLessThan(3);
   });
 
+  it('stay where nothing tells how delivery should be', () => {
+    const control = new LayerControl(3, TICK, () => 0);
+    for (let now = 0; now < 20; now += 0.25) control.judge(now);
+    expect(control.layers).toBe(3);
+  });
+
   it('wait longer where the estimate says that one more would not fit', () => {
     const recovery = (bandwidth: number | undefined) => {
       const control = new LayerControl(2, TICK, perUpdate);

@@ -43,7 +43,8 @@ export class FieldCache {
   private revision = 0;
 
   constructor(
-    readonly field: Field,
+    /** What the newest catalog says of it. */
+    public field: Field,
     private readonly tickSeconds: number,
   ) {
     this.coefficients = new Float32Array(cellCount(field.grid.resolution) * valuesPerProbe(field.order));

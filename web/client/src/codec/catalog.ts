@@ -36,6 +36,10 @@ export interface Field {
   readonly regions: readonly Region[];
   /** Temporal layers, 1 to 3. */
   readonly layers: number;
+  /** What computes it, in words: `cpu path tracing`. */
+  readonly source?: string;
+  /** The run of the server that computes it, where that is not the catalog's; see {@link epochOf}. */
+  readonly epoch?: string;
 }
 
 /** An oriented box divided into cells. */
@@ -57,6 +61,11 @@ export interface Region {
   readonly min: Vec3;
   /** Cells along each axis, 1 to 16. */
   readonly size: Vec3;
+}
+
+/** The run that numbers a field's updates and ticks: its own, or else the catalog's. */
+export function epochOf(catalog: Catalog, field: Field): string {
+  return field.epoch ?? catalog.epoch;
 }
 
 /** Number of values (coefficients times three channels) of a probe. */
@@ -81,8 +90,7 @@ export function parseCatalog(bytes: Uint8Array): Catalog {
       `the server speaks version ${JSON.stringify(json.lumencast)} of the wire format, this client version ${WIRE_VERSION}`,
     );
   }
-  const epoch = text(json.epoch, 'epoch');
-  if (!/^[0-9a-f]{16}$/i.test(epoch)) throw new WireError('malformed', 'epoch is not 16 hexadecimal digits');
+  const epoch = parseEpoch(json.epoch);
   const scene = object(json.scene, 'scene');
   const fields = list(json.fields, 'fields', LIMITS.fields)
     .map((field) => object(field, 'a field'))
@@ -118,7 +126,23 @@ function parseField(json: Json): Field {
     cellsMin: json.cells_min === undefined ? [0, 0, 0] : vec3(json.cells_min, 'cells_min', anyWhole),
     regions: parseRegions(json.regions, grid.resolution),
     layers: whole(json.layers, 'layers', LIMITS.layers, 1),
+    ...(json.source === undefined ? {} : { source: parseSource(json.source) }),
+    ...(json.epoch === undefined ? {} : { epoch: parseEpoch(json.epoch) }),
   };
+}
+
+function parseEpoch(json: unknown): string {
+  const epoch = text(json, 'epoch');
+  if (!/^[0-9a-f]{16}$/i.test(epoch)) throw new WireError('malformed', 'epoch is not 16 hexadecimal digits');
+  return epoch;
+}
+
+function parseSource(json: unknown): string {
+  const source = text(json, 'source');
+  const bytes = new TextEncoder().encode(source).length;
+  if (bytes > LIMITS.sourceBytes) throw new WireError('limit', `a source of ${bytes} bytes`);
+  if (/\p{Cc}/u.test(source)) throw new WireError('malformed', 'control characters in a source');
+  return source;
 }
 
 function parseGrid(json: Json): Grid {

@@ -6,6 +6,7 @@ export const LIMITS = {
   probesPerField: 262_144,
   probesPerCatalog: 524_288,
   regionCells: 16,
+  sourceBytes: 128,
   snapshotEdits: 65_536,
   deltaEdits: 4096,
   layers: 3,

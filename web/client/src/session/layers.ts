@@ -42,7 +42,7 @@ export class LayerControl {
 
   /**
    * `most`: layers that the server offers. `framesPerUpdate`: how many frames an update of the fields
-   * brings on average when so many layers are read.
+   * brings on average when so many layers are read; 0 where nothing can be judged.
    */
   constructor(
     private readonly most: number,
@@ -109,6 +109,7 @@ export class LayerControl {
 
   private verdict(now: number): 'good' | 'fair' | 'bad' {
     const tick = this.tickSeconds;
+    if (this.framesPerUpdate(1) === 0) return 'fair';
     if (this.frames === 0) {
       const silence = now - Math.max(this.lastArrival, this.settledAt);
       return silence > 3 * this.window ? 'bad' : 'fair';

@@ -43,7 +43,7 @@ export class Meter {
   }
 
   /** The last arrivals, with the server's clock at the end of their ticks. */
-  timings(clockOfTick: (tick: number) => number | undefined): Timing[] {
-    return this.arrivals.map((arrival) => ({ ...arrival, clock: clockOfTick(arrival.tick) }));
+  timings(clockOfTick: (field: number, tick: number) => number | undefined): Timing[] {
+    return this.arrivals.map((arrival) => ({ ...arrival, clock: clockOfTick(arrival.field, arrival.tick) }));
   }
 }

@@ -1,4 +1,4 @@
-import type { Catalog } from '../codec/catalog.js';
+import { type Catalog, epochOf } from '../codec/catalog.js';
 import type { Vec3 } from '../edit.js';
 import type { Link, TrackReader } from '../transport.js';
 import { LayerControl } from './layers.js';
@@ -27,7 +27,12 @@ export class Reading {
     private readonly sink: Sink,
   ) {
     const most = Math.max(1, ...catalog.fields.map((field) => field.layers));
-    const perUpdate = [1, 2, 3].map((layers) => framesPerUpdate(planTracks(catalog, layers, undefined)));
+    // Only of the catalog's own server are clock and updates known by which delivery is judged.
+    const own = catalog.fields.filter((field) => epochOf(catalog, field) === catalog.epoch);
+    const judged = new Set(own.map((field) => field.id));
+    const perUpdate = [1, 2, 3].map((layers) =>
+      framesPerUpdate(planTracks(catalog, layers, undefined).filter(({ field }) => judged.has(field))),
+    );
     this.layers = new LayerControl(most, catalog.tickSeconds, (layers) => perUpdate[layers - 1]);
     this.stateReader = link.subscribe('state', { priority: STATE_PRIORITY, maxAge: STATE_AGE }, (frame) =>
       sink.state(frame),

@@ -13,6 +13,8 @@ export function json(value: unknown): Uint8Array {
 
 export interface Options {
   epoch?: string;
+  /** The field's own epoch. */
+  fieldEpoch?: string;
   /** Number of regions, side by side along x, of 2×2×2 cells each. */
   regions?: number;
   /** The server's clock at its first tick. */
@@ -40,12 +42,14 @@ export class FakeServer {
   private refused: { client: string; seq: number; reason: string }[] = [];
   private sent: EncodedRegion[] = [];
   readonly epoch: string;
+  private readonly fieldEpoch: string | undefined;
   private readonly regions: number;
   private readonly clock: number;
   readonly brightness: (update: number) => number;
 
   constructor(options: Options = {}) {
     this.epoch = options.epoch ?? '00000000000000aa';
+    this.fieldEpoch = options.fieldEpoch;
     this.regions = options.regions ?? 1;
     this.clock = options.clock ?? 1000;
     this.brightness = options.brightness ?? ((update) => 1 + update);
@@ -73,6 +77,7 @@ export class FakeServer {
             size: CELLS,
           })),
           layers: 3,
+          ...(this.fieldEpoch === undefined ? {} : { source: 'a test', epoch: this.fieldEpoch }),
         },
         { id: 9, kind: 'something later' },
       ],
