@@ -2,12 +2,13 @@
 
 use glam::Vec3;
 
-use crate::{OffsetPolicy, ProbeVolume, sh::Sh};
+use crate::{OffsetPolicy, Order, ProbeVolume, sh::Sh};
 
 /// The light of a scene: volumes, the finer ones laid over the coarser.
 ///
 /// Where a volume ends, light passes smoothly into the next coarser one over the outermost half
-/// cell. Beyond all volumes the nearest one's border counts.
+/// cell, or into those that abut: on a shared face the mean of both counts. Beyond all volumes the
+/// nearest one's border counts.
 ///
 /// ```
 /// use glam::{Quat, UVec3, Vec3};
@@ -53,24 +54,39 @@ impl LightField {
     /// Light at a world position on a surface with a world `normal` (zero in free space); `None`
     /// when there is no volume.
     pub fn sample(&self, position: Vec3, normal: Vec3, offset: OffsetPolicy) -> Option<Sh> {
-        let nearest = self
-            .volumes
-            .iter()
-            .min_by(|a, b| a.grid.distance(position).total_cmp(&b.grid.distance(position)))?;
-        let mut light = Sh::dark(nearest.order);
+        if self.volumes.is_empty() {
+            return None;
+        }
+        // Of the lowest order; what is added raises it to its own.
+        let mut light = Sh::dark(Order::L1);
+        let mut add = |volume: &ProbeVolume, weight: f32| {
+            if weight > 0.0 {
+                light.add_scaled(&volume.sample(position, normal, offset), weight);
+            }
+        };
         let mut left = 1.0;
         for volume in &self.volumes {
             let weight = left * volume.grid.weight(position);
-            if weight > 0.0 {
-                light.add_scaled(&volume.sample(position, normal, offset), weight);
-                left -= weight;
-            }
+            add(volume, weight);
+            left -= weight;
             if left <= 0.0 {
                 return Some(light);
             }
         }
-        light.add_scaled(&nearest.sample(position, normal, offset), left);
+        let reach: f32 = self.volumes.iter().map(|volume| volume.grid.reach(position)).sum();
+        if reach > 0.0 {
+            for volume in &self.volumes {
+                add(volume, left * volume.grid.reach(position) / reach);
+            }
+        } else {
+            add(self.nearest(position)?, left);
+        }
         Some(light)
+    }
+
+    fn nearest(&self, position: Vec3) -> Option<&ProbeVolume> {
+        let distance = |volume: &ProbeVolume| volume.grid.distance(position);
+        self.volumes.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 
     /// Irradiance on a surface, lux; black when there is no volume.
@@ -104,9 +120,11 @@ mod tests {
     }
 
     fn read(field: &LightField, x: f32) -> f32 {
-        field.sample(Vec3::new(x, 0.0, 0.0), Vec3::ZERO, OffsetPolicy::None).unwrap().coefficients
-            [0]
-        .x
+        read_at(field, Vec3::X * x)
+    }
+
+    fn read_at(field: &LightField, position: Vec3) -> f32 {
+        field.sample(position, Vec3::ZERO, OffsetPolicy::None).unwrap().coefficients[0].x
     }
 
     #[test]
@@ -122,6 +140,28 @@ mod tests {
         assert_eq!(read(&field, 2.0), 1.0);
         let steps: Vec<f32> = (0..=400).map(|i| read(&field, i as f32 * 0.01)).collect();
         assert!(steps.windows(2).all(|pair| pair[1] <= pair[0] + 1e-6 && pair[0] - pair[1] < 0.04));
+    }
+
+    /// The halves of a room, cut into cells alike and not.
+    #[test]
+    fn light_passes_smoothly_through_a_shared_face() {
+        for cells in [4, 2] {
+            let field = LightField::new(vec![
+                uniform(0, Vec3::X * -2.0, 4.0, 4, 1.0),
+                uniform(1, Vec3::X * 2.0, 4.0, cells, 2.0),
+            ]);
+            // Amid the face, along its edge, outside above both, and beyond the reach of either.
+            for (y, steepest) in [(0.0, 0.04), (1.9, 0.04), (2.2, 0.04), (4.0, 1.0)] {
+                let at = |x: f32| read_at(&field, Vec3::new(x, y, 0.0));
+                let values: Vec<f32> = (-300..=300).map(|i| at(i as f32 * 0.01)).collect();
+                assert!((values[0] - 1.0).abs() < 1e-6 && (values[600] - 2.0).abs() < 1e-6);
+                let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
+                assert!(steps().all(|step| step >= -1e-6), "{cells} {y}");
+                let worst = steps().fold(0.0, f32::max);
+                assert!(worst <= steepest, "{cells} {y}: {worst}");
+            }
+            assert!((read(&field, 0.0) - 1.5).abs() < 1e-6, "the mean on the face");
+        }
     }
 
     #[test]

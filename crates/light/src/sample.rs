@@ -58,6 +58,14 @@ impl Grid {
         let t = (2.0 * to_border).clamp(Vec3::ZERO, Vec3::ONE);
         (t * t * (3.0 - 2.0 * t)).element_product()
     }
+
+    /// How much of what no box claims belongs to this one: 1 inside and on the border, falling
+    /// linearly to 0 half a cell outside.
+    pub fn reach(&self, position: Vec3) -> f32 {
+        let cell = self.cell_from_world(position);
+        let outside = (-0.5 - cell).max(cell + 0.5 - self.resolution.as_vec3()).max(Vec3::ZERO);
+        (1.0 - 2.0 * outside).max(Vec3::ZERO).element_product()
+    }
 }
 
 impl ProbeVolume {
@@ -177,5 +185,8 @@ mod tests {
         assert_eq!(grid.weight(Vec3::ZERO), 1.0);
         assert_eq!(grid.weight(Vec3::X * 0.25), 0.5);
         assert_eq!(grid.weight(Vec3::X * 0.5), 0.0);
+        assert_eq!(grid.reach(Vec3::X * 0.5), 1.0);
+        assert_eq!(grid.reach(Vec3::new(0.75, -0.75, 0.2)), 0.25);
+        assert_eq!(grid.reach(Vec3::X), 0.0);
     }
 }
