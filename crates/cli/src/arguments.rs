@@ -60,7 +60,7 @@ impl SceneArguments {
     pub(crate) fn volumes(&self, scene: &Scene) -> Result<Vec<VolumeSpec>> {
         let mut volumes = Vec::new();
         for volume in &self.volumes {
-            volumes.push(volume.in_scene(scene));
+            volumes.push(volume.in_scene(scene).context("--volume")?);
         }
         if volumes.is_empty() {
             volumes = scene.volumes();
@@ -207,14 +207,16 @@ pub(crate) struct VolumeArgument {
 
 impl VolumeArgument {
     /// The volume in a scene: without a place of its own it spans the scene's bounds.
-    fn in_scene(&self, scene: &Scene) -> VolumeSpec {
+    fn in_scene(&self, scene: &Scene) -> Result<VolumeSpec> {
         let bounds = scene.bounds();
         let (center, size) = self.place.unwrap_or((
             0.5 * (bounds.min + bounds.max),
             (bounds.max - bounds.min).max(Vec3::splat(1e-3)),
         ));
         let grid = Grid { center, rotation: Quat::IDENTITY, size, resolution: self.resolution };
-        VolumeSpec { grid, order: Order::default() }
+        let volume = VolumeSpec { grid, order: Order::default() };
+        volume.check().map_err(anyhow::Error::msg)?;
+        Ok(volume)
     }
 }
 

@@ -52,6 +52,7 @@ impl Bake {
             |done| bar.set_position((done * 1000.0) as u64),
         );
         bar.finish_and_clear();
+        let light = light?;
 
         let info = SceneInfo { name: scene.name().into(), root: scene.root_file().into() };
         let at = UpdateInfo {

@@ -267,6 +267,32 @@ fn what_was_baked_can_be_inspected() {
         .failed_saying(&[unwritable]);
 }
 
+/// Refused before memory is asked for, and before anything is computed or written.
+#[test]
+fn volumes_beyond_the_limits_are_refused_in_words() {
+    let folder = Folder::new("large-volumes");
+    let path = folder.0.join("large.light");
+    let bake = |volumes: &[&str]| {
+        let mut arguments =
+            vec!["bake", "cornell", "-o", path.to_str().expect("text"), "--samples", "10000000"];
+        arguments.extend(volumes.iter().flat_map(|volume| ["--volume", *volume]));
+        run(&arguments)
+    };
+    for huge in ["100000x100000x100000", "4294967295x4294967295x4294967295", "65537x1x1"] {
+        let words = ["--volume", huge, "1 to 65536", "give it fewer"];
+        bake(&[huge]).failed_saying(&words);
+        run(&["serve", "cornell", "--listen", "127.0.0.1:0", "--volume", huge])
+            .failed_saying(&words);
+        run(&["bench", "tick", "cornell", "--volume", huge]).failed_saying(&words);
+    }
+    bake(&["8x8x8@0,0,0:1e30,1,1"]).failed_saying(&["--volume", "size"]);
+    // Each small enough, but not together; and as many regions as no catalog holds.
+    bake(&["64x32x32"; 9]).failed_saying(&["volume 8", "589824", "524288", "fewer cells"]);
+    bake(&["65536x1x1"]).failed_saying(&["volume 0", "6554 regions", "4096", "fewer cells"]);
+    bake(&["1x1x1"; 257]).failed_saying(&["257", "256"]);
+    assert!(!path.exists());
+}
+
 #[test]
 fn inspect_tells_what_is_in_a_scene() {
     let ran = run(&["inspect", "cornell", "--json"]);

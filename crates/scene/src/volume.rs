@@ -56,7 +56,11 @@ impl VolumeSpec {
             return Err(format!("its size is {size}; each side has to be more than 0"));
         }
         if resolution.min_element() == 0 || cells(resolution) > limits::PROBES {
-            return Err(format!("its resolution is {resolution}; 1 to {} probes", limits::PROBES));
+            let UVec3 { x, y, z } = resolution;
+            return Err(format!(
+                "{x}x{y}x{z} cells; a volume has 1 to {}: give it fewer, or give several volumes",
+                limits::PROBES
+            ));
         }
         if resolution.z > limits::VOLUME_DEPTH {
             return Err(format!(

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use lumencast_gather::Gather;
 use lumencast_gather::blend::BlendSettings;
-use lumencast_light::{ProbeVolume, VolumeId};
+use lumencast_light::ProbeVolume;
 use lumencast_scene::{Snapshot, VolumeSpec};
 
+use crate::error::ServerError;
 use crate::field::Field;
 use crate::tick::GatherOptions;
 
@@ -16,7 +17,10 @@ const SAMPLES_A_PASS: u32 = 64;
 /// Gathers `samples` samples for every probe of `volumes` and averages them; `options.blend` plays no
 /// part. `progress` is told the share done, 0 to 1, after every pass.
 ///
-/// The error falls with the root of `samples`: four times the samples, half the noise.
+/// The light's error falls with the root of `samples`: four times the samples, half the noise.
+///
+/// # Errors
+/// A volume that makes no sense, or more than the wire format carries; nothing is gathered then.
 pub fn bake(
     scene: &Arc<Snapshot>,
     volumes: &[VolumeSpec],
@@ -24,12 +28,9 @@ pub fn bake(
     samples: u32,
     options: GatherOptions,
     mut progress: impl FnMut(f32),
-) -> Vec<ProbeVolume> {
+) -> Result<Vec<ProbeVolume>, ServerError> {
     let mean = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
-    let mut fields: Vec<Field> = (0..)
-        .zip(volumes)
-        .map(|(id, spec)| Field::new(VolumeId(id), spec.grid, spec.order, mean))
-        .collect();
+    let mut fields = Field::all(volumes, mean)?;
     let passes = samples.div_ceil(SAMPLES_A_PASS).max(1);
     for pass in 0..passes {
         let first = u64::from(samples) * u64::from(pass) / u64::from(passes);
@@ -44,5 +45,5 @@ pub fn bake(
         }
         progress((pass + 1) as f32 / passes as f32);
     }
-    fields.into_iter().map(Field::into_volume).collect()
+    Ok(fields.into_iter().map(Field::into_volume).collect())
 }

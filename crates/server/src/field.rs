@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use glam::{IVec3, Vec3};
-use lumencast_codec::{self as codec, EncodedRegion, ProbeEncoder, UpdateInfo};
+use lumencast_codec::{self as codec, EncodedRegion, ProbeEncoder, UpdateInfo, limits};
 use lumencast_gather::blend::{BlendSettings, History};
 use lumencast_gather::{Gathered, Job, Receiver};
 use lumencast_light::{Grid, Order, ProbeVolume, VolumeId};
-use lumencast_scene::Snapshot;
+use lumencast_scene::{Snapshot, VolumeSpec};
 
+use crate::error::ServerError;
 use crate::tick::GatherOptions;
 use crate::walls::Buried;
 
@@ -28,7 +29,19 @@ pub(crate) struct Field {
 }
 
 impl Field {
-    pub(crate) fn new(id: VolumeId, grid: Grid, order: Order, blend: BlendSettings) -> Self {
+    /// The fields of volumes, numbered in their order. Volumes are checked before memory is taken
+    /// for any.
+    pub(crate) fn all(
+        volumes: &[VolumeSpec],
+        blend: BlendSettings,
+    ) -> Result<Vec<Self>, ServerError> {
+        check(volumes)?;
+        let new =
+            |(id, spec): (u32, &VolumeSpec)| Self::new(VolumeId(id), spec.grid, spec.order, blend);
+        Ok((0..).zip(volumes).map(new).collect())
+    }
+
+    fn new(id: VolumeId, grid: Grid, order: Order, blend: BlendSettings) -> Self {
         Self {
             volume: ProbeVolume::dark(id, grid, order),
             positions: grid.positions().collect(),
@@ -64,10 +77,6 @@ impl Field {
             source: source.to_owned(),
             epoch: None,
         }
-    }
-
-    pub(crate) fn region_count(&self) -> usize {
-        self.encoder.regions().count()
     }
 
     pub(crate) fn probe_count(&self) -> usize {
@@ -124,4 +133,32 @@ impl Field {
         self.update += 1;
         self.encoder.encode(&self.volume, info, watched)
     }
+}
+
+/// Whether volumes make sense and the wire format can carry them.
+fn check(volumes: &[VolumeSpec]) -> Result<(), ServerError> {
+    if volumes.len() > limits::FIELDS {
+        return Err(ServerError::TooManyVolumes(volumes.len()));
+    }
+    let mut total = 0;
+    for (volume, spec) in (0..).zip(volumes) {
+        let refused = |reason| Err(ServerError::Volume { volume, reason });
+        if let Err(reason) = spec.check() {
+            return refused(reason);
+        }
+        let probes = spec.grid.probe_count();
+        total += probes;
+        let regions = codec::regions(spec.grid.resolution).len();
+        let (count, what, most) = if probes > limits::FIELD_PROBES {
+            (probes, "probes", limits::FIELD_PROBES)
+        } else if total > limits::CATALOG_PROBES {
+            (total, "probes with those before it", limits::CATALOG_PROBES)
+        } else if regions > limits::REGIONS {
+            (regions, "regions", limits::REGIONS)
+        } else {
+            continue;
+        };
+        return refused(format!("{count} {what}; at most {most}: give it fewer cells"));
+    }
+    Ok(())
 }

@@ -10,7 +10,7 @@ use lumencast_codec::{
 };
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::{Gather, Gathered};
-use lumencast_light::{ProbeVolume, VolumeId};
+use lumencast_light::ProbeVolume;
 use lumencast_scene::{Edit, Environment, InstanceSource, Scene, Script, Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
@@ -95,7 +95,7 @@ impl Tick {
     /// Prepares a scene. `epoch` tells this run of the server from others.
     ///
     /// # Errors
-    /// A volume beyond the limits of the wire format, or a source's name.
+    /// A volume that makes no sense or is beyond the limits of the wire format, or such a source.
     pub fn new(
         scene: Scene,
         gatherer: Box<dyn Gather>,
@@ -108,11 +108,7 @@ impl Tick {
         }
         let volumes =
             if options.volumes.is_empty() { scene.volumes() } else { options.volumes.clone() };
-        let fields: Vec<Field> = (0..)
-            .zip(volumes)
-            .map(|(id, spec)| Field::new(VolumeId(id), spec.grid, spec.order, options.gather.blend))
-            .collect();
-        check_limits(&fields)?;
+        let fields = Field::all(&volumes, options.gather.blend)?;
         let budget = Budget::new(options.period, options.samples);
         let last = Report::default();
         Ok(Self {
@@ -326,30 +322,6 @@ impl Tick {
         self.last = report.clone();
         report
     }
-}
-
-/// What the wire format can carry.
-fn check_limits(fields: &[Field]) -> Result<(), ServerError> {
-    if fields.len() > limits::FIELDS {
-        return Err(ServerError::TooManyVolumes(fields.len()));
-    }
-    let mut total = 0;
-    for field in fields {
-        total += field.probe_count();
-        let regions = field.region_count();
-        let reason = if field.probe_count() > limits::FIELD_PROBES {
-            format!("{} probes; at most {}", field.probe_count(), limits::FIELD_PROBES)
-        } else if total > limits::CATALOG_PROBES {
-            format!("{total} probes with those before it; at most {}", limits::CATALOG_PROBES)
-        } else if regions > limits::REGIONS {
-            format!("{regions} regions; at most {}", limits::REGIONS)
-        } else {
-            continue;
-        };
-        let volume = field.id().0;
-        return Err(ServerError::Volume { volume, reason: reason + ": give it fewer cells" });
-    }
-    Ok(())
 }
 
 /// What became of a tick's edits.

@@ -348,12 +348,24 @@ fn additions_end_before_a_snapshot_grows_too_long() {
 
 #[test]
 fn too_many_probes_are_refused_in_words() {
-    let mut huge = options();
-    huge.volumes[0].grid.resolution = glam::UVec3::new(128, 128, 34);
-    let scene = Scene::builtin("cornell").expect("a built-in scene");
-    let tracer = Box::new(CpuPathTracer::new(Options::default()).expect("threads"));
-    let error = Tick::new(scene, tracer, huge, Epoch(0)).err().expect("refused").to_string();
-    assert!(error.contains("volume 0") && error.contains("557056"), "{error}");
+    let with = |resolution: [u32; 3], count: usize| {
+        let mut huge = options();
+        huge.volumes[0].grid.resolution = resolution.into();
+        huge.volumes = vec![huge.volumes[0]; count];
+        huge
+    };
+    let long = TickOptions { source: "x".repeat(129), ..options() };
+    for (options, words) in [
+        (with([u32::MAX; 3], 1), ["volume 0", "1 to 65536"]),
+        (with([64, 32, 32], 9), ["volume 8", "589824"]),
+        (long, ["source", "128"]),
+    ] {
+        let scene = Scene::builtin("cornell").expect("a built-in scene");
+        let tracer = Box::new(CpuPathTracer::new(Options::default()).expect("threads"));
+        let refused = Tick::new(scene, tracer, options, Epoch(0)).err().expect("refused");
+        let error = refused.to_string();
+        assert!(words.iter().all(|word| error.contains(word)), "{error}");
+    }
 }
 
 #[test]
