@@ -289,8 +289,22 @@ fn volumes_beyond_the_limits_are_refused_in_words() {
     // Each small enough, but not together; and as many regions as no catalog holds.
     bake(&["64x32x32"; 9]).failed_saying(&["volume 8", "589824", "524288", "fewer cells"]);
     bake(&["65536x1x1"]).failed_saying(&["volume 0", "6554 regions", "4096", "fewer cells"]);
-    bake(&["1x1x1"; 257]).failed_saying(&["257", "256"]);
+    bake(&["1x1x1"; 257]).failed_saying(&["257", "256", "fewer volumes"]);
+    bake(&["1x1x9000"]).failed_saying(&["265 fields", "256", "fewer cells along z"]);
     assert!(!path.exists());
+}
+
+#[test]
+fn volumes_too_deep_for_browsers_are_baked_in_pieces() {
+    let folder = Folder::new("deep");
+    let path = folder.0.join("deep.light").to_str().expect("text").to_owned();
+    let baked =
+        run(&["bake", "cornell", "-o", &path, "--volume", "1x2x35", "--samples", "1", "--json"]);
+    assert_eq!(baked.code, Some(0), "{baked:?}");
+    assert_eq!((&baked.json()["fields"], &baked.json()["probes"]), (&2.into(), &70.into()));
+    let fields = run(&["inspect", &path, "--json"]).json()["fields"].clone();
+    let resolutions = [0, 1].map(|field| fields[field]["grid"]["resolution"].clone());
+    assert_eq!(resolutions, [json!([1, 2, 17]), json!([1, 2, 18])]);
 }
 
 #[test]

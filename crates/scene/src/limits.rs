@@ -25,7 +25,8 @@ pub(crate) const NODES: usize = 1_000_000;
 pub(crate) const FILES: usize = 1_024;
 /// Probes of one volume.
 pub(crate) const PROBES: u64 = 65_536;
-/// Cells of a volume along z at L2: its atlas has to fit the 256 slices that WebGL2 guarantees.
+/// Cells along z of a volume as it is sent; deeper ones are split. Its atlas at L2, as which every
+/// order is drawn, has to fit the 256 slices that WebGL2 guarantees: 7 · (34 + 2) = 252.
 pub(crate) const VOLUME_DEPTH: u32 = 34;
 /// Volumes of a scene.
 pub(crate) const VOLUMES: usize = 64;

@@ -9,7 +9,7 @@ use crate::{Aabb, limits};
 /// A probe volume as a scene asks for it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VolumeSpec {
-    /// The box and its cells: at most 65,536 of them, and at most 34 along z.
+    /// The box and its cells: at most 65,536 of them.
     #[serde(flatten)]
     pub grid: Grid,
     /// Order of the expansion.
@@ -53,7 +53,10 @@ impl VolumeSpec {
             return Err("its rotation is not a unit quaternion".into());
         }
         if !size.cmpgt(Vec3::ZERO).all() || size.max_element() > limits::EXTENT {
-            return Err(format!("its size is {size}; each side has to be more than 0"));
+            return Err(format!(
+                "its size is {size} metres; each side has to be more than 0, at most {:e}",
+                limits::EXTENT
+            ));
         }
         if resolution.min_element() == 0 || cells(resolution) > limits::PROBES {
             let UVec3 { x, y, z } = resolution;
@@ -62,14 +65,30 @@ impl VolumeSpec {
                 limits::PROBES
             ));
         }
-        if resolution.z > limits::VOLUME_DEPTH {
-            return Err(format!(
-                "{} cells along z; browsers hold {} at most: turn it or split it",
-                resolution.z,
-                limits::VOLUME_DEPTH
-            ));
-        }
         Ok(())
+    }
+
+    /// The volume cut across z into as few pieces as have at most 34 layers of cells, nearly equally
+    /// many: browsers hold no more in one texture. The probes stay where they are; a volume that is
+    /// not too deep is the one piece.
+    pub fn split(self) -> impl Iterator<Item = Self> {
+        let Grid { center, rotation, size, resolution } = self.grid;
+        let pieces = resolution.z.div_ceil(limits::VOLUME_DEPTH);
+        let cut = move |piece: u32| {
+            (u64::from(resolution.z) * u64::from(piece) / u64::from(pieces)) as u32
+        };
+        (0..pieces).map(move |piece| {
+            let (from, to) = (cut(piece), cut(piece + 1));
+            let share = |layers: u32| layers as f32 / resolution.z as f32;
+            let middle = 0.5 * (share(from) + share(to)) - 0.5;
+            let grid = Grid {
+                center: center + rotation * (Vec3::Z * (middle * size.z)),
+                rotation,
+                size: size.with_z(size.z * share(to - from)),
+                resolution: resolution.with_z(to - from),
+            };
+            Self { grid, ..self }
+        })
     }
 }
 
@@ -80,6 +99,8 @@ fn cells(resolution: UVec3) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Quat;
+    use lumencast_light::{LightField, OffsetPolicy, ProbeVolume, VolumeId};
 
     #[test]
     fn volumes_around_bounds_have_near_cubic_cells_within_the_budget() {
@@ -108,6 +129,84 @@ mod tests {
         assert!(cell.max_element() / cell.min_element() < 1.3, "{cell}");
     }
 
+    fn deep(layers: u32, rotation: Quat) -> VolumeSpec {
+        let grid = Grid {
+            center: Vec3::new(3.0, -1.0, 2.0),
+            rotation,
+            size: Vec3::new(4.0, 2.0, 30.0),
+            resolution: UVec3::new(3, 2, layers),
+        };
+        VolumeSpec { grid, order: Order::L3 }
+    }
+
+    #[test]
+    fn pieces_have_the_probes_of_the_whole() {
+        for rotation in [Quat::IDENTITY, Quat::from_xyzw(0.1, 0.5, -0.3, 0.8).normalize()] {
+            for (layers, depths) in [
+                (1, &[1][..]),
+                (34, &[34]),
+                (35, &[17, 18]),
+                (68, &[34, 34]),
+                (103, &[25, 26, 26, 26]),
+            ] {
+                let whole = deep(layers, rotation);
+                whole.check().expect("a sound volume");
+                let pieces: Vec<_> = whole.split().collect();
+                let found: Vec<u32> = pieces.iter().map(|p| p.grid.resolution.z).collect();
+                assert_eq!(found, depths);
+                for piece in &pieces {
+                    piece.check().expect("a sound piece");
+                    assert_eq!(piece.order, whole.order);
+                }
+                let probes: Vec<Vec3> = pieces.iter().flat_map(|p| p.grid.positions()).collect();
+                assert_eq!(probes.len(), whole.grid.probe_count());
+                for (probe, of_whole) in probes.into_iter().zip(whole.grid.positions()) {
+                    assert!(probe.distance(of_whole) < 1e-5, "{probe} {of_whole}");
+                }
+            }
+            let shallow = deep(34, rotation);
+            assert_eq!(shallow.split().collect::<Vec<_>>(), [shallow]);
+        }
+    }
+
+    #[test]
+    fn light_is_continuous_across_the_cuts() {
+        let rotation = Quat::from_xyzw(0.1, 0.5, -0.3, 0.8).normalize();
+        let whole = deep(70, rotation);
+        // Light that changes from layer to layer, as far as it can.
+        let lit = |(id, piece, first): (u32, VolumeSpec, u32)| {
+            let mut volume = ProbeVolume::dark(VolumeId(id), piece.grid, piece.order);
+            for probe in 0..piece.grid.probe_count() {
+                let layer = first + piece.grid.cell(probe).z;
+                volume.probe_mut(probe)[0] = Vec3::splat((layer % 2) as f32);
+            }
+            volume
+        };
+        let mut first = 0;
+        let pieces = (0..).zip(whole.split()).map(|(id, piece)| {
+            first += piece.grid.resolution.z;
+            lit((id, piece, first - piece.grid.resolution.z))
+        });
+        let pieces = LightField::new(pieces.collect());
+        let whole_light = LightField::new(vec![lit((0, whole, 0))]);
+        assert_eq!(pieces.volumes().len(), 3);
+        let cell = whole.grid.spacing().z;
+        let read = |light: &LightField, z: f32| {
+            let position = whole.grid.center + rotation * Vec3::new(0.3, 0.2, z);
+            light.sample(position, Vec3::ZERO, OffsetPolicy::None).expect("light").values()[0].x
+        };
+        // In hundredths of a cell, from the first probe to the last.
+        let values: Vec<(f32, f32)> = (50..=6950)
+            .map(|i| (i as f32 * 0.01 - 35.0) * cell)
+            .map(|z| (read(&pieces, z), read(&whole_light, z)))
+            .collect();
+        let steepest = values.windows(2).map(|v| (v[1].0 - v[0].0).abs()).fold(0.0, f32::max);
+        assert!(steepest < 0.03, "{steepest}");
+        // Trilinear light goes straight from probe to probe; at the cuts it takes a curve there.
+        let farthest = values.iter().map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(farthest > 0.01 && farthest < 0.15, "{farthest}");
+    }
+
     #[test]
     fn senseless_volumes_are_refused() {
         let good = VolumeSpec::around(Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 64);
@@ -121,7 +220,7 @@ mod tests {
         assert!(with(|g| g.size.y = f32::NAN).is_err());
         assert!(with(|g| g.resolution.y = 0).is_err());
         assert!(with(|g| g.resolution = UVec3::splat(u32::MAX)).is_err());
-        assert!(with(|g| g.resolution.z = 35).is_err());
+        assert!(with(|g| g.resolution = UVec3::new(1, 1, 65_537)).is_err());
         assert!(with(|g| g.rotation.w = 2.0).is_err());
     }
 }

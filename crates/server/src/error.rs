@@ -17,8 +17,12 @@ pub enum ServerError {
         reason: String,
     },
     /// More fields than a catalog holds.
-    #[error("{0} volumes; a scene has at most {max}", max = lumencast_codec::limits::FIELDS)]
-    TooManyVolumes(usize),
+    #[error(
+        "{0} fields; a catalog holds at most {max}: give fewer volumes, or fewer cells along z, of \
+         which 34 make a field",
+        max = lumencast_codec::limits::FIELDS
+    )]
+    TooManyFields(usize),
     /// A source that does not fit a catalog.
     #[error(
         "source {0:?}: at most {max} bytes of text, no control characters",

@@ -29,16 +29,15 @@ pub(crate) struct Field {
 }
 
 impl Field {
-    /// The fields of volumes, numbered in their order. Volumes are checked before memory is taken
-    /// for any.
+    /// The fields of volumes, numbered in their order; of a volume too deep for clients, one for
+    /// each piece. Volumes are checked before memory is taken for any.
     pub(crate) fn all(
         volumes: &[VolumeSpec],
         blend: BlendSettings,
     ) -> Result<Vec<Self>, ServerError> {
-        check(volumes)?;
         let new =
-            |(id, spec): (u32, &VolumeSpec)| Self::new(VolumeId(id), spec.grid, spec.order, blend);
-        Ok((0..).zip(volumes).map(new).collect())
+            |(id, spec): (u32, VolumeSpec)| Self::new(VolumeId(id), spec.grid, spec.order, blend);
+        Ok((0..).zip(pieces(volumes)?).map(new).collect())
     }
 
     fn new(id: VolumeId, grid: Grid, order: Order, blend: BlendSettings) -> Self {
@@ -135,30 +134,27 @@ impl Field {
     }
 }
 
-/// Whether volumes make sense and the wire format can carry them.
-fn check(volumes: &[VolumeSpec]) -> Result<(), ServerError> {
-    if volumes.len() > limits::FIELDS {
-        return Err(ServerError::TooManyVolumes(volumes.len()));
-    }
+/// The pieces of volumes that make sense and that the wire format can carry.
+fn pieces(volumes: &[VolumeSpec]) -> Result<Vec<VolumeSpec>, ServerError> {
+    let mut pieces = Vec::new();
     let mut total = 0;
     for (volume, spec) in (0..).zip(volumes) {
-        let refused = |reason| Err(ServerError::Volume { volume, reason });
-        if let Err(reason) = spec.check() {
-            return refused(reason);
-        }
-        let probes = spec.grid.probe_count();
-        total += probes;
-        let regions = codec::regions(spec.grid.resolution).len();
-        let (count, what, most) = if probes > limits::FIELD_PROBES {
-            (probes, "probes", limits::FIELD_PROBES)
-        } else if total > limits::CATALOG_PROBES {
-            (total, "probes with those before it", limits::CATALOG_PROBES)
-        } else if regions > limits::REGIONS {
-            (regions, "regions", limits::REGIONS)
-        } else {
-            continue;
+        let refused = |reason| ServerError::Volume { volume, reason };
+        let most = |count: usize, what: &str, limit: usize| {
+            let reason = format!("{count} {what}; at most {limit}: give it fewer cells");
+            if count > limit { Err(refused(reason)) } else { Ok(()) }
         };
-        return refused(format!("{count} {what}; at most {most}: give it fewer cells"));
+        spec.check().map_err(refused)?;
+        total += spec.grid.probe_count();
+        most(total, "probes with those before it", limits::CATALOG_PROBES)?;
+        for piece in spec.split() {
+            most(piece.grid.probe_count(), "probes", limits::FIELD_PROBES)?;
+            most(codec::regions(piece.grid.resolution).len(), "regions", limits::REGIONS)?;
+            pieces.push(piece);
+        }
     }
-    Ok(())
+    if pieces.len() > limits::FIELDS {
+        return Err(ServerError::TooManyFields(pieces.len()));
+    }
+    Ok(pieces)
 }

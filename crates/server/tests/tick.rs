@@ -1,11 +1,11 @@
 //! The tick, stepped by hand: no network, no clock but the test's own.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use glam::Vec3;
-use lumencast_codec::{EncodedRegion, Epoch, ProbeDecoder, StateFrame};
+use lumencast_codec::{Catalog, EncodedRegion, Epoch, ProbeDecoder, StateFrame};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Gathered, Job, Progress, Ticket};
 use lumencast_light::ProbeVolume;
@@ -365,6 +365,24 @@ fn too_many_probes_are_refused_in_words() {
         let refused = Tick::new(scene, tracer, options, Epoch(0)).err().expect("refused");
         let error = refused.to_string();
         assert!(words.iter().all(|word| error.contains(word)), "{error}");
+    }
+}
+
+#[test]
+fn a_volume_too_deep_for_clients_is_sent_in_pieces() {
+    let mut deep = options();
+    deep.volumes[0].grid.resolution = glam::UVec3::new(1, 2, 40);
+    let whole = deep.volumes[0].grid;
+    let mut stepped = Stepped::new(deep);
+    let catalog = Catalog::decode(&stepped.tick.catalog().encode()).expect("a catalog");
+    let fields: Vec<_> = catalog.fields.iter().map(|f| (f.id, f.grid.resolution.z)).collect();
+    assert_eq!(fields, [(0, 20), (1, 20)]);
+    stepped.steps(1);
+    let sent: BTreeSet<u32> = stepped.kept.frames.iter().map(|(field, _)| *field).collect();
+    assert_eq!(sent, BTreeSet::from([0, 1]));
+    let probes = stepped.tick.volumes().flat_map(|volume| volume.grid.positions());
+    for (probe, of_whole) in probes.zip(whole.positions()) {
+        assert!(probe.distance(of_whole) < 1e-5, "{probe} {of_whole}");
     }
 }
 

@@ -207,8 +207,8 @@ fn senseless_settings_name_their_file() {
             "size",
         ),
         (
-            "[[volume]]\ncenter = [0.0, 0.0, 0.0]\nsize = [1.0, 1.0, 1.0]\nresolution = [1, 1, 99]",
-            "along z",
+            "[[volume]]\ncenter = [0.0, 0.0, 0.0]\nsize = [1.0, 1.0, 1.0]\nresolution = [1, 1, 99999]",
+            "give it fewer",
         ),
         ("[environment]\ntype = \"constant\"\nradiance = [nan, 0.0, 0.0]", "cd/m²"),
         ("[environment]\ntype = \"image\"\nuri = \"none.hdr\"", "none.hdr"),
