@@ -1,10 +1,10 @@
 //! What the workspace needs of the machine. As root on Debian it is installed; otherwise the exact
 //! commands are printed.
 
-use std::collections::BTreeSet;
 use std::fs;
+use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::run::{cargo, command, output, step};
 
@@ -23,6 +23,8 @@ struct Package {
     release: Release,
     purpose: Purpose,
     why: &'static str,
+    /// Whether the demo runs without it.
+    optional: bool,
     present: fn() -> bool,
 }
 
@@ -38,27 +40,15 @@ const PACKAGES: &[Package] = &[
         release: Release::Stable,
         purpose: Purpose::Demo,
         why: "a C compiler for the cryptography of QUIC",
+        optional: false,
         present: || runs("cc", "--version"),
-    },
-    Package {
-        name: "cmake",
-        release: Release::Stable,
-        purpose: Purpose::Demo,
-        why: "builds the cryptography of QUIC",
-        present: || runs("cmake", "--version"),
-    },
-    Package {
-        name: "nasm",
-        release: Release::Stable,
-        purpose: Purpose::Demo,
-        why: "assembler of cryptography and of video; without it they are slower, silently",
-        present: || runs("nasm", "--version"),
     },
     Package {
         name: "chromium",
         release: Release::Stable,
         purpose: Purpose::Test,
         why: "the browser of the browser test",
+        optional: false,
         present: || runs("chromium", "--version"),
     },
     Package {
@@ -66,16 +56,21 @@ const PACKAGES: &[Package] = &[
         release: Release::Stable,
         purpose: Purpose::Test,
         why: "makes the certificate of the browser test",
+        optional: false,
         present: || runs("openssl", "version"),
     },
     Package {
         name: "mesa-vulkan-drivers",
         release: Release::Backports,
-        purpose: Purpose::Test,
-        why: "a GPU in software (lavapipe 25 or newer)",
+        purpose: Purpose::Demo,
+        why: "a GPU in software (lavapipe 25 or newer), for machines without one",
+        optional: true,
         present: || installed_version("mesa-vulkan-drivers").is_some_and(|major| major >= 25),
     },
 ];
+
+/// Where bookworm-backports is added to the package sources.
+const BACKPORTS_FILE: &str = "/etc/apt/sources.list.d/bookworm-backports.sources";
 
 /// Programs of cargo that the tests call.
 const CARGO_TOOLS: &[(&str, &str)] =
@@ -96,14 +91,28 @@ pub(crate) fn install(purpose: Purpose) -> Result<()> {
 }
 
 fn check_node() -> Result<()> {
-    const MINIMUM: u32 = 20;
+    let (major, minor) = node_wanted()?;
+    let advice = format!("install Node {major}.{minor} or newer, with npm, from nodejs.org");
     let version = output("node", &["--version"]).unwrap_or_default();
-    let major = version.trim().trim_start_matches('v').split('.').next().map(str::parse::<u32>);
-    match major {
-        Some(Ok(major)) if major >= MINIMUM && runs("npm", "--version") => Ok(()),
-        Some(Ok(major)) => bail!("Node {major} is too old: the web page needs {MINIMUM} or newer"),
-        _ => bail!("Node {MINIMUM} or newer with npm is missing; install it from nodejs.org"),
-    }
+    let Some(found) = major_and_minor(version.trim().trim_start_matches('v')) else {
+        bail!("the web page needs Node: {advice}");
+    };
+    ensure!(found >= (major, minor), "Node {} is too old: {advice}", version.trim());
+    ensure!(runs("npm", "--version"), "npm is missing: {advice}");
+    Ok(())
+}
+
+/// The oldest Node with which the web packages work, as they say themselves.
+fn node_wanted() -> Result<(u32, u32)> {
+    let package: serde_json::Value = serde_json::from_str(include_str!("../../web/package.json"))?;
+    let wanted = package["engines"]["node"].as_str().and_then(|text| text.strip_prefix(">="));
+    wanted.and_then(major_and_minor).context("web/package.json asks for no Node of the form >=1.2")
+}
+
+/// `20.19.5` or `20.19`
+fn major_and_minor(version: &str) -> Option<(u32, u32)> {
+    let mut numbers = version.split('.').map(str::parse);
+    Some((numbers.next()?.ok()?, numbers.next()?.ok()?))
 }
 
 fn install_packages(purpose: Purpose) -> Result<()> {
@@ -119,27 +128,23 @@ fn install_packages(purpose: Purpose) -> Result<()> {
     for package in &wanted {
         println!("missing: {} ({})", package.name, package.why);
     }
-    if !runs("apt-get", "--version") {
-        bail!("this set-up knows Debian 12 only; install the packages named above by other means");
+    let can_wait = purpose == Purpose::Demo && wanted.iter().all(|p| p.optional);
+    let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
+    if !release.contains("VERSION_CODENAME=bookworm") {
+        ensure!(can_wait, "only on Debian 12 are they installed: install them by other means");
+        return Ok(());
     }
+    let source = if backports.is_empty() { None } else { backports_source(&package_sources()) };
     if output("id", &["-u"]).is_none_or(|id| id.trim() != "0") {
-        println!("\nRun this as root, then start again:\n");
-        if !backports.is_empty() && backports_source()?.is_some() {
-            println!("  cargo xtask setup    # as root: adds bookworm-backports too, or by hand:");
-            println!("  add the suite bookworm-backports to your Debian sources");
-        }
-        println!("  apt-get update");
-        for (release, names) in [("", &stable), ("-t bookworm-backports ", &backports)] {
-            if !names.is_empty() {
-                println!("  apt-get install -y {release}{}", names.join(" "));
-            }
-        }
-        bail!("packages are missing, and only root may install them");
+        let commands = commands(&stable, &backports, source.as_deref());
+        println!("\nPaste this into a shell of root (`su -` or `sudo -i`), and start again:\n");
+        println!("{commands}");
+        ensure!(can_wait, "packages are missing, and only root may install them");
+        println!("The demo goes on without.");
+        return Ok(());
     }
-    if !backports.is_empty()
-        && let Some(source) = backports_source()?
-    {
-        fs::write("/etc/apt/sources.list.d/bookworm-backports.sources", source)
+    if let Some(source) = source {
+        fs::write(BACKPORTS_FILE, source)
             .context("could not add bookworm-backports to the package sources")?;
     }
     step("package lists", apt(&["update", "-q"]))?;
@@ -153,38 +158,47 @@ fn install_packages(purpose: Purpose) -> Result<()> {
     Ok(())
 }
 
-/// A source entry for bookworm-backports at the mirrors that the machine uses already; `None` when
-/// the suite is known.
-fn backports_source() -> Result<Option<String>> {
-    let mut mirrors = BTreeSet::new();
-    let mut files = vec!["/etc/apt/sources.list".into()];
+/// What root types to install packages, as one block.
+fn commands(stable: &[&str], backports: &[&str], source: Option<&str>) -> String {
+    let mut commands = String::new();
+    if let Some(source) = source {
+        commands += &format!("cat > {BACKPORTS_FILE} <<'END'\n{source}END\n");
+    }
+    commands += "apt-get update";
+    for (release, names) in [("", stable), ("-t bookworm-backports ", backports)] {
+        if !names.is_empty() {
+            commands += &format!(" &&\napt-get install -y {release}{}", names.join(" "));
+        }
+    }
+    commands + "\n"
+}
+
+/// The package sources of apt that count.
+fn package_sources() -> String {
+    let mut files = vec![PathBuf::from("/etc/apt/sources.list")];
     if let Ok(folder) = fs::read_dir("/etc/apt/sources.list.d") {
         files.extend(folder.flatten().map(|entry| entry.path()));
     }
-    for file in files {
-        let enabled = file.extension().is_some_and(|e| e == "list" || e == "sources");
-        let Ok(text) = fs::read_to_string(&file) else { continue };
-        if !enabled {
-            continue;
-        }
-        if text.contains("bookworm-backports") {
-            return Ok(None);
-        }
-        for line in text.lines().map(str::trim).filter(|line| !line.starts_with('#')) {
-            mirrors.extend(
-                line.split_whitespace()
-                    .filter(|word| word.starts_with("http") && word.ends_with("/debian"))
-                    .map(str::to_owned),
-            );
-        }
+    files.retain(|file| file.extension().is_some_and(|e| e == "list" || e == "sources"));
+    files.iter().filter_map(|file| fs::read_to_string(file).ok()).collect::<Vec<_>>().join("\n")
+}
+
+/// A source entry for bookworm-backports at the mirror that the machine uses already, or else at
+/// Debian's own; `None` when the suite is among the `sources`.
+fn backports_source(sources: &str) -> Option<String> {
+    let lines = sources.lines().filter(|line| !line.trim_start().starts_with('#'));
+    let words = lines.flat_map(str::split_whitespace);
+    if words.clone().any(|word| word == "bookworm-backports") {
+        return None;
     }
-    let mirror = mirrors.first().context(
-        "no Debian mirror in /etc/apt/sources.list*: add the suite bookworm-backports by hand",
-    )?;
-    Ok(Some(format!(
+    let mirror = words
+        .map(|word| word.trim_end_matches('/'))
+        .find(|word| word.starts_with("http") && word.ends_with("/debian"))
+        .unwrap_or("http://deb.debian.org/debian");
+    Some(format!(
         "Types: deb\nURIs: {mirror}\nSuites: bookworm-backports\nComponents: main\n\
          Signed-By: /usr/share/keyrings/debian-archive-keyring.gpg\n"
-    )))
+    ))
 }
 
 fn apt(args: &[&str]) -> std::process::Command {
@@ -201,4 +215,45 @@ fn runs(program: &str, flag: &str) -> bool {
 fn installed_version(package: &str) -> Option<u32> {
     let version = output("dpkg-query", &["-W", "-f", "${Version}", package])?;
     version.split(['.', '-']).next()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn node_is_asked_for_as_in_the_packages() {
+        assert!(node_wanted().expect("a version") >= (20, 19));
+        assert_eq!(major_and_minor("20.19.5"), Some((20, 19)));
+        assert_eq!(major_and_minor("22"), None);
+        assert!(major_and_minor("20.9.0") < major_and_minor("20.19.0"));
+    }
+
+    #[test]
+    fn backports_are_added_where_they_are_missing() {
+        let fresh = "deb http://ftp.de.debian.org/debian/ bookworm main\n# bookworm-backports\n";
+        let source = backports_source(fresh).expect("a source");
+        assert!(source.contains("URIs: http://ftp.de.debian.org/debian\n"), "{source}");
+        let elsewhere = backports_source("URIs: mirror+file:///etc/apt/mirrors/debian.list");
+        assert!(elsewhere.expect("a source").contains("URIs: http://deb.debian.org/debian\n"));
+        assert_eq!(backports_source("Suites: bookworm bookworm-backports"), None);
+    }
+
+    /// The block is for pasting: a shell without rights to install runs it, with a stand-in for apt.
+    #[test]
+    fn commands_for_root_can_be_pasted() {
+        let file = std::env::temp_dir().join(format!("lumencast-setup-{}", std::process::id()));
+        let file = file.to_string_lossy();
+        let block = commands(&["cc", "b"], &["mesa"], Some("Types: deb\nSuites: $x\n"))
+            .replace(BACKPORTS_FILE, &file)
+            .replace("apt-get", "apt_get");
+        let script = format!("apt_get() {{ echo \"apt $*\"; }}\n{block}cat {file}\nrm {file}\n");
+        let said = output("sh", &["-ec", &script]).expect("the commands run");
+        assert_eq!(
+            said,
+            "apt update\napt install -y cc b\napt install -y -t bookworm-backports mesa\n\
+             Types: deb\nSuites: $x\n"
+        );
+        assert_eq!(commands(&["cc"], &[], None), "apt-get update &&\napt-get install -y cc\n");
+    }
 }

@@ -29,12 +29,11 @@ pub(crate) struct Doctor {
 }
 
 /// Programs that building and testing need, with what for.
-const PROGRAMS: [(&str, &str, &str); 6] = [
+const PROGRAMS: [(&str, &str, &str); 5] = [
     ("cargo", "--version", "builds the server"),
     ("node", "--version", "builds the page"),
     ("npm", "--version", "builds the page"),
-    ("cmake", "--version", "builds the TLS library"),
-    ("nasm", "--version", "makes the video encoder fast"),
+    ("cc", "--version", "compiles the cryptography of QUIC"),
     ("chromium", "--version", "the browser tests"),
 ];
 
