@@ -55,6 +55,10 @@ pub(crate) struct Serve {
     /// An origin (https://host[:port]) whose pages may connect, besides the server's own; repeatable.
     #[arg(long, value_name = "ORIGIN", help_heading = "Network")]
     allow_origin: Vec<String>,
+    /// Sessions open at once, at most; further ones are refused until one ends.
+    #[arg(long, value_name = "N", default_value_t = 256, help_heading = "Network",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    clients: u32,
     #[command(flatten)]
     tick: TickArguments,
     /// The page's files, in place of those compiled in.
@@ -106,6 +110,7 @@ impl Serve {
         if let (Some(cert), Some(key)) = (&self.tls_cert, &self.tls_key) {
             network.tls = Tls::Files { cert: cert.clone(), key: key.clone() };
         }
+        network.max_sessions = self.clients as usize;
         network.allowed_hosts.clone_from(&self.allow_host);
         network.allowed_origins.clone_from(&self.allow_origin);
         Ok(network)

@@ -39,6 +39,7 @@ fn wrong_usage_exits_with_2() {
         &["serve", "cornell", "--samples", "0"],
         &["serve", "cornell", "--rate", "nan"],
         &["serve", "cornell", "--ratio", "2"],
+        &["serve", "cornell", "--clients", "0"],
         &["probe", "cornell"],
         &["probe", "cornell", "--at", "0,0"],
         &["probe", "cornell", "--at", "0,0,0", "--order", "5"],

@@ -195,6 +195,18 @@ fn an_edit_of_one_client_changes_the_light_of_another() {
 }
 
 #[test]
+fn clients_beyond_the_limit_are_refused() {
+    let server = Serving::start("cornell", &[&SMALL[..], &["--clients", "1"]].concat());
+    limited(async {
+        let first = Follower::connect(&server).await;
+        let mut options = ConnectOptions::default();
+        options.timeout = Duration::from_millis(500);
+        assert!(Client::connect(&server.url(), options).await.is_err());
+        drop(first);
+    });
+}
+
+#[test]
 fn a_refused_edit_comes_back_with_its_reason() {
     let server = Serving::start("cornell", &SMALL);
     limited(async {
