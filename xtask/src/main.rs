@@ -4,6 +4,7 @@
 
 mod demo;
 mod figures;
+mod oracles;
 mod run;
 mod setup;
 mod test;

@@ -60,6 +60,16 @@ const PACKAGES: &[Package] = &[
         present: || runs("openssl", "version"),
     },
     Package {
+        name: "python3-pip",
+        release: Release::Stable,
+        purpose: Purpose::Test,
+        why: "fetches Embree, which rays are compared with",
+        optional: false,
+        present: || {
+            output("python3", &["-m", "pip", "--version"]).is_some_and(|text| text.contains("pip"))
+        },
+    },
+    Package {
         name: "mesa-vulkan-drivers",
         release: Release::Backports,
         purpose: Purpose::Demo,

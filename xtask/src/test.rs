@@ -3,6 +3,7 @@
 use anyhow::Result;
 use clap::Args;
 
+use crate::oracles;
 use crate::run::{cargo, npm, step, target_dir};
 use crate::setup::{self, Purpose};
 
@@ -25,7 +26,12 @@ impl Test {
         step("web: page", npm(&["run", "build"]))?;
         let clippy = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
         step("lints", cargo(&clippy))?;
-        step("tests", cargo(&["nextest", "run", "--workspace"]))?;
+        let mut tests = cargo(&["nextest", "run", "--workspace"]);
+        match oracles::embree() {
+            Ok(library) => drop(tests.env("LUMENCAST_EMBREE", library)),
+            Err(why) => println!("without Embree, so its test is left out: {why:#}"),
+        }
+        step("tests", tests)?;
         step("doctests", cargo(&["test", "--workspace", "--doc", "--quiet"]))?;
         let deny = ["deny", "--all-features", "check", "bans", "licenses", "sources"];
         step("licences and sources of dependencies", cargo(&deny))?;

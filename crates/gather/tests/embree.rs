@@ -1,5 +1,5 @@
-//! Hits against Embree's. `LUMENCAST_EMBREE` names its library; without it, or without the scene, the
-//! test skips and says so.
+//! Hits against Embree's. `LUMENCAST_EMBREE` names its library; without it the tests skip and say so,
+//! as does the one on Sponza without the scene. `cargo xtask test` fetches the library.
 
 use std::path::{Path, PathBuf};
 
@@ -12,19 +12,25 @@ use lumencast_testkit::embree::{Embree, Quality};
 const RAYS: u32 = 1_000_000;
 
 #[expect(clippy::print_stderr, reason = "a skipped test says so")]
-fn files() -> Option<(PathBuf, PathBuf)> {
+fn library() -> Option<PathBuf> {
+    let library = std::env::var_os("LUMENCAST_EMBREE").map(PathBuf::from);
+    if library.is_none() {
+        eprintln!("skipped: LUMENCAST_EMBREE is not set");
+    }
+    library
+}
+
+#[expect(clippy::print_stderr, reason = "a skipped test says so")]
+fn sponza() -> Option<Scene> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let scenes =
         std::env::var_os("LUMENCAST_SCENES").map_or(root.join("../shared/scenes"), PathBuf::from);
-    let scene = scenes.join("sponza/Sponza.glb");
-    let library = std::env::var_os("LUMENCAST_EMBREE").map(PathBuf::from);
-    match library {
-        Some(library) if scene.exists() => Some((scene, library)),
-        _ => {
-            eprintln!("skipped: LUMENCAST_EMBREE is not set, or {} is not here", scene.display());
-            None
-        }
+    let path = scenes.join("sponza/Sponza.glb");
+    if !path.exists() {
+        eprintln!("skipped: {} is not here", path.display());
+        return None;
     }
+    Some(Scene::load(&path).unwrap())
 }
 
 /// A number in [0, 1) (splitmix64's finaliser).
@@ -60,9 +66,19 @@ fn exactly(triangle: [Vec3; 3], ray: &TestRay) -> (f64, f64) {
 }
 
 #[test]
-fn a_million_random_rays_agree_but_for_ties() {
-    let Some((scene, library)) = files() else { return };
-    let mut scene = Scene::load(&scene).unwrap();
+fn a_million_random_rays_agree_on_sponza() {
+    let (Some(scene), Some(library)) = (sponza(), library()) else { return };
+    agree_but_for_ties(scene, &library);
+}
+
+/// Many instances, some of them deformed.
+#[test]
+fn a_million_random_rays_agree_in_the_tomb() {
+    let Some(library) = library() else { return };
+    agree_but_for_ties(Scene::open("tomb").unwrap(), &library);
+}
+
+fn agree_but_for_ties(mut scene: Scene, library: &Path) {
     let bounds = scene.bounds();
     let view = View::look_at(bounds.min, bounds.max, 1.0).unwrap();
     let bench = RayBench::new(&scene.snapshot(), view, 0, None).unwrap();
@@ -72,7 +88,7 @@ fn a_million_random_rays_agree_but_for_ties() {
     let ours = bench.trace_closest(&rays);
     let any = bench.trace_any(&rays);
     let disagreements = |triangles: &[[Vec3; 3]]| {
-        let embree = Embree::new(&library, triangles, Quality::Medium, true, 2).unwrap();
+        let embree = Embree::new(library, triangles, Quality::Medium, true, 2).unwrap();
         let mut wrong = 0;
         for ((ray, ours), any) in rays.iter().zip(&ours).zip(&any) {
             let theirs = embree.closest(ray.origin, ray.direction, ray.t_max);
