@@ -35,8 +35,13 @@ impl Light {
                 limits::LIGHT
             ));
         }
-        if !(color.cmpge(Vec3::ZERO).all() && color.max_element() <= limits::LIGHT) {
-            return Err(format!("its colour is {color}; channels are finite and not negative"));
+        let brightest = color.max_element();
+        if !(color.cmpge(Vec3::ZERO).all() && brightest.max(brightest * intensity) <= limits::LIGHT)
+        {
+            return Err(format!(
+                "its colour is {color}; channels are 0 to {:e}, also times its intensity",
+                limits::LIGHT
+            ));
         }
         if range.is_some_and(|range| !(range > 0.0 && range.is_finite())) {
             return Err("its range has to be finite and more than 0".into());

@@ -80,28 +80,27 @@ fn read_image(
 fn decode(bytes: &[u8], name: &str, accessors: Accessors<'_>) -> Result<Image, Fault> {
     let fail = |reason: String| Fault::Image { name: name.to_owned(), reason };
     let reader = || {
-        let mut reader = ImageReader::new(Cursor::new(bytes))
-            .with_guessed_format()
-            .map_err(|e| fail(e.to_string()))?;
-        let mut bounds = Limits::default();
-        bounds.max_image_width = Some(limits::IMAGE_SIDE);
-        bounds.max_image_height = Some(limits::IMAGE_SIDE);
-        // Sixteen bits a channel while decoding, and as much again for the decoder itself.
-        bounds.max_alloc = Some(16 * u64::from(limits::IMAGE_SIDE).pow(2));
-        reader.limits(bounds);
-        Ok(reader)
+        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| fail(e.to_string()))
     };
     let first = reader()?;
     if !matches!(first.format(), Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) {
         return Err(fail("PNG, JPEG and WebP are read; convert it".into()));
     }
     let (width, height) = first.into_dimensions().map_err(|e| fail(e.to_string()))?;
-    if width.max(height) > limits::IMAGE_SIDE {
-        let side = limits::IMAGE_SIDE;
-        return Err(fail(format!("{width} × {height} texels; at most {side} × {side}")));
+    let side = limits::IMAGE_SIDE;
+    if width.max(height) > side {
+        let limit = format!("{width} × {height} texels, where {side} × {side} are possible");
+        return Err(fail(format!("{limit}; scale it down")));
     }
     accessors.budget.texels(width, height)?;
-    let decoded = reader()?.decode().map_err(|e| fail(e.to_string()))?.into_rgba8();
+    let mut second = reader()?;
+    let mut bounds = Limits::default();
+    bounds.max_image_width = Some(side);
+    bounds.max_image_height = Some(side);
+    // Sixteen bits a channel while decoding, and as much again for the decoder itself.
+    bounds.max_alloc = Some(16 * u64::from(side).pow(2));
+    second.limits(bounds);
+    let decoded = second.decode().map_err(|e| fail(e.to_string()))?.into_rgba8();
     let (width, height) = decoded.dimensions();
     let texels = decoded.into_raw().as_chunks::<4>().0.to_vec();
     if width == 0 || height == 0 {

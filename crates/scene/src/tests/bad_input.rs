@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-use super::{TRIANGLE, fault, fault_of, triangle};
+use super::{TRIANGLE, fault, fault_of, load, triangle};
 use crate::builtin::writer::{Writer, container};
 use crate::{Fault, Scene};
 
@@ -38,15 +38,26 @@ fn rich() -> Vec<u8> {
 
 /// A PNG that says it has this size. It is whole when that is 2 × 2.
 fn png(width: u32, height: u32) -> Vec<u8> {
+    // Two rows of a filter byte and two grey texels.
+    stored_png(width, height, 8, &[0, 10, 20, 0, 30, 40])
+}
+
+/// A grey PNG of `depth` bits a texel whose rows are stored, not compressed.
+fn stored_png(width: u32, height: u32, depth: u8, rows: &[u8]) -> Vec<u8> {
     let mut png = b"\x89PNG\r\n\x1a\n".to_vec();
     let mut header = Vec::new();
     header.extend(width.to_be_bytes());
     header.extend(height.to_be_bytes());
-    header.extend([8, 0, 0, 0, 0]);
-    // Two rows of a filter byte and two grey texels, stored, not compressed.
-    let rows = [0u8, 10, 20, 0, 30, 40];
-    let mut data = vec![0x78, 1, 1, 6, 0, !6, !0];
-    data.extend(rows);
+    header.extend([depth, 0, 0, 0, 0]);
+    let mut data = vec![0x78, 1];
+    let mut blocks = rows.chunks(0xffff).peekable();
+    while let Some(block) = blocks.next() {
+        let length = block.len() as u16;
+        data.push(u8::from(blocks.peek().is_none()));
+        data.extend(length.to_le_bytes());
+        data.extend((!length).to_le_bytes());
+        data.extend(block);
+    }
     let (a, b) = rows.iter().fold((1u32, 0u32), |(a, b), byte| {
         let a = (a + u32::from(*byte)) % 65_521;
         (a, (b + a) % 65_521)
@@ -192,15 +203,31 @@ fn triangles_named_again_and_again_are_counted() {
 
 #[test]
 fn vertices_that_are_not_finite_are_refused_by_mesh() {
-    for bad in [f32::NAN, f32::INFINITY, 1e30] {
-        let mut w = triangle();
-        let positions = w.floats("VEC3", &[0., 0., 0., 1., bad, 0., 0., 1., 0.]);
-        let primitive = json!({ "attributes": { "POSITION": positions } });
-        w.add("meshes", json!({ "name": "bent", "primitives": [primitive] }));
-        // JSON has no NaN: the bounds have to go.
-        let fault = fault_of(without_bounds(w));
-        assert!(fault.contains("mesh 1 \"bent\"") && fault.contains("not finite"), "{fault}");
+    for attribute in ["POSITION", "NORMAL", "TEXCOORD_0", "COLOR_0"] {
+        for bad in [f32::NAN, f32::INFINITY, 1e30] {
+            let mut w = triangle();
+            let (kind, mut numbers) = match attribute {
+                "TEXCOORD_0" => ("VEC2", vec![0.5; 6]),
+                _ => ("VEC3", TRIANGLE.to_vec()),
+            };
+            numbers[4] = bad;
+            let mut attributes = json!({ "POSITION": 0 });
+            attributes[attribute] = w.floats(kind, &numbers).into();
+            let primitive = json!({ "attributes": attributes });
+            w.add("meshes", json!({ "name": "bent", "primitives": [primitive] }));
+            // JSON has no NaN: the bounds have to go.
+            let fault = fault_of(without_bounds(w));
+            let said =
+                fault.contains("mesh 1 \"bent\", primitive 0") && fault.contains("not finite");
+            assert!(said, "{attribute}: {fault}");
+        }
     }
+    let mut w = triangle();
+    let target = w.floats("VEC3", &[0., 0., 0., 1., f32::NAN, 0., 0., 1., 0.]);
+    let primitive = json!({ "attributes": { "POSITION": 0 }, "targets": [{ "POSITION": target }] });
+    w.add("meshes", json!({ "name": "bent", "primitives": [primitive] }));
+    let fault = fault_of(without_bounds(w));
+    assert!(fault.contains("\"bent\", primitive 0: morph target 0: POSITION"), "{fault}");
 }
 
 fn without_bounds(w: Writer) -> Vec<u8> {
@@ -246,29 +273,75 @@ fn trees_that_are_none_are_refused() {
 
 #[test]
 fn image_bombs_are_refused() {
-    for (width, height, reason) in
-        [(60_000, 60_000, "16384"), (60_000, 1, "16384"), (0, 2, "decoded")]
-    {
+    for (width, height, reasons) in [
+        (60_000, 60_000, &["60000 × 60000", "16384 × 16384", "scale it down"][..]),
+        (16_385, 1, &["16385 × 1 ", "scale it down"]),
+        (0, 2, &["decoded"]),
+    ] {
         let mut w = triangle();
-        let view = w.view(&png(width, height));
-        w.add("images", json!({ "name": "bomb", "bufferView": view }));
-        w.add("textures", json!({ "source": 0 }));
-        w.add("materials", json!({ "emissiveTexture": { "index": 0 } }));
+        show_image(&mut w, &png(width, height));
         let fault = fault(w);
-        let said =
-            fault.contains("\"bomb\"") && (fault.contains(reason) || fault.contains("exceed"));
-        assert!(said, "{width} × {height}: {fault}");
+        assert!(fault.contains("\"wall\""), "{fault}");
+        assert!(reasons.iter().all(|reason| fault.contains(reason)), "{fault}");
     }
     // Each within bounds, together too many.
     let mut w = triangle();
-    for k in 0..3 {
-        let view = w.view(&png(16_000, 16_000));
-        w.add("images", json!({ "bufferView": view }));
-        w.add("textures", json!({ "source": k }));
-        w.add("materials", json!({ "emissiveTexture": { "index": k } }));
+    for _ in 0..3 {
+        show_image(&mut w, &png(16_000, 16_000));
     }
     let fault = fault(w);
-    assert!(fault.contains("texels exceed the limit") || fault.contains("decoded"), "{fault}");
+    assert!(fault.contains("exceed the limit") || fault.contains("decoded"), "{fault}");
+}
+
+/// A material that shows an image named "wall".
+fn show_image(w: &mut Writer, png: &[u8]) {
+    let view = w.view(png);
+    let image = w.add("images", json!({ "name": "wall", "bufferView": view }));
+    let texture = w.add("textures", json!({ "source": image }));
+    w.add("materials", json!({ "emissiveTexture": { "index": texture } }));
+}
+
+#[test]
+fn the_smallest_and_the_largest_image_load() {
+    for side in [1u32, 16_384] {
+        // One bit a texel, all white but the last.
+        let row = [&[0][..], &vec![0xff; side.div_ceil(8) as usize]].concat();
+        let mut rows = row.repeat(side as usize);
+        *rows.last_mut().expect("a row") = 0xfe << ((8 - side % 8) % 8);
+        let mut w = triangle();
+        show_image(&mut w, &stored_png(side, side, 1, &rows));
+        let scene = load(w);
+        let texture = scene.materials()[0].emissive_texture.as_ref().expect("a texture");
+        let image = &texture.image;
+        assert_eq!((image.width, image.height), (side, side));
+        assert_eq!(image.texels.len(), side as usize * side as usize);
+        assert_eq!(image.texels.last(), Some(&[0, 0, 0, 255]));
+        assert!(side == 1 || image.texels[0] == [255; 4]);
+    }
+}
+
+/// A million nodes that show one mesh: as many as a scene may have, and one more.
+#[test]
+fn a_million_nodes() {
+    const MILLION: usize = 1_000_000;
+    let file = |count: usize| {
+        let glb = triangle().finish(Value::Null);
+        let json_length = u32::from_le_bytes([glb[12], glb[13], glb[14], glb[15]]) as usize;
+        let mut json: Value = serde_json::from_slice(&glb[20..20 + json_length]).expect("JSON");
+        let nodes: Vec<_> =
+            (0..count).map(|i| format!(r#"{{"mesh":0,"translation":[{i},0,0]}}"#)).collect();
+        json["nodes"] = "NODES".into();
+        json["scenes"][0]["nodes"] = (0..count).collect::<Vec<_>>().into();
+        let text = json.to_string().replace("\"NODES\"", &format!("[{}]", nodes.join(",")));
+        container(&text, &glb[20 + json_length + 8..])
+    };
+    let mut scene = Scene::from_glb("test", file(MILLION)).expect("within the limits");
+    let snapshot = scene.snapshot();
+    assert_eq!(snapshot.instances.len(), MILLION);
+    let mesh = &snapshot.instances[0].mesh;
+    assert!(snapshot.instances.iter().all(|i| std::sync::Arc::ptr_eq(&i.mesh, mesh)));
+    let fault = fault_of(file(MILLION + 1));
+    assert!(fault.contains("nodes exceed the limit of 1000000"), "{fault}");
 }
 
 #[test]
@@ -334,6 +407,10 @@ fn lights_and_cameras_out_of_range_are_refused() {
     for (light, reason) in [
         (json!({ "type": "point", "intensity": -1.0 }), "light 0: its intensity"),
         (json!({ "type": "point", "color": [0.0, -1.0, 0.0] }), "light 0: its colour"),
+        (
+            json!({ "type": "point", "color": [0.0, 1e7, 0.0], "intensity": 1e7 }),
+            "light 0: its colour",
+        ),
         (json!({ "type": "spot", "spot": { "outerConeAngle": 3.0 } }), "light 0: its cones"),
         (json!({ "type": "area" }), "light 0: unknown type"),
     ] {
