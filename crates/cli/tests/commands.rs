@@ -96,6 +96,22 @@ fn bad_scenes_are_refused_by_name() {
 }
 
 #[test]
+fn vertices_that_are_no_numbers_are_refused_by_mesh() {
+    let folder = Folder::new("no-numbers");
+    let path = folder.triangles("bent", &[[0.0; 3], [1.0, f32::NAN, 0.0], [0.0, 1.0, 0.0]], 1.0);
+    let picture = folder.0.join("never.png");
+    for arguments in [
+        &["inspect", &path][..],
+        &["probe", &path, "--at", "0,0,0"],
+        &["render", &path, "-o", picture.to_str().expect("text")],
+        &["serve", &path, "--listen", "127.0.0.1:0"],
+    ] {
+        run(arguments).failed_saying(&["bent.gltf", "mesh 0 \"odd\"", "POSITION", "not finite"]);
+    }
+    assert!(!picture.exists());
+}
+
+#[test]
 fn an_address_for_all_needs_a_word_on_who_may_edit() {
     run(&["serve", "cornell", "--listen", "0.0.0.0:0"]).failed_saying(&["--token-key", "--open"]);
 }

@@ -17,6 +17,33 @@ fn text(path: &Path) -> &str {
     path.to_str().expect("text")
 }
 
+/// Triangles without area, doubled, a thousand kilometres long and too thin for f32, all shining.
+#[test]
+fn odd_triangles_are_drawn_and_gathered_in_numbers() {
+    let folder = Folder::new("render-odd");
+    let mut corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].repeat(2);
+    corners.extend([[1.0; 3]; 3]);
+    corners.extend([[-5e5, -1.0, 5e5], [5e5, -1.0, 5e5], [0.0, -1.0, -5e5]]);
+    corners.extend([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 1e-30, 0.0]]);
+    for (name, emission) in [("dim", 0.5), ("bright", 1e12)] {
+        let scene = folder.triangles(name, &corners, emission);
+        let exr = folder.0.join(format!("{name}.exr"));
+        let mut arguments = vec!["render", &scene, "--size", "48x32", "--spp", "4"];
+        arguments.extend(["--camera", "0,1,2,0,0,0", "-o", text(&exr)]);
+        let ran = run(&arguments);
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        let picture = linear(&exr);
+        let pixels = picture.pixels();
+        assert!(pixels.iter().all(|v| v.is_finite() && v.min_element() >= 0.0), "{name}");
+        assert!(pixels.iter().any(|v| v.max_element() >= 0.9 * emission), "{name}: the lamp shows");
+
+        let ran = run(&["probe", &scene, "--at", "0,0,0", "--at", "0.2,0.2,0.5", "--json"]);
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        // JSON has no NaN: it would be null.
+        assert!(!ran.stdout.contains("null"), "{ran:?}");
+    }
+}
+
 #[test]
 fn parts_of_a_picture_add_up() {
     let folder = Folder::new("render-parts");

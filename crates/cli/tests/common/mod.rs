@@ -244,6 +244,40 @@ impl Folder {
         std::fs::write(&path, contents).expect("a temporary file");
         path.to_str().expect("a path of text").to_owned()
     }
+
+    /// Writes NAME.gltf with its buffer beside it: a mesh named "odd" of these triangles, two-sided,
+    /// that reflects half of the light and emits as much as it is asked to, under a sun.
+    pub fn triangles(&self, name: &str, corners: &[[f32; 3]], emission: f32) -> String {
+        let bytes: Vec<u8> = corners.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+        self.file(&format!("{name}.bin"), &bytes);
+        let scene = serde_json::json!({
+            "asset": { "version": "2.0" },
+            "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_emissive_strength"],
+            "extensions": { "KHR_lights_punctual": { "lights": [{ "type": "directional" }] } },
+            "buffers": [{ "uri": format!("{name}.bin"), "byteLength": bytes.len() }],
+            "bufferViews": [{ "buffer": 0, "byteLength": bytes.len() }],
+            "accessors": [{
+                "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": corners.len(),
+            }],
+            "materials": [{
+                "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.5, 0.5, 1.0] },
+                "emissiveFactor": [1.0, 1.0, 1.0],
+                "doubleSided": true,
+                "extensions": {
+                    "KHR_materials_emissive_strength": { "emissiveStrength": emission },
+                },
+            }],
+            "meshes": [{
+                "name": "odd", "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }],
+            }],
+            "nodes": [
+                { "mesh": 0 },
+                { "extensions": { "KHR_lights_punctual": { "light": 0 } } },
+            ],
+            "scenes": [{ "nodes": [0, 1] }],
+        });
+        self.file(&format!("{name}.gltf"), scene.to_string().as_bytes())
+    }
 }
 
 impl Drop for Folder {
