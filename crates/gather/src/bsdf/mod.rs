@@ -5,7 +5,8 @@
 //! - *diffuse*: Lambert times (1 − F(n·v))(1 − F(n·l))/(1 − F̄), where F̄ is the mean of F over the
 //!   hemisphere (Ashikhmin and Shirley 2000, section 2.2). glTF's own sample code mixes by
 //!   1 − F(v·h), which at grazing angles reflects up to 1.6 times what arrives; with this factor a
-//!   smooth white surface reflects exactly what arrives, and the model stays reciprocal.
+//!   smooth white surface reflects exactly what arrives, a rough one at most 0.2 % more, and the
+//!   model stays reciprocal.
 //! - *specular*: GGX with height-correlated Smith shadowing, F after Schlick.
 //! - *transmission*: thin-walled, so light goes on without bending; roughness blurs it: the
 //!   specular lobe mirrored through the surface, times base colour and 1 − F.
