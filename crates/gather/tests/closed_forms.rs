@@ -2,12 +2,15 @@
 //! might write who forgot a cosine, and has to refuse it.
 
 use std::f32::consts::PI;
+use std::path::Path;
 use std::sync::Arc;
 
-use glam::Vec3;
-use lumencast_gather::reference::{ProbeEstimate, ProbeSettings, probe_sh};
+use glam::{UVec2, Vec3};
+use lumencast_gather::reference::{
+    Film, PictureSettings, ProbeEstimate, ProbeSettings, Renderer, View, probe_sh,
+};
 use lumencast_light::{Order, sh};
-use lumencast_scene::{AlphaMode, Environment, Light, LightKind, Material, Snapshot};
+use lumencast_scene::{AlphaMode, Environment, Light, LightKind, Material, Projection, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 const BLACK: Vec3 = Vec3::ZERO;
@@ -102,6 +105,21 @@ fn furnace() {
     }
 }
 
+/// The same room after very many bounces: L/(1 − ρ).
+#[test]
+fn closed_room_after_many_bounces() {
+    let (albedo, emission) = (Vec3::new(0.5, 0.8, 0.2), Vec3::new(1.0, 2.0, 3.0));
+    let mut stage = Stage::default();
+    let wall = stage.material(lambert(albedo, emission));
+    stage.room(Vec3::ZERO, Vec3::new(2.0, 3.0, 4.0), wall);
+    let settings =
+        ProbeSettings { bounces: 64, samples: 256, lattices: 16, ..ProbeSettings::default() };
+    let at = Vec3::new(0.3, -0.4, 0.5);
+    let e = probe_sh(&stage.snapshot(), &[at], &settings).unwrap().remove(0);
+    let all = emission / (1.0 - albedo);
+    check(&e, &uniform(all), &uniform(1.005 * all), 1e-4);
+}
+
 /// Integrating sphere with a lamp in its centre: every wall has ρI/πR², then ρ times that, …
 #[test]
 fn white_sphere_with_a_lamp() {
@@ -167,6 +185,31 @@ fn sun_on_a_plane() {
         let e = probe(&stage.snapshot(), Vec3::new(0.0, 1.0, 0.0), 1);
         check(&e, &zonal(Vec3::NEG_Y, moments(cos)), &zonal(Vec3::NEG_Y, moments(1.0)), 2e-3);
     }
+}
+
+/// Sun and sky: the upper half shows the sky, the lower a plane that both light.
+#[test]
+fn sun_and_sky_on_a_plane() {
+    let (albedo, sky, illuminance) = (Vec3::new(0.9, 0.5, 0.1), Vec3::new(1.0, 2.0, 4.0), 30.0);
+    let mut stage = Stage::default();
+    let floor = stage.material(lambert(albedo, BLACK));
+    stage.quad(Vec3::new(-1e4, 0.0, 1e4), Vec3::X * 2e4, Vec3::NEG_Z * 2e4, floor);
+    let sun = Light {
+        kind: LightKind::Directional,
+        color: Vec3::ONE,
+        intensity: illuminance,
+        range: None,
+    };
+    stage.light(sun, Vec3::ZERO, Vec3::new(1.0, -1.0, 0.5));
+    stage.environment(Environment::Constant { radiance: sky });
+    let cos = 1.0 / (1.0f32 + 1.0 + 0.25).sqrt();
+    let of = |from_sky: f32| {
+        let floor = albedo * (illuminance * cos / PI + from_sky * sky);
+        zonal(Vec3::Y, [2.0 * PI * Y0 * (sky + floor), PI * Y1 * (sky - floor), BLACK])
+    };
+    let e = probe(&stage.snapshot(), Vec3::new(0.0, 1.0, 0.0), 1);
+    // A hemisphere of radiance L gives πL, not 2πL.
+    check(&e, &of(1.0), &of(2.0), 2e-3);
 }
 
 /// A rectangle of light: c₀ = Y₀₀ L Ω; from behind it is dark unless both sides shine.
@@ -266,4 +309,56 @@ fn white_ball_in_a_white_sky() {
 fn nothing_gives_nothing() {
     let scene = Stage::default().snapshot();
     assert_eq!(probe(&scene, Vec3::ZERO, 3).sh, vec![BLACK; 9]);
+}
+
+#[derive(serde::Deserialize)]
+struct AlbedoTable {
+    roughness: Vec<f32>,
+    cos: Vec<f32>,
+    by_f0: Vec<Vec<f32>>,
+    by_f90: Vec<Vec<f32>>,
+}
+
+/// A floor in a sky of radiance 1 shows its directional albedo: 1 for Lambert and for smooth
+/// surfaces, and for rough metal that of single-scatter GGX (`vectors/ggx_albedo.json`).
+#[test]
+fn floors_in_a_furnace() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vectors/ggx_albedo.json");
+    let table: AlbedoTable = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let gltf = |metallic, roughness| Material { metallic, roughness, ..Material::default() };
+    let mut floors = vec![
+        (lambert(Vec3::ONE, BLACK), 0.6, 1.0),
+        (gltf(1.0, 0.0), 0.6, 1.0),
+        (gltf(0.0, 0.0), 0.3, 1.0),
+        (Material { transmission: 1.0, ..gltf(0.0, 0.0) }, 0.3, 1.0),
+    ];
+    for (i, &roughness) in table.roughness.iter().enumerate() {
+        for (j, &cos) in table.cos.iter().enumerate().filter(|(_, cos)| **cos < 1.0) {
+            floors.push((gltf(1.0, roughness), cos, table.by_f0[i][j] + table.by_f90[i][j]));
+        }
+    }
+    let settings = PictureSettings { size: UVec2::splat(16), bounces: 1, ..Default::default() };
+    for (material, cos, expected) in floors {
+        let name = format!("metallic {}, roughness {}", material.metallic, material.roughness);
+        let mut stage = Stage::default();
+        let floor = stage.material(material);
+        stage.quad(Vec3::new(-1e3, 0.0, 1e3), Vec3::X * 2e3, Vec3::NEG_Z * 2e3, floor);
+        stage.environment(Environment::Constant { radiance: Vec3::ONE });
+        let away = Vec3::new((1.0 - cos * cos).sqrt(), cos, 0.0);
+        let mut view = View::look_at(10.0 * away, Vec3::ZERO, 1.0).unwrap();
+        view.projection =
+            Projection::Orthographic { half_width: 0.1, half_height: 0.1, near: 0.0, far: 20.0 };
+        let renderer = Renderer::new(&stage.snapshot(), view, settings).unwrap();
+        let mut film = Film::new(settings.size);
+        while film.samples() < 64 {
+            renderer.pass(&mut film, 64, &|_| true).unwrap();
+        }
+        let pixels = film.picture();
+        let n = pixels.len() as f32;
+        let mean = pixels.iter().map(|v| v.x).sum::<f32>() / n;
+        let variance = pixels.iter().map(|v| (v.x - mean).powi(2)).sum::<f32>() / (n - 1.0);
+        let tolerance = 5.0 * (variance / n).sqrt() + 1e-3 * expected;
+        assert!((mean - expected).abs() < tolerance, "{name}, {cos}: {mean}, {expected}");
+        assert!(tolerance < 0.03 * expected, "{name}, {cos}: too coarse a check: ± {tolerance}");
+    }
 }
