@@ -28,7 +28,12 @@ fn room(lamp: Vec3) -> Arc<Snapshot> {
     stage.room(Vec3::Y, Vec3::splat(2.0), white);
     stage.room(Vec3::new(-0.4, 0.6, -0.3), Vec3::new(-0.6, 1.2, 0.6), red);
     stage.quad(Vec3::new(-0.3, 1.99, -0.3), 0.6 * Vec3::X, 0.6 * Vec3::Z, glow);
-    let light = Light { kind: LightKind::Point, color: Vec3::ONE, intensity: 1.0, range: None };
+    let light = Light {
+        kind: LightKind::Point { radius: 0.0 },
+        color: Vec3::ONE,
+        intensity: 1.0,
+        range: None,
+    };
     stage.light(light, lamp, Vec3::NEG_Y);
     stage.snapshot()
 }

@@ -6,6 +6,7 @@ use glam::{Vec2, Vec3};
 use lumencast_scene::{AlphaMode, Instance, Material, Snapshot};
 
 use crate::accel::{Accel, AccelCache, Hit, Kernel, Ray, Stack};
+use crate::bsdf::Scatter;
 use crate::lights::environment::{Sky, SkyCache};
 use crate::lights::punctual::Punctual;
 use crate::lights::{AreaSample, Lights, emitters};
@@ -117,8 +118,8 @@ impl World {
 
     /// Direction (unit) and distance of a source of light, were nothing in between.
     pub(crate) fn aim(&self, from: Vec3, choice: f32, u: Vec2) -> Option<(Vec3, f32)> {
-        let facing = |_: Vec3| Vec3::ONE;
-        if let Some((incident, _)) = self.lights.punctual.choose(from, choice, facing) {
+        let facing = |_: Vec3| Scatter { value: Vec3::ONE, pdf: 0.0 };
+        if let Some((incident, _)) = self.lights.punctual.choose(from, choice, || u, facing) {
             return Some((incident.direction, incident.distance));
         }
         match self.lights.sample_area(from, choice, u)? {

@@ -108,11 +108,16 @@ fn without_area() -> Vec<[Vec3; 3]> {
 }
 
 fn point_light(intensity: f32) -> Light {
-    Light { kind: LightKind::Point, color: Vec3::ONE, intensity, range: None }
+    Light { kind: LightKind::Point { radius: 0.0 }, color: Vec3::ONE, intensity, range: None }
 }
 
 fn sun(illuminance: f32) -> Light {
-    Light { kind: LightKind::Directional, color: Vec3::ONE, intensity: illuminance, range: None }
+    Light {
+        kind: LightKind::Directional { angle: 0.0 },
+        color: Vec3::ONE,
+        intensity: illuminance,
+        range: None,
+    }
 }
 
 /// A room of two metres with a lamp and a point light.
@@ -372,7 +377,7 @@ fn lights_and_materials_at_their_limits() {
         stage.quad(Vec3::new(-0.3, 1.0 - 1e-6, -0.3), 0.6 * Vec3::X, 0.6 * Vec3::Z, lamp);
         stage.light(sun(MOST), Vec3::ZERO, Vec3::NEG_ONE);
         stage.light(point_light(MOST), Vec3::new(0.5, -1.0 + 1e-5, -0.5), Vec3::X);
-        let spot = LightKind::Spot { inner: 0.0, outer: 1e-3 };
+        let spot = LightKind::Spot { inner: 0.0, outer: 1e-3, radius: 0.0 };
         let spot = Light { kind: spot, ..point_light(MOST) };
         stage.light(spot, Vec3::new(0.5, 0.4, -0.5), Vec3::NEG_Y);
         let name = format!("metallic {metallic}, roughness {roughness}, index {ior}");

@@ -63,7 +63,7 @@ fn zonal(axis: Vec3, moments: [Vec3; 3]) -> Vec<Vec3> {
 }
 
 fn point_light(intensity: f32) -> Light {
-    Light { kind: LightKind::Point, color: Vec3::ONE, intensity, range: None }
+    Light { kind: LightKind::Point { radius: 0.0 }, color: Vec3::ONE, intensity, range: None }
 }
 
 #[test]
@@ -141,17 +141,24 @@ fn white_sphere_with_a_lamp() {
     assert_eq!(none.sh[0], BLACK, "a punctual light is not seen itself");
 }
 
-/// A lamp over a plane, seen from the lamp's place: L(θ) = ρI cos³θ/πh².
+/// A lamp over a plane, seen from the lamp's place: L(θ) = ρI cos³θ/πh². A sphere that is wholly
+/// above the plane lights it as its centre would.
 #[test]
 fn point_light_over_a_plane() {
-    let (albedo, intensity, height) = (0.6, 50.0, 0.7);
+    for radius in [0.0, 0.6] {
+        lamp_over_a_plane(Light { kind: LightKind::Point { radius }, ..point_light(50.0) });
+    }
+}
+
+fn lamp_over_a_plane(lamp: Light) {
+    let (albedo, height) = (0.6, 0.7);
     let mut stage = Stage::default();
     let floor = stage.material(lambert(Vec3::splat(albedo), BLACK));
     let side = 4000.0;
     stage.quad(Vec3::new(-side, 0.0, side) * 0.5, Vec3::X * side, Vec3::NEG_Z * side, floor);
     let at = Vec3::new(3.0, height, -2.0);
-    stage.light(point_light(intensity), at, Vec3::X);
-    let peak = albedo * intensity / (PI * height * height);
+    stage.light(lamp, at, Vec3::X);
+    let peak = albedo * lamp.intensity / (PI * height * height);
     // ∫ cosᵏθ cosⁿθ dω = 2π/(n + k + 1) over the hemisphere.
     let moments = |n: f32| {
         let m = |k: f32| 2.0 * PI / (n + k + 1.0);
@@ -171,7 +178,7 @@ fn sun_on_a_plane() {
         let floor = stage.material(lambert(albedo, BLACK));
         stage.quad(Vec3::new(-1e4, 0.0, 1e4), Vec3::X * 2e4, Vec3::NEG_Z * 2e4, floor);
         let sun = Light {
-            kind: LightKind::Directional,
+            kind: LightKind::Directional { angle: 0.0 },
             color: Vec3::ONE,
             intensity: illuminance,
             range: None,
@@ -195,7 +202,7 @@ fn sun_and_sky_on_a_plane() {
     let floor = stage.material(lambert(albedo, BLACK));
     stage.quad(Vec3::new(-1e4, 0.0, 1e4), Vec3::X * 2e4, Vec3::NEG_Z * 2e4, floor);
     let sun = Light {
-        kind: LightKind::Directional,
+        kind: LightKind::Directional { angle: 0.0 },
         color: Vec3::ONE,
         intensity: illuminance,
         range: None,

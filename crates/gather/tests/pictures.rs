@@ -74,8 +74,12 @@ fn sun_on_a_floor() {
     let mut stage = Stage::default();
     let material = stage.material(lambert(Vec3::new(0.2, 0.5, 0.8), Vec3::ZERO));
     stage.quad(Vec3::new(-9.0, 0.0, 9.0), Vec3::X * 18.0, Vec3::NEG_Z * 18.0, material);
-    let sun =
-        Light { kind: LightKind::Directional, color: Vec3::ONE, intensity: 1000.0, range: None };
+    let sun = Light {
+        kind: LightKind::Directional { angle: 0.0 },
+        color: Vec3::ONE,
+        intensity: 1000.0,
+        range: None,
+    };
     stage.light(sun, Vec3::ZERO, Vec3::new(0.0, -1.0, -1.0).normalize());
     let view = View::look_at(Vec3::new(0.0, 3.0, 1.0), Vec3::ZERO, 0.8).unwrap();
     let expected = Vec3::new(0.2, 0.5, 0.8) * 1000.0 * 0.5f32.sqrt() / std::f32::consts::PI;

@@ -132,6 +132,12 @@ pub struct LightSpec {
     /// Spot lights only: half-angle where the light ends, radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outer: Option<f32>,
+    /// Point and spot lights only: of the sphere that shines, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f32>,
+    /// Directional lights only: angle that the shining disc spans, radians.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle: Option<f32>,
 }
 
 /// Factors of a material; see [`crate::Material`] for units and ranges.

@@ -1,6 +1,6 @@
 //! Punctual lights.
 
-use std::f32::consts::FRAC_PI_2;
+use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -8,6 +8,10 @@ use serde::{Deserialize, Serialize};
 use crate::{NodeId, limits};
 
 /// A punctual light as in KHR_lights_punctual. It shines along its node's −Z.
+///
+/// It may have a size, which glTF does not know and reads from the light's `extras.lumencast`.
+/// Intensity means the same whatever the size: what a surface receives that faces the light's
+/// middle and sees all of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Light {
     /// Point, spot or directional.
@@ -46,14 +50,24 @@ impl Light {
         if range.is_some_and(|range| !(range > 0.0 && range.is_finite())) {
             return Err("its range has to be finite and more than 0".into());
         }
-        if let LightKind::Spot { inner, outer } = kind
+        if let LightKind::Spot { inner, outer, .. } = kind
             && !(inner >= 0.0 && inner < outer && outer <= FRAC_PI_2 + 1e-6)
         {
             return Err(format!(
                 "its cones are {inner} and {outer}; 0 ≤ inner < outer ≤ π/2 is needed"
             ));
         }
-        Ok(())
+        match kind {
+            LightKind::Point { radius } | LightKind::Spot { radius, .. }
+                if !(0.0..=limits::EXTENT).contains(&radius) =>
+            {
+                Err(format!("its radius is {radius}; 0 to {:e} m is possible", limits::EXTENT))
+            }
+            LightKind::Directional { angle } if !(0.0..=PI).contains(&angle) => {
+                Err(format!("its angle is {angle}; 0 to π is possible"))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -65,21 +79,65 @@ fn one() -> f32 {
     1.0
 }
 
+/// By reference, as serde asks.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_zero(size: &f32) -> bool {
+    *size == 0.0
+}
+
 /// The kind of a punctual light.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum LightKind {
     /// Shines alike in every direction.
-    Point,
+    Point {
+        /// Of the sphere that shines, metres; 0 for a point.
+        #[serde(default, skip_serializing_if = "is_zero")]
+        radius: f32,
+    },
     /// Shines in a cone; falloff between the half-angles (radians) as in KHR_lights_punctual.
     Spot {
         /// Half-angle where falloff begins, 0 ≤ inner < outer.
         inner: f32,
         /// Half-angle where the light ends, at most π/2.
         outer: f32,
+        /// Of the sphere that shines, metres; 0 for a point. Falloff is by the direction from the
+        /// sphere's centre.
+        #[serde(default, skip_serializing_if = "is_zero")]
+        radius: f32,
     },
-    /// Parallel light from infinitely far.
-    Directional,
+    /// Light from infinitely far.
+    Directional {
+        /// Angle that the shining disc spans, radians: 0.0093 for the sun, at most π; 0 for
+        /// parallel light.
+        #[serde(default, skip_serializing_if = "is_zero")]
+        angle: f32,
+    },
+}
+
+impl LightKind {
+    /// Sets those sizes that are given; the reason where the kind has no such size.
+    pub(crate) fn resize(
+        &mut self,
+        new_radius: Option<f32>,
+        new_angle: Option<f32>,
+    ) -> Result<(), &'static str> {
+        match self {
+            Self::Point { radius } | Self::Spot { radius, .. } => {
+                if new_angle.is_some() {
+                    return Err("only directional lights have an angle");
+                }
+                *radius = new_radius.unwrap_or(*radius);
+            }
+            Self::Directional { angle } => {
+                if new_radius.is_some() {
+                    return Err("only point and spot lights have a radius");
+                }
+                *angle = new_angle.unwrap_or(*angle);
+            }
+        }
+        Ok(())
+    }
 }
 
 /// A light at its place in the world.

@@ -21,15 +21,25 @@ export interface Transform {
 
 /** A punctual light as in KHR_lights_punctual. It shines along its node's −Z. */
 export type Light = (
-  | { type: 'point' }
+  | {
+      type: 'point';
+      /** Of the sphere that shines, metres; a point when absent. */
+      radius?: number;
+    }
   | {
       type: 'spot';
       /** Half-angle where falloff begins, radians, 0 ≤ inner < outer. */
       inner: number;
       /** Half-angle where the light ends, radians, at most π/2. */
       outer: number;
+      /** Of the sphere that shines, metres; a point when absent. */
+      radius?: number;
     }
-  | { type: 'directional' }
+  | {
+      type: 'directional';
+      /** Angle that the shining disc spans, radians, at most π; parallel light when absent. */
+      angle?: number;
+    }
 ) & {
   /** Linear colour, each channel ≥ 0; white when absent. */
   color?: Vec3;
@@ -48,6 +58,10 @@ export interface LightSpec {
   inner?: number;
   /** Spot lights only. */
   outer?: number;
+  /** Point and spot lights only. */
+  radius?: number;
+  /** Directional lights only. */
+  angle?: number;
 }
 
 /** Factors of a material. */

@@ -39,7 +39,10 @@ export function describeLight(light: PunctualLight): LightData {
   return { type: light instanceof PointLight ? 'point' : 'directional', ...spec };
 }
 
-/** All parts of a light that glTF knows; `range` is left out where it is infinite. */
+/** What lights of three.js lack. GLTFLoader keeps a light's extras in its `userData`, as is done here. */
+type Size = Pick<LightSpec, 'radius' | 'angle'>;
+
+/** All parts of a light that the server knows; what is infinite, or a size not given, is left out. */
 export function lightSpec(light: PunctualLight): LightSpec {
   const spec: LightSpec = {
     color: light.color.toArray() as [number, number, number],
@@ -50,6 +53,10 @@ export function lightSpec(light: PunctualLight): LightSpec {
     spec.inner = light.angle * (1 - light.penumbra);
     spec.outer = light.angle;
   }
+  const { radius, angle } = (light.userData.lumencast ?? {}) as Size;
+  if (light instanceof DirectionalLight) {
+    if (angle !== undefined) spec.angle = angle;
+  } else if (radius !== undefined) spec.radius = radius;
   return spec;
 }
 
@@ -64,6 +71,10 @@ export function setLight(light: PunctualLight, spec: LightSpec): void {
     light.angle = outer;
     light.penumbra = outer > 0 ? 1 - Math.min(inner / outer, 1) : 0;
   }
+  const extras = light.userData.lumencast as Size | undefined;
+  if (light instanceof DirectionalLight) {
+    if (spec.angle !== undefined) light.userData.lumencast = { ...extras, angle: spec.angle };
+  } else if (spec.radius !== undefined) light.userData.lumencast = { ...extras, radius: spec.radius };
 }
 
 /** Sets a colour from linear values. */

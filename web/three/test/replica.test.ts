@@ -11,6 +11,7 @@ import {
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { beforeEach, describe, expect, it } from 'vitest';
 import { timeAt, wrap } from '../src/animations.js';
+import { lightSpec } from '../src/lights.js';
 import { Replica } from '../src/replica.js';
 
 /** A file with a mesh (node 0) that carries a lamp (node 1), and an animation of the mesh's height. */
@@ -109,6 +110,19 @@ describe('Replica', () => {
 
     replica.applySnapshot([add]);
     expect(replica.content.light(2)!.intensity).toBe(9);
+  });
+
+  it('keeps the sizes of lights, which three.js does not know', () => {
+    const { gltf, lamp } = file();
+    lamp.userData.lumencast = { radius: 0.5 };
+    const replica = replicaOf(gltf);
+    expect(lightSpec(lamp).radius).toBe(0.5);
+    replica.applyAccepted({ edit: 'set_light', node: 1, radius: 0.25 }, false);
+    expect(lightSpec(lamp).radius).toBe(0.25);
+    const sun: Edit = { edit: 'add_light', node: 2, light: { type: 'directional', angle: 0.01 } };
+    replica.applyAccepted(sun, false);
+    expect(lightSpec(replica.content.light(2)!)).toMatchObject({ angle: 0.01 });
+    expect(lightSpec(new PointLight())).not.toHaveProperty('radius');
   });
 
   it('undoes an own edit that is refused', async () => {

@@ -1,8 +1,9 @@
 //! Sources of light, and where on them to look for it (next-event estimation).
 //!
 //! Every vertex of a path asks two sources: one punctual light ([`punctual`]), and one point of an
-//! emissive triangle ([`emitters`]) or of an environment picture ([`environment`]). The latter two
-//! are also met by rays that the BSDF chose, and weighed against that by the power heuristic.
+//! emissive triangle ([`emitters`]) or of an environment picture ([`environment`]). The latter two,
+//! and punctual lights with a size, are also met by rays that the BSDF chose, and weighed against
+//! that by the power heuristic.
 //! Constant and gradient environments are left to those rays, which suit them as well.
 
 pub(crate) mod emitters;
@@ -35,9 +36,11 @@ pub(crate) enum AreaSample {
 }
 
 impl Lights {
-    /// Whether no ray can meet a source: nothing emits, and the environment is black.
-    pub(crate) fn are_punctual(&self) -> bool {
+    /// Whether no ray can meet a source: nothing emits, the environment is black, and punctual lights
+    /// are points.
+    pub(crate) fn are_points(&self) -> bool {
         self.emitters.is_empty()
+            && !self.punctual.have_size()
             && matches!(self.sky, Sky::Constant(radiance) if radiance == Vec3::ZERO)
     }
 

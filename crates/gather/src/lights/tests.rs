@@ -6,6 +6,7 @@ use lumencast_scene::{Environment, HdrImage, Light, LightKind, NodeId, PlacedLig
 
 use super::environment::{Sky, SkyCache};
 use super::punctual::{Punctual, incident};
+use crate::bsdf::{Bsdf, Scatter, Substance};
 use crate::sampling::{Sampler, sphere};
 
 fn placed(light: Light, position: Vec3, direction: Vec3) -> PlacedLight {
@@ -13,7 +14,7 @@ fn placed(light: Light, position: Vec3, direction: Vec3) -> PlacedLight {
 }
 
 fn point(intensity: f32, range: Option<f32>) -> Light {
-    Light { kind: LightKind::Point, color: Vec3::ONE, intensity, range }
+    Light { kind: LightKind::Point { radius: 0.0 }, color: Vec3::ONE, intensity, range }
 }
 
 #[test]
@@ -32,7 +33,7 @@ fn inverse_square_and_range_window() {
 #[test]
 fn spot_falls_off_as_khr_lights_punctual_says() {
     let (inner, outer) = (0.2f32, 0.5f32);
-    let spot = Light { kind: LightKind::Spot { inner, outer }, ..point(1.0, None) };
+    let spot = Light { kind: LightKind::Spot { inner, outer, radius: 0.0 }, ..point(1.0, None) };
     let spot = placed(spot, Vec3::ZERO, Vec3::NEG_Z);
     let at = |angle: f32| {
         incident(&spot, Vec3::new(angle.sin(), 0.0, -angle.cos())).map_or(0.0, |i| i.irradiance.x)
@@ -53,9 +54,9 @@ fn choosing_among_lights_is_unbiased() {
                 let mut s = Sampler::new(3, 0, i);
                 let position = 2.0 * sphere(s.square()) + Vec3::Y;
                 let kind = match i % 3 {
-                    0 => LightKind::Point,
-                    1 => LightKind::Spot { inner: 0.0, outer: 1.5 },
-                    _ => LightKind::Directional,
+                    0 => LightKind::Point { radius: 0.0 },
+                    1 => LightKind::Spot { inner: 0.0, outer: 1.5, radius: 0.0 },
+                    _ => LightKind::Directional { angle: 0.0 },
                 };
                 let color = Vec3::new(1.0, s.number(), s.number());
                 let light = Light { kind, color, intensity: 1.0 + 5.0 * s.number(), range: None };
@@ -64,6 +65,7 @@ fn choosing_among_lights_is_unbiased() {
             .collect();
         let at = Vec3::new(0.1, -0.2, 0.3);
         let reflected = |l: Vec3| Vec3::splat(l.y.max(0.0));
+        let scatter = |l: Vec3| Scatter { value: reflected(l), pdf: 0.0 };
         let expected: Vec3 = lights
             .iter()
             .filter_map(|l| incident(l, at))
@@ -73,8 +75,11 @@ fn choosing_among_lights_is_unbiased() {
         let n = 1 << 14;
         let (mut mean, mut squares) = (Vec3::ZERO, Vec3::ZERO);
         for i in 0..n {
-            let u = Sampler::new(9, 1, i).number();
-            let light = punctual.choose(at, u, reflected).map_or(Vec3::ZERO, |(_, light)| light);
+            let mut s = Sampler::new(9, 1, i);
+            let choice = s.number();
+            let light = punctual
+                .choose(at, choice, || s.square(), scatter)
+                .map_or(Vec3::ZERO, |(_, light)| light);
             mean += light / n as f32;
             squares += light * light / n as f32;
         }
@@ -139,4 +144,108 @@ fn picture_samples_estimate_its_integral() {
     // where uniform directions vary by about twenty times.
     let spread = (chosen[1] / chosen[0].powi(2) - 1.0).sqrt();
     assert!(spread < 1.0, "{spread}");
+}
+
+/// From a tenth of a second of arc to the whole half space.
+#[test]
+fn discs_keep_their_digits() {
+    for half in [5e-7f32, 1e-4, 4.64e-3, 0.1, 1.0, PI / 2.0] {
+        let kind = LightKind::Directional { angle: 2.0 * half };
+        let sun =
+            placed(Light { kind, ..point(1.0, None) }, Vec3::ZERO, Vec3::new(-3.0, -2.0, 1.0));
+        let disc = incident(&sun, Vec3::ZERO).unwrap();
+        let (mut inner, mut met, mut mean) = (0, 0, Vec3::ZERO);
+        let n = 4096;
+        for i in 0..n {
+            let toward = disc.toward(Sampler::new(1, 0, i).square());
+            // Of the solid angle, half is within the cone of half its height.
+            let off = disc.direction.cross(toward.direction).length();
+            let height = disc.height();
+            inner += u32::from(off * off < 0.5 * height * (2.0 - 0.5 * height));
+            met += u32::from(disc.met(toward.direction) == Some(f32::INFINITY));
+            mean += toward.irradiance * toward.direction.dot(disc.direction) / n as f32;
+        }
+        // A float's rounding is a tenth of the smallest of the discs.
+        let slack = if half < 1e-6 { n / 4 } else { n / 1000 };
+        assert!(inner.abs_diff(n / 2) <= slack, "{half}: {inner}");
+        assert!(met >= n - slack, "{half}: {met}");
+        assert!((mean - Vec3::ONE).abs().max_element() < 1e-3, "{half}: {mean}");
+        let radiance = 1.0 / (f64::from(half).sin().powi(2) * std::f64::consts::PI);
+        assert!((f64::from(disc.radiance().x) / radiance - 1.0).abs() < 1e-5, "{half}");
+    }
+}
+
+#[test]
+fn a_ray_meets_a_sphere_where_it_is() {
+    let kind = LightKind::Point { radius: 0.5 };
+    let light = placed(Light { kind, ..point(1.0, None) }, Vec3::new(0.0, 3.0, 0.0), Vec3::X);
+    let met = |at: Vec3, to: Vec3| incident(&light, at).unwrap().met((to - at).normalize());
+    assert!((met(Vec3::ZERO, Vec3::Y).unwrap() - 2.5).abs() < 1e-6);
+    let side = Vec3::new(0.3, 2.6, 0.0);
+    assert!((met(Vec3::ZERO, side).unwrap() - side.length()).abs() < 1e-5);
+    assert_eq!(met(Vec3::ZERO, Vec3::NEG_Y), None);
+    assert_eq!(met(Vec3::ZERO, Vec3::new(0.6, 3.0, 0.0)), None);
+    assert_eq!(met(Vec3::new(0.0, 2.9, 0.0), 4.0 * Vec3::Y), Some(0.0));
+}
+
+/// The three ways of estimating a disc's reflection off a glossy surface: looking for the light,
+/// chance, and both together.
+#[test]
+fn both_ways_of_finding_a_disc_count_once() {
+    let lights = [
+        placed(
+            Light { kind: LightKind::Point { radius: 0.5 }, ..point(3.0, None) },
+            Vec3::new(-1.2, 0.3, 1.5),
+            Vec3::X,
+        ),
+        placed(
+            Light { kind: LightKind::Directional { angle: 0.5 }, ..point(1.0, None) },
+            Vec3::ZERO,
+            Vec3::new(0.8, 0.1, -1.0),
+        ),
+    ];
+    let punctual = Punctual::new(&lights, 3.0);
+    for (metallic, roughness) in [(1.0, 0.1), (1.0, 0.5), (0.0, 0.3)] {
+        let bsdf = Bsdf::new(&Substance {
+            base_color: Vec3::splat(0.8),
+            metallic,
+            roughness,
+            transmission: 0.0,
+            ior: 1.5,
+            specular: 1.0,
+            specular_color: Vec3::ONE,
+        });
+        let view = Vec3::new(0.8, 0.0, 1.0).normalize();
+        let eval = |direction: Vec3| bsdf.eval(view, direction);
+        let (n, end, mut sums) = (1 << 16, f32::INFINITY, [[0.0f64; 2]; 4]);
+        for i in 0..n {
+            let mut s = Sampler::new(5, 0, i);
+            let (choice, on_disc) = (s.number(), s.square());
+            let searched: f32 = lights
+                .iter()
+                .map(|l| incident(l, Vec3::ZERO).unwrap().toward(on_disc))
+                .map(|point| eval(point.direction).value.x * point.irradiance.x)
+                .sum();
+            let mixed = punctual.choose(Vec3::ZERO, choice, || on_disc, eval);
+            let mixed = mixed.map_or(0.0, |(_, light)| light.x);
+            let (mut weighed, mut unweighed) = (0.0, 0.0);
+            if let Some(chosen) = bsdf.sample(view, s.number(), s.square()) {
+                let met = |pdf| punctual.met(Vec3::ZERO, chosen.direction, end, pdf).x;
+                weighed = chosen.weight.x * met(chosen.pdf);
+                unweighed = chosen.weight.x * met(f32::INFINITY);
+            }
+            let values = [searched, unweighed, mixed + weighed, mixed + unweighed];
+            for (sum, value) in sums.iter_mut().zip(values.map(f64::from)) {
+                sum[0] += value / f64::from(n);
+                sum[1] += value * value / f64::from(n);
+            }
+        }
+        let [searched, chance, both, twice] =
+            sums.map(|[mean, square]| (mean, ((square - mean * mean) / f64::from(n)).sqrt()));
+        let agree = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).abs() < 5.0 * a.1.hypot(b.1);
+        let all = format!("{metallic} {roughness}: {searched:?} {chance:?} {both:?} {twice:?}");
+        assert!(agree(both, searched) && agree(both, chance), "{all}");
+        assert!(!agree(twice, both), "too coarse a check: {all}");
+        assert!(both.1 < 4.0 * searched.1.min(chance.1), "far from the better of the two: {all}");
+    }
 }

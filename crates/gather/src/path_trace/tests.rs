@@ -1,3 +1,5 @@
+mod sized_lights;
+
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -98,7 +100,12 @@ fn point_light_falls_by_cosine_and_square() {
     let albedo = Vec3::splat(0.5);
     let mut stage = Stage::default();
     let at = floor(&mut stage, lambert(albedo, BLACK));
-    let light = Light { kind: LightKind::Point, color: Vec3::ONE, intensity: 20.0, range: None };
+    let light = Light {
+        kind: LightKind::Point { radius: 0.0 },
+        color: Vec3::ONE,
+        intensity: 20.0,
+        range: None,
+    };
     let place = Vec3::new(1.5, 2.0, -0.5);
     stage.light(light, place, Vec3::X);
     let d = place - at;
@@ -163,7 +170,12 @@ fn picture_of_a_sun_over_a_lambert_plane() {
 fn clamp_holds_scattered_light_and_leaves_the_rest() {
     let mut stage = Stage::default();
     floor(&mut stage, lambert(Vec3::ONE, Vec3::splat(100.0)));
-    let sun = Light { kind: LightKind::Directional, color: Vec3::ONE, intensity: 1e5, range: None };
+    let sun = Light {
+        kind: LightKind::Directional { angle: 0.0 },
+        color: Vec3::ONE,
+        intensity: 1e5,
+        range: None,
+    };
     stage.light(sun, BLACK, Vec3::NEG_Y);
     let (mean, _) = look(&stage.snapshot(), Vec3::Y, down(), 1, 7.0);
     assert!((mean - Vec3::splat(107.0)).abs().max_element() < 1e-3, "{mean}");
@@ -226,7 +238,12 @@ fn lit_room() -> Arc<Snapshot> {
         ..lambert(Vec3::splat(0.7), Vec3::splat(0.1))
     });
     stage.room(BLACK, Vec3::splat(4.0), wall).sphere(Vec3::new(0.0, -1.0, 0.0), 0.5, 12, wall);
-    let light = Light { kind: LightKind::Point, color: Vec3::ONE, intensity: 3.0, range: None };
+    let light = Light {
+        kind: LightKind::Point { radius: 0.0 },
+        color: Vec3::ONE,
+        intensity: 3.0,
+        range: None,
+    };
     stage.light(light, Vec3::new(1.0, 1.0, 1.0), Vec3::X);
     stage.snapshot()
 }

@@ -27,6 +27,11 @@ impl Shader<'_> {
         let world = self.world;
         let depth = self.depth;
         let part = Part::after(depth);
+        if depth > 0 {
+            let end = path.hit.map_or(f32::INFINITY, |hit| hit.t);
+            let discs = path.throughput * self.discs(&path.segment, end);
+            path.seen.add(Part::after(depth - 1), self.limited(depth, discs));
+        }
         let Some(hit) = path.hit else {
             let sky = path.throughput * self.sky(&path.segment);
             path.seen.add(part, self.limited(depth, sky));
@@ -48,7 +53,7 @@ impl Shader<'_> {
 
         self.punctual(&vertex, index, path);
         self.area(&vertex, index, path);
-        if depth + 1 == self.limits.bounces && world.lights.are_punctual() {
+        if depth + 1 == self.limits.bounces && world.lights.are_points() {
             // The last ray could only meet a source.
             return None;
         }
@@ -63,6 +68,12 @@ impl Shader<'_> {
         }
         path.segment = next;
         Some(())
+    }
+
+    /// Punctual lights with a size that a scattered ray meets before `end` metres.
+    fn discs(&self, segment: &Segment, end: f32) -> Vec3 {
+        let Ray { origin, direction, .. } = segment.ray;
+        self.world.lights.punctual.met(origin, direction, end, segment.pdf)
     }
 
     /// Environment seen along a ray that left the scene.
@@ -88,7 +99,8 @@ impl Shader<'_> {
         let choice = path.sampler.number();
         let at = vertex.point.position;
         let lights = &self.world.lights.punctual;
-        let Some((incident, light)) = lights.choose(at, choice, |l| vertex.eval(l).value) else {
+        let on_disc = || path.sampler.square();
+        let Some((incident, light)) = lights.choose(at, choice, on_disc, |l| vertex.eval(l)) else {
             return;
         };
         let light = self.limited(self.depth + 1, path.throughput * light);
@@ -106,7 +118,7 @@ impl Shader<'_> {
 
     /// Reaches for one point of an emissive triangle or of the environment.
     fn area(&mut self, vertex: &Vertex<'_>, index: u32, path: &mut Path) {
-        if self.world.lights.are_punctual() {
+        if self.world.lights.are_points() {
             return;
         }
         let (choice, u) = (path.sampler.number(), path.sampler.square());

@@ -58,6 +58,16 @@ pub(super) struct Light {
     pub(super) intensity: f32,
     pub(super) range: Option<f32>,
     pub(super) spot: Option<Spot>,
+    #[serde(default)]
+    pub(super) extras: Value,
+}
+
+/// `extras.lumencast` of a light.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct LightSize {
+    pub(super) radius: Option<f32>,
+    pub(super) angle: Option<f32>,
 }
 
 #[derive(Debug, Deserialize)]

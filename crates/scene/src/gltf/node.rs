@@ -159,9 +159,9 @@ fn read_light(
     json: &json::Light,
     warnings: &mut Vec<String>,
 ) -> Result<Light, Fault> {
-    let kind = match json.kind.as_str() {
-        "point" => LightKind::Point,
-        "directional" => LightKind::Directional,
+    let mut kind = match json.kind.as_str() {
+        "point" => LightKind::Point { radius: 0.0 },
+        "directional" => LightKind::Directional { angle: 0.0 },
         "spot" => {
             let default = json::Spot::default();
             let spot = json.spot.as_ref().unwrap_or(&default);
@@ -171,10 +171,15 @@ fn read_light(
                 warnings.push(format!("light {index}: its inner cone is made less than its outer"));
                 inner = outer.next_down();
             }
-            LightKind::Spot { inner, outer }
+            LightKind::Spot { inner, outer, radius: 0.0 }
         }
         other => return Err(invalid(format!("unknown type {other:?}"))),
     };
+    if let Some(extras) = json.extras.get("lumencast") {
+        let json::LightSize { radius, angle } = serde_json::from_value(extras.clone())
+            .map_err(|e| invalid(format!("extras.lumencast: {e}")))?;
+        kind.resize(radius, angle).map_err(invalid)?;
+    }
     let (color, intensity) = (Vec3::from(json.color), json.intensity);
     let light = Light { kind, color, intensity, range: json.range };
     light.check().map_err(invalid)?;

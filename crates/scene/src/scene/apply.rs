@@ -354,7 +354,8 @@ fn changed_light(mut light: Light, spec: &LightSpec) -> Result<Light, &'static s
     light.color = spec.color.unwrap_or(light.color);
     light.intensity = spec.intensity.unwrap_or(light.intensity);
     light.range = spec.range.or(light.range);
-    if let LightKind::Spot { inner, outer } = &mut light.kind {
+    light.kind.resize(spec.radius, spec.angle)?;
+    if let LightKind::Spot { inner, outer, .. } = &mut light.kind {
         *inner = spec.inner.unwrap_or(*inner);
         *outer = spec.outer.unwrap_or(*outer);
     } else if spec.inner.is_some() || spec.outer.is_some() {

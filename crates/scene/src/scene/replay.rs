@@ -134,8 +134,12 @@ impl Scene {
 }
 
 /// Stands for a light that has been removed, until the edit that removes it.
-const NO_LIGHT: Light =
-    Light { kind: LightKind::Point, color: glam::Vec3::ZERO, intensity: 0.0, range: None };
+const NO_LIGHT: Light = Light {
+    kind: LightKind::Point { radius: 0.0 },
+    color: glam::Vec3::ZERO,
+    intensity: 0.0,
+    range: None,
+};
 
 /// Names are URIs.
 fn source_of(model: &Model) -> InstanceSource {
@@ -165,19 +169,32 @@ fn moved(node: NodeId, old: Trs, new: Trs) -> Option<Edit> {
 }
 
 fn light_change(node: NodeId, old: Light, new: Light) -> Edit {
-    let cones = |light: Light| match light.kind {
-        LightKind::Spot { inner, outer } => (Some(inner), Some(outer)),
-        _ => (None, None),
-    };
-    let ((old_inner, old_outer), (inner, outer)) = (cones(old), cones(new));
+    let (old, new) = (parts(old), parts(new));
     let light = LightSpec {
-        color: differing(old.color, new.color),
-        intensity: differing(old.intensity, new.intensity),
+        color: differing(old.color, new.color).flatten(),
+        intensity: differing(old.intensity, new.intensity).flatten(),
         range: differing(old.range, new.range).flatten(),
-        inner: differing(old_inner, inner).flatten(),
-        outer: differing(old_outer, outer).flatten(),
+        inner: differing(old.inner, new.inner).flatten(),
+        outer: differing(old.outer, new.outer).flatten(),
+        radius: differing(old.radius, new.radius).flatten(),
+        angle: differing(old.angle, new.angle).flatten(),
     };
     Edit::SetLight { node, light }
+}
+
+/// All parts that a light has.
+fn parts(light: Light) -> LightSpec {
+    let Light { kind, color, intensity, range } = light;
+    let spec =
+        LightSpec { color: Some(color), intensity: Some(intensity), range, ..LightSpec::default() };
+    match kind {
+        LightKind::Point { radius } => LightSpec { radius: Some(radius), ..spec },
+        LightKind::Spot { inner, outer, radius } => {
+            let (inner, outer, radius) = (Some(inner), Some(outer), Some(radius));
+            LightSpec { inner, outer, radius, ..spec }
+        }
+        LightKind::Directional { angle } => LightSpec { angle: Some(angle), ..spec },
+    }
 }
 
 fn material_change(material: MaterialId, old: &Material, new: &Material) -> Option<Edit> {

@@ -25,7 +25,8 @@ fn rich() -> Vec<u8> {
     w.node(json!({ "mesh": 1, "skin": 0 }));
     w.animation("a", (1, "weights"), "LINEAR", &[0.0, 1.0], ("SCALAR", &[0.0, 1.0]));
     w.animation("b", (0, "rotation"), "CUBICSPLINE", &[0.0, 1.0], ("VEC4", &[0.5; 24]));
-    w.light(json!({ "type": "spot", "range": 3.0 }), json!({ "name": "lamp" }));
+    let size = json!({ "lumencast": { "radius": 0.1 } });
+    w.light(json!({ "type": "spot", "range": 3.0, "extras": size }), json!({ "name": "lamp" }));
     w.camera("camera", 1.0, json!({}));
     let image = w.view(&png(2, 2));
     w.add("images", json!({ "bufferView": image, "mimeType": "image/png" }));
@@ -413,6 +414,22 @@ fn lights_and_cameras_out_of_range_are_refused() {
         ),
         (json!({ "type": "spot", "spot": { "outerConeAngle": 3.0 } }), "light 0: its cones"),
         (json!({ "type": "area" }), "light 0: unknown type"),
+        (
+            json!({ "type": "point", "extras": { "lumencast": { "radius": -1.0 } } }),
+            "light 0: its radius is -1",
+        ),
+        (
+            json!({ "type": "point", "extras": { "lumencast": { "angle": 0.1 } } }),
+            "light 0: only directional lights have an angle",
+        ),
+        (
+            json!({ "type": "directional", "extras": { "lumencast": { "radius": 0.1 } } }),
+            "light 0: only point and spot lights have a radius",
+        ),
+        (
+            json!({ "type": "directional", "extras": { "lumencast": { "angle": "wide" } } }),
+            "light 0: extras.lumencast: invalid type",
+        ),
     ] {
         let mut w = triangle();
         w.light(light, json!({}));

@@ -63,7 +63,7 @@ fn added_nodes_get_the_next_numbers_whatever_the_edit_says() {
     scene.apply(&Edit::RemoveNode { node: NodeId(6) }).expect("removed");
     let lamp = Edit::AddLight {
         node: None,
-        light: light(LightKind::Point, 3.0),
+        light: light(LightKind::Point { radius: 0.0 }, 3.0),
         parent: Some(NodeId(5)),
         transform: at(Vec3::Y),
     };
@@ -99,6 +99,33 @@ fn lights_change_and_go_out() {
     assert_eq!(scene.snapshot().lights.len(), 1, "the spot light only");
     scene.apply(&Edit::RemoveLight { node: NodeId(2) }).expect("removed");
     assert!(scene.snapshot().lights.is_empty());
+}
+
+#[test]
+fn lights_have_a_size() {
+    let mut w = triangle();
+    let with = |mut light: serde_json::Value, size| {
+        light["extras"] = json!({ "lumencast": size, "other": 1 });
+        light
+    };
+    w.light(with(json!({ "type": "point" }), json!({ "radius": 0.25 })), json!({}));
+    w.light(with(json!({ "type": "spot" }), json!({ "radius": 0.5 })), json!({}));
+    w.light(with(json!({ "type": "directional" }), json!({ "angle": 0.0093 })), json!({}));
+    w.light(json!({ "type": "point", "extras": [1, 2] }), json!({}));
+    let mut scene = load(w);
+    let kinds = |scene: &Scene| scene.lights().iter().map(|l| l.light.kind).collect::<Vec<_>>();
+    let outer = std::f32::consts::FRAC_PI_4;
+    let spot = |radius| LightKind::Spot { inner: 0.0, outer, radius };
+    let (point, sun) =
+        (|radius| LightKind::Point { radius }, |angle| LightKind::Directional { angle });
+    assert_eq!(kinds(&scene), [point(0.25), spot(0.5), sun(0.0093), point(0.0)]);
+    let mut set = |node, light| {
+        scene.apply(&Edit::SetLight { node: NodeId(node), light }).expect("set");
+    };
+    set(2, LightSpec { radius: Some(0.0), outer: Some(outer), ..LightSpec::default() });
+    set(3, LightSpec { angle: Some(0.02), ..LightSpec::default() });
+    set(4, LightSpec { radius: Some(1.0), ..LightSpec::default() });
+    assert_eq!(kinds(&scene), [point(0.25), spot(0.0), sun(0.02), point(1.0)]);
 }
 
 #[test]
@@ -151,7 +178,7 @@ fn senseless() -> Vec<(Edit, &'static str)> {
     };
     let play =
         |animation, playback| Edit::SetAnimation { animation: AnimationId(animation), playback };
-    let spot = |inner, outer| light(LightKind::Spot { inner, outer }, 1.0);
+    let spot = |inner, outer| light(LightKind::Spot { inner, outer, radius: 0.0 }, 1.0);
     let outside = InstanceSource::File("../other.glb".into());
     vec![
         (go(999, none), "node 999 does not exist"),
@@ -171,8 +198,16 @@ fn senseless() -> Vec<(Edit, &'static str)> {
         (set(1, LightSpec { inner: Some(0.1), ..spec }), "only spot lights"),
         (set(2, LightSpec { inner: Some(0.5), ..spec }), "cones"),
         (set(2, LightSpec { outer: Some(2.0), ..spec }), "cones"),
+        (set(1, LightSpec { radius: Some(-0.1), ..spec }), "node 1 \"lamp\": its radius is -0.1"),
+        (set(1, LightSpec { radius: Some(nan), ..spec }), "radius"),
+        (set(2, LightSpec { radius: Some(inf), ..spec }), "radius"),
+        (set(1, LightSpec { angle: Some(0.1), ..spec }), "only directional lights"),
         (Edit::RemoveLight { node: NodeId(0) }, "carries no light"),
-        (add(light(LightKind::Point, inf)), "intensity"),
+        (add(light(LightKind::Point { radius: 1e10 }, 1.0)), "radius"),
+        (add(light(LightKind::Directional { angle: nan }, 1.0)), "angle"),
+        (add(light(LightKind::Directional { angle: -0.1 }, 1.0)), "angle"),
+        (add(light(LightKind::Directional { angle: 3.2 }, 1.0)), "its angle is 3.2; 0 to π"),
+        (add(light(LightKind::Point { radius: 0.0 }, inf)), "intensity"),
         (add(spot(0.5, 0.4)), "cones"),
         (paint(MaterialChange { base_color: Some(Vec4::splat(1.5)), ..plain }), "0 to 1"),
         (paint(MaterialChange { roughness: Some(-0.1), ..plain }), "0 to 1"),

@@ -70,10 +70,10 @@ impl Random {
                 Edit::AddInstance { node: None, source, parent, transform }
             }
             5 => {
-                let kind = if unit < 0.5 {
-                    LightKind::Point
-                } else {
-                    LightKind::Spot { inner: 0.1, outer: unit }
+                let kind = match self.below(3) {
+                    0 => LightKind::Point { radius: vector.x },
+                    1 => LightKind::Spot { inner: 0.1, outer: unit, radius: 0.0 },
+                    _ => LightKind::Directional { angle: unit },
                 };
                 let light = Light { kind, color: vector, intensity: unit, range: Some(3.0) };
                 Edit::AddLight { node: None, light, parent, transform }
@@ -84,8 +84,8 @@ impl Random {
                     color: self.maybe(vector),
                     intensity: self.maybe(unit),
                     range: self.maybe(1.0 + unit),
-                    outer: None,
-                    inner: None,
+                    radius: self.maybe(unit),
+                    ..LightSpec::default()
                 };
                 Edit::SetLight { node, light }
             }

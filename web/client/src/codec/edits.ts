@@ -32,16 +32,25 @@ const lightParts: Readers<Pick<LightSpec, 'color' | 'intensity' | 'range'>> = {
   range: real,
 };
 const coneParts = { inner: real, outer: real };
+const radiusPart = { radius: real };
+const anglePart = { angle: real };
 
 const light: Read<Light> = (value, what) => {
   const json = object(value, what);
   const parts = some(json, lightParts);
   switch (json.type) {
     case 'point':
+      return { type: 'point', ...some(json, radiusPart), ...parts };
     case 'directional':
-      return { type: json.type, ...parts };
+      return { type: 'directional', ...some(json, anglePart), ...parts };
     case 'spot':
-      return { type: 'spot', inner: real(json.inner, 'inner'), outer: real(json.outer, 'outer'), ...parts };
+      return {
+        type: 'spot',
+        inner: real(json.inner, 'inner'),
+        outer: real(json.outer, 'outer'),
+        ...some(json, radiusPart),
+        ...parts,
+      };
     default:
       throw new WireError('malformed', `a light of type ${JSON.stringify(json.type)}`);
   }
@@ -92,7 +101,7 @@ const EDITS: { readonly [name: string]: (json: Json) => Edit } = {
   set_light: (json) => ({
     edit: 'set_light',
     node: node(json),
-    ...some(json, { ...lightParts, ...coneParts }),
+    ...some(json, { ...lightParts, ...coneParts, ...radiusPart, ...anglePart }),
   }),
   remove_light: (json) => ({ edit: 'remove_light', node: node(json) }),
   set_material: (json) => ({
