@@ -7,10 +7,11 @@ use lumencast_scene::{AlphaMode, Instance, Material, Snapshot};
 
 use crate::accel::{Accel, AccelCache, Hit, Kernel, Ray, Stack};
 use crate::bsdf::Scatter;
+use crate::lights::emission::EmissionCache;
 use crate::lights::environment::{Sky, SkyCache};
 use crate::lights::punctual::Punctual;
 use crate::lights::{AreaSample, Lights, emitters};
-use crate::sampling::{mix2, unit};
+use crate::sampling::{luminance, mix2, unit};
 use crate::surface::{Frames, MaterialModel, Point, Triangle};
 
 /// What is kept from one snapshot to the next.
@@ -18,6 +19,7 @@ use crate::surface::{Frames, MaterialModel, Point, Triangle};
 pub(crate) struct WorldCache {
     accel: AccelCache,
     sky: SkyCache,
+    emission: EmissionCache,
 }
 
 /// A snapshot with its acceleration structure and tables of lights.
@@ -73,11 +75,11 @@ impl World {
             parts: Vec::new(),
             fallback,
         };
-        world.find_emitters();
+        world.find_emitters(&mut cache.emission);
         world
     }
 
-    fn find_emitters(&mut self) {
+    fn find_emitters(&mut self, cache: &mut EmissionCache) {
         let mut emitters = emitters::Emitters::default();
         for (index, instance) in (0..).zip(&self.snapshot.instances) {
             self.first_part.push(self.parts.len() as u32);
@@ -89,12 +91,18 @@ impl World {
                     material: id,
                     opaque: material.alpha_mode == AlphaMode::Opaque
                         || self.model == MaterialModel::Lambert,
-                    emitters: emitters::shines(material, self.model)
-                        .map(|both| emitters.add((index, instance), frames, p, both)),
+                    emitters: emitters::shines(material, self.model).map(|both| {
+                        let texture = material.emissive_texture.as_ref();
+                        let means = texture.map(|t| cache.means(&instance.mesh, p, t));
+                        let of_texture = |t: u32| means.as_ref().map_or(1.0, |m| m[t as usize]);
+                        let luminance = |t| luminance(material.emissive) * of_texture(t);
+                        emitters.add((index, instance), frames, p, both, luminance)
+                    }),
                 });
             }
         }
-        emitters.finish(&self.snapshot.instances, |i, p| self.material(i, p));
+        cache.finish();
+        emitters.finish();
         self.lights.emitters = emitters;
     }
 

@@ -118,7 +118,9 @@ export class Replica implements Values {
   hold(node: number): () => void {
     return this.#reconciler.hold([
       ...['translation', 'rotation', 'scale'].map((part) => `node/${node}/${part}`),
-      ...['color', 'intensity', 'range', 'inner', 'outer', 'radius', 'angle'].map((part) => `light/${node}/${part}`),
+      ...['color', 'intensity', 'range', 'inner', 'outer', 'radius', 'angle'].map(
+        (part) => `light/${node}/${part}`,
+      ),
     ]);
   }
 

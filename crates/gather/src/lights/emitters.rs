@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use lumencast_scene::{Instance, Material};
 
-use crate::sampling::{Table, luminance, triangle};
+use crate::sampling::{Table, triangle};
 use crate::surface::{Frames, MaterialModel, Triangle, scaled_cross};
 
 /// A triangle that shines.
@@ -28,6 +28,8 @@ struct Emitter {
 #[derive(Debug, Default)]
 pub(crate) struct Emitters {
     emitters: Vec<Emitter>,
+    /// Luminous flux over π, of each.
+    powers: Vec<f32>,
     by_power: Table,
 }
 
@@ -46,13 +48,15 @@ pub(crate) struct EmitterSample {
 }
 
 impl Emitters {
-    /// Adds a primitive's triangles; returns the number of its first.
+    /// Adds a primitive's triangles, each of some mean luminance (cd/m²); returns the number of its
+    /// first.
     pub(crate) fn add(
         &mut self,
         (index, instance): (u32, &Instance),
         frames: &Frames,
         primitive: u32,
         double_sided: bool,
+        luminance: impl Fn(u32) -> f32,
     ) -> u32 {
         let first = self.emitters.len() as u32;
         let triangles = instance.mesh.primitives[primitive as usize].triangles.len() as u32;
@@ -75,32 +79,17 @@ impl Emitters {
                 offset,
             }
         }));
+        let sides = if double_sided { 2.0 } else { 1.0 };
+        let power = |e: &Emitter| {
+            e.area * luminance(e.triangle) * sides * f32::from(e.normal != Vec3::ZERO)
+        };
+        self.powers.extend(self.emitters[first as usize..].iter().map(power));
         first
     }
 
     /// To be called once all are there: weighs them by power.
-    pub(crate) fn finish<'a>(
-        &mut self,
-        instances: &'a [Instance],
-        material: impl Fn(u32, u32) -> &'a Material,
-    ) {
-        self.by_power = Table::new(self.emitters.iter().map(|e| {
-            let local = Triangle::new(&instances[e.instance as usize], e.primitive, e.triangle);
-            let material = material(e.instance, e.primitive);
-            let power = |weights: Vec3| luminance(local.emission(material, weights));
-            // Textures: at the middle and near the corners.
-            let near = |k: usize| {
-                let mut w = Vec3::splat(0.15);
-                w[k] = 0.7;
-                power(w)
-            };
-            let mean = match material.emissive_texture {
-                None => power(Vec3::splat(1.0 / 3.0)),
-                Some(_) => 0.25 * (power(Vec3::splat(1.0 / 3.0)) + near(0) + near(1) + near(2)),
-            };
-            let sides = if e.double_sided { 2.0 } else { 1.0 };
-            e.area * mean * sides * f32::from(e.normal != Vec3::ZERO)
-        }));
+    pub(crate) fn finish(&mut self) {
+        self.by_power = Table::new(std::mem::take(&mut self.powers));
     }
 
     /// Whether nothing shines.

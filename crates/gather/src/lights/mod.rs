@@ -6,6 +6,7 @@
 //! that by the power heuristic.
 //! Constant and gradient environments are left to those rays, which suit them as well.
 
+pub(crate) mod emission;
 pub(crate) mod emitters;
 pub(crate) mod environment;
 pub(crate) mod punctual;

@@ -3,7 +3,7 @@ mod sized_lights;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use lumencast_light::Order;
 use lumencast_scene::{Environment, HdrImage, Light, LightKind, Material, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
@@ -93,6 +93,50 @@ fn rectangle_over_a_lambert_plane() {
     let expected = albedo * emission * form;
     let solid = 4.0 * a * b / (1.0 + height).powi(2) / PI;
     check(look_down(&stage, 1), expected, albedo * emission * solid);
+}
+
+/// A black panel of many triangles with one bright texel, L cos θ cos θ' A/πd². It lies where the
+/// middle of its triangle and places near the corners miss it.
+#[test]
+fn bright_texel_of_a_panel() {
+    use lumencast_scene::{Filter, Image, Primitive, TextureRef, Vertices};
+    let (side, cells, height) = (64u32, 16u32, 2.0);
+    let mut texels = vec![[0, 0, 0, 255]; (side * side) as usize];
+    texels[(5 * side + 51) as usize] = [255; 4];
+    let image = Image { name: String::new(), width: side, height: side, texels };
+    let texture = TextureRef {
+        image: Arc::new(image),
+        tex_coord: 0,
+        texture_from_mesh: glam::Affine2::IDENTITY,
+        wrap: Default::default(),
+        filter: Filter::Nearest,
+    };
+    let mut stage = Stage::default();
+    let at = floor(&mut stage, lambert(Vec3::ONE, BLACK));
+    let panel = lambert(BLACK, Vec3::splat(4000.0));
+    let material = stage.material(Material { emissive_texture: Some(texture), ..panel });
+    let corner = at + Vec3::new(-1.0, height, -1.0);
+    let nodes =
+        || (0..=cells).flat_map(|z| (0..=cells).map(move |x| Vec2::new(x as f32, z as f32)));
+    let uv: Vec<Vec2> = nodes().map(|node| node / cells as f32).collect();
+    let positions = uv.iter().map(|p| corner + 2.0 * Vec3::new(p.x, 0.0, p.y)).collect();
+    let normals = vec![Vec3::NEG_Y; uv.len()];
+    let row = cells + 1;
+    let first = (0..cells).flat_map(|z| (0..cells).map(move |x| z * row + x));
+    let triangles = first.flat_map(|i| [[i, i + 1, i + row + 1], [i, i + row + 1, i + row]]);
+    let primitive = Primitive {
+        triangles: triangles.collect(),
+        vertices: Vertices { positions, normals, tangents: Vec::new() },
+        uv: [uv, Vec::new()],
+        material,
+        ..Primitive::default()
+    };
+    stage.primitive(primitive, glam::Affine3A::IDENTITY);
+    let texel = 2.0 / side as f32;
+    let d = corner + Vec3::new(51.5 * texel, 0.0, 5.5 * texel) - at;
+    let cos = d.normalize().y;
+    let expected = 4000.0 / PI * cos * cos * texel * texel / d.length_squared();
+    check(look_down(&stage, 1), Vec3::splat(expected), Vec3::splat(1.2 * expected));
 }
 
 #[test]

@@ -62,7 +62,7 @@ pub(crate) fn fetch_texels(texture: &TextureRef, uv: Vec2) {
     }
 }
 
-fn fetch(image: &Image, p: IVec2, wrap: [Wrap; 2], coding: Coding) -> Vec4 {
+pub(crate) fn fetch(image: &Image, p: IVec2, wrap: [Wrap; 2], coding: Coding) -> Vec4 {
     let x = wrapped(p.x, image.width, wrap[0]);
     let y = wrapped(p.y, image.height, wrap[1]);
     let Some(&[r, g, b, a]) = image.texels.get(y * image.width as usize + x) else {
@@ -78,7 +78,7 @@ fn fetch(image: &Image, p: IVec2, wrap: [Wrap; 2], coding: Coding) -> Vec4 {
     rgb.extend(f32::from(a) / 255.0)
 }
 
-fn wrapped(i: i32, size: u32, wrap: Wrap) -> usize {
+pub(crate) fn wrapped(i: i32, size: u32, wrap: Wrap) -> usize {
     if i >= 0 && (i as u32) < size {
         return i as usize;
     }
