@@ -42,7 +42,7 @@ export function describeLight(light: PunctualLight): LightData {
 /** What lights of three.js lack. GLTFLoader keeps a light's extras in its `userData`, as is done here. */
 type Size = Pick<LightSpec, 'radius' | 'angle'>;
 
-/** All parts of a light that the server knows; what is infinite, or a size not given, is left out. */
+/** All parts of a light that the server knows; `range` is left out where it is infinite. */
 export function lightSpec(light: PunctualLight): LightSpec {
   const spec: LightSpec = {
     color: light.color.toArray() as [number, number, number],
@@ -53,10 +53,9 @@ export function lightSpec(light: PunctualLight): LightSpec {
     spec.inner = light.angle * (1 - light.penumbra);
     spec.outer = light.angle;
   }
-  const { radius, angle } = (light.userData.lumencast ?? {}) as Size;
-  if (light instanceof DirectionalLight) {
-    if (angle !== undefined) spec.angle = angle;
-  } else if (radius !== undefined) spec.radius = radius;
+  const { radius = 0, angle = 0 } = (light.userData.lumencast ?? {}) as Size;
+  if (light instanceof DirectionalLight) spec.angle = angle;
+  else spec.radius = radius;
   return spec;
 }
 

@@ -1,10 +1,21 @@
-import type { Edit } from '@lumencast/client';
+import type { Edit, LightSpec } from '@lumencast/client';
 
 /** One value of the scene that edits set: `node/3/translation`, `light/5/intensity`, … */
 export interface Assignment {
   readonly key: string;
   readonly value: unknown;
 }
+
+/** What of a light edits set. */
+export const LIGHT_PARTS: readonly (keyof LightSpec)[] = [
+  'color',
+  'intensity',
+  'range',
+  'inner',
+  'outer',
+  'radius',
+  'angle',
+];
 
 /** Where values live: the three.js scene, or a plain map in tests. */
 export interface Values {
@@ -129,7 +140,7 @@ export function assignments(edit: Edit): Assignment[] {
     case 'move_node':
       return parts(`node/${edit.node}`, edit, ['translation', 'rotation', 'scale']);
     case 'set_light':
-      return parts(`light/${edit.node}`, edit, ['color', 'intensity', 'range', 'inner', 'outer']);
+      return parts(`light/${edit.node}`, edit, LIGHT_PARTS);
     case 'remove_light':
       // Its node stays; and a light less would recompile every shader.
       return [{ key: `light/${edit.node}/intensity`, value: 0 }];

@@ -6,7 +6,7 @@ import { Content } from './content.js';
 import { showEnvironment } from './environment.js';
 import { createLight, lightSpec, setColor, setLight } from './lights.js';
 import { Models } from './models.js';
-import { Reconciler, type Values } from './reconcile.js';
+import { LIGHT_PARTS, Reconciler, type Values } from './reconcile.js';
 
 /** What a replica tells those who draw the scene. */
 export interface ReplicaEvents {
@@ -118,9 +118,7 @@ export class Replica implements Values {
   hold(node: number): () => void {
     return this.#reconciler.hold([
       ...['translation', 'rotation', 'scale'].map((part) => `node/${node}/${part}`),
-      ...['color', 'intensity', 'range', 'inner', 'outer', 'radius', 'angle'].map(
-        (part) => `light/${node}/${part}`,
-      ),
+      ...LIGHT_PARTS.map((part) => `light/${node}/${part}`),
     ]);
   }
 
