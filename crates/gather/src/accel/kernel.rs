@@ -95,9 +95,14 @@ impl Setup {
         Self { origin, inverse, near, axes, shear }
     }
 
+    /// The same ray in the space of an instance.
     #[inline(always)]
-    fn transformed(ray: &Ray, placed: &Placed) -> Self {
+    fn in_object(&self, ray: &Ray, placed: &Placed) -> Self {
         let m = &placed.object_from_world;
+        if placed.only_moves {
+            let origin = Vec3A::from(ray.origin) + m.translation;
+            return Self { origin: origin.to_array(), ..*self };
+        }
         Self::new(
             m.transform_point3a(ray.origin.into()),
             m.transform_vector3a(ray.direction.into()),
@@ -164,7 +169,7 @@ pub(super) fn trace_with<const ANY: bool>(
         |instance, t_max, stack| {
             let placed = &accel.placed[instance as usize];
             let (nodes, blocks): (&[Node], &[Block]) = (&placed.bvh.nodes, &placed.bvh.blocks);
-            let local = Setup::transformed(ray, placed);
+            let local = world.in_object(ray, placed);
             let ahead = |child: u32| match child & LEAF {
                 0 => fetch_ahead(&nodes[child as usize]),
                 _ => fetch_ahead(&blocks[(child & !LEAF) as usize]),

@@ -65,6 +65,8 @@ struct Placed {
     /// Index into the snapshot's instances.
     instance: u32,
     object_from_world: Affine3A,
+    /// The transform only moves, so that directions stay as they are.
+    only_moves: bool,
     bvh: Arc<MeshBvh>,
 }
 
@@ -100,7 +102,8 @@ impl Accel {
             }
             boxes.push(bvh.bounds().transformed(&world_from_object));
             let object_from_world = world_from_object.inverse();
-            placed.push(Placed { instance, object_from_world, bvh });
+            let only_moves = object_from_world.matrix3 == Mat3A::IDENTITY;
+            placed.push(Placed { instance, object_from_world, only_moves, bvh });
         }
         let (nodes, bounds) = wide::over_boxes(&boxes);
         Self { nodes, placed, bounds, kernel }
