@@ -1,6 +1,16 @@
-import type { AnimationClip, Camera, Material, Mesh, Object3D } from 'three';
-import { type GLTF, GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+import {
+  type AnimationClip,
+  type Camera,
+  Group,
+  type Material,
+  Mesh,
+  type Object3D,
+  type Texture,
+} from 'three';
+import { type GLTF, GLTFLoader, type GLTFReference } from 'three/addons/loaders/GLTFLoader.js';
 import { isPunctualLight, type PunctualLight } from './lights.js';
+import { copyParts } from './materials.js';
+import { materialsOf } from './patch.js';
 
 /** An animation and the object whose descendants it moves. */
 export interface Animation {
@@ -21,11 +31,13 @@ export class Content {
 
   /** Takes in a file, or another copy of one, whose first node, material and animation have these numbers. */
   add(gltf: GLTF, first: { node: number; material: number; animation: number }): void {
-    for (const [thing, { nodes, materials }] of gltf.parser.associations) {
+    for (const [thing, numbers] of associationsOf(gltf)) {
+      const { nodes, materials } = numbers ?? {};
       if (nodes !== undefined && 'isObject3D' in thing) this.setNode(first.node + nodes, thing);
       if (materials !== undefined && 'isMaterial' in thing)
         this.#addMaterial(first.material + materials, thing);
     }
+    this.addMaterials(gltf, gltf.scene, first.material);
     gltf.animations.forEach((clip, i) => {
       const copies = this.#animations.get(first.animation + i) ?? [];
       this.#animations.set(first.animation + i, [...copies, { clip, root: gltf.scene }]);
@@ -33,17 +45,42 @@ export class Content {
     this.cameras.push(...gltf.cameras);
   }
 
-  /** Forgets materials and animations from these numbers on. */
-  forgetFrom(first: { material: number; animation: number }): void {
-    for (const number of this.#materials.keys()) if (number >= first.material) this.#materials.delete(number);
-    for (const number of this.#animations.keys())
-      if (number >= first.animation) this.#animations.delete(number);
+  /**
+   * Takes in the materials of the file's meshes below an object: those that no other mesh shows, and
+   * glTF's default material, which comes after the file's own.
+   */
+  addMaterials(gltf: GLTF, below: Object3D, first: number): void {
+    const { meshes = [], materials = [] } = gltf.parser.json as MeshesAndMaterials;
+    const associations = associationsOf(gltf);
+    below.traverse((object) => {
+      const { meshes: mesh, primitives: index } = associations.get(object) ?? {};
+      const primitive =
+        mesh === undefined || index === undefined ? undefined : meshes[mesh]?.primitives[index];
+      if (!primitive) return;
+      const number = first + (primitive.material ?? materials.length);
+      for (const material of materialsOf(object)) this.#addMaterial(number, material);
+    });
+  }
+
+  /** Forgets materials and animations from these numbers on; returns them, as keys of values have them. */
+  forgetFrom(first: { material: number; animation: number }): string[] {
+    const materials = [...this.#materials.keys()].filter((number) => number >= first.material);
+    const animations = [...this.#animations.keys()].filter((number) => number >= first.animation);
+    for (const number of materials) this.#materials.delete(number);
+    for (const number of animations) this.#animations.delete(number);
+    return [
+      ...materials.map((number) => `material/${number}`),
+      ...animations.map((number) => `animation/${number}`),
+    ];
   }
 
   /** GLTFLoader makes variants of a material, say for meshes with vertex colours. */
   #addMaterial(number: number, material: Material): void {
     const variants = this.#materials.get(number) ?? [];
-    if (!variants.includes(material)) this.#materials.set(number, [...variants, material]);
+    if (variants.includes(material)) return;
+    // One that comes late looks as edits have made the others: that of a file's second copy.
+    if (variants[0]) copyParts(variants[0], material);
+    this.#materials.set(number, [...variants, material]);
   }
 
   setNode(number: number, object: Object3D): void {
@@ -103,6 +140,21 @@ export class Content {
   get animations(): ReadonlyMap<number, readonly Animation[]> {
     return this.#animations;
   }
+}
+
+interface MeshesAndMaterials {
+  readonly meshes?: readonly {
+    readonly primitives: readonly { readonly material?: number }[];
+    readonly weights?: readonly number[];
+  }[];
+  readonly materials?: readonly unknown[];
+}
+
+/** GLTFLoader leaves variants of the default material in without numbers, whatever its types say. */
+function associationsOf({
+  parser,
+}: GLTF): ReadonlyMap<Object3D | Material | Texture, GLTFReference | undefined> {
+  return parser.associations;
 }
 
 /** Loads a glTF file; `progress` gets bytes so far and, where known, of all. */

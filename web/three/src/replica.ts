@@ -1,10 +1,11 @@
-import type { Edit, Environment, Light, Playback, Session, Transform, Vec4 } from '@lumencast/client';
-import { Group, Material, MeshStandardMaterial, Object3D, type Scene } from 'three';
+import type { Edit, Environment, Light, Playback, Session, Transform } from '@lumencast/client';
+import { Group, type Object3D, type Scene } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { Animations } from './animations.js';
 import { Content } from './content.js';
 import { showEnvironment } from './environment.js';
-import { createLight, lightSpec, setColor, setLight } from './lights.js';
+import { createLight, lightSpec, setLight } from './lights.js';
+import { materialPart, setMaterialPart } from './materials.js';
 import { Models } from './models.js';
 import { LIGHT_PARTS, Reconciler, type Values } from './reconcile.js';
 
@@ -279,33 +280,4 @@ function setNodePart(object: Object3D | undefined, part: string | undefined, val
   if (part === 'translation') object?.position.fromArray(value);
   else if (part === 'rotation') object?.quaternion.fromArray(value).normalize();
   else object?.scale.fromArray(value);
-}
-
-function materialPart(material: Material | undefined, part: string | undefined): unknown {
-  if (!(material instanceof MeshStandardMaterial)) return undefined;
-  switch (part) {
-    case 'base_color':
-      return [...material.color.toArray(), material.opacity];
-    case 'metallic':
-      return material.metalness;
-    case 'roughness':
-      return material.roughness;
-    default:
-      return material.emissive.clone().multiplyScalar(material.emissiveIntensity).toArray();
-  }
-}
-
-function setMaterialPart(material: Material, part: string | undefined, value: unknown): void {
-  if (part === 'base_color' && 'color' in material) {
-    const [r, g, b, opacity] = value as Vec4;
-    setColor((material as MeshStandardMaterial).color, [r, g, b]);
-    material.opacity = opacity;
-  }
-  if (!(material instanceof MeshStandardMaterial)) return;
-  if (part === 'metallic') material.metalness = value as number;
-  else if (part === 'roughness') material.roughness = value as number;
-  else if (part === 'emissive') {
-    setColor(material.emissive, value as [number, number, number]);
-    material.emissiveIntensity = 1;
-  }
 }
