@@ -170,16 +170,24 @@ export async function loadGltf(
   return gltf;
 }
 
-/** A copy of a glTF mesh without the nodes that hang below it. */
+/**
+ * A glTF mesh as an instance of its own shows it: without the nodes that hang below it and the skeleton
+ * of the node that it was made for, morphed by the mesh's own weights.
+ */
 export async function instantiateMesh(gltf: GLTF, mesh: number): Promise<Object3D> {
+  const { primitives, weights = [] } = (gltf.parser.json as MeshesAndMaterials).meshes![mesh];
   const original = (await gltf.parser.getDependency('mesh', mesh)) as Object3D;
-  const copy = original.clone(false);
-  copy.position.set(0, 0, 0);
-  copy.quaternion.identity();
-  copy.scale.set(1, 1, 1);
-  const isPart = (child: Object3D) =>
-    (child as Mesh).isMesh && gltf.parser.associations.get(child)?.nodes === undefined;
-  if (!(original as Mesh).isMesh)
-    copy.add(...original.children.filter(isPart).map((part) => part.clone(false)));
-  return copy;
+  const parts = primitives.length === 1 ? [original] : original.children.slice(0, primitives.length);
+  const copies = parts.filter(isMesh).map((part) => {
+    const copy = new Mesh(part.geometry, part.material);
+    copy.morphTargetInfluences?.forEach((_, i, all) => (all[i] = weights[i] ?? 0));
+    // As GLTFLoader does with its copies.
+    gltf.parser.associations.set(copy, { meshes: mesh, primitives: parts.indexOf(part) });
+    return copy;
+  });
+  return copies.length === 1 ? copies[0] : new Group().add(...copies);
+}
+
+function isMesh(object: Object3D): object is Mesh {
+  return (object as Partial<Mesh>).isMesh === true;
 }

@@ -20,11 +20,13 @@ const ROOT = '';
  */
 export class Models {
   readonly #first = new Map<string, First>();
-  readonly #meshes: { readonly gltf: GLTF; readonly first: number }[] = [];
+  readonly #files: { readonly gltf: GLTF; readonly first: First }[] = [];
   #next: First = { mesh: 0, material: 0, animation: 0 };
   /** What the first added file gets. */
   readonly #afterRoot: First;
   #queue: Promise<unknown> = Promise.resolve();
+  /** Grows with every restart: what was asked for before is no longer wanted. */
+  #turn = 0;
 
   constructor(
     private readonly content: Content,
@@ -35,31 +37,38 @@ export class Models {
     this.#afterRoot = this.#next;
   }
 
-  /** Forgets all added files: their edits will come again. */
-  restart(): void {
+  /** Forgets all added files, as their edits will come again; returns which things went with them. */
+  restart(): string[] {
+    this.#turn++;
     for (const name of this.#first.keys()) if (name !== ROOT) this.#first.delete(name);
-    this.#meshes.length = Math.min(this.#meshes.length, 1);
+    this.#files.length = this.#first.size;
     this.#next = this.#afterRoot;
-    this.content.forgetFrom(this.#afterRoot);
+    return this.content.forgetFrom(this.#afterRoot);
   }
 
-  /** What an instance shows, to be hung below its node. */
-  instantiate(source: InstanceSource, node: number): Promise<Object3D> {
-    const made = this.#queue.then(() =>
-      'mesh' in source ? this.#mesh(source.mesh) : this.#file(source.file, node),
-    );
+  /** What an instance shows, to be hung below its node; `undefined` after a restart. */
+  instantiate(source: InstanceSource, node: number): Promise<Object3D | undefined> {
+    const turn = this.#turn;
+    const wanted = () => turn === this.#turn;
+    const made = this.#queue.then(() => {
+      if (!wanted()) return undefined;
+      return 'mesh' in source ? this.#mesh(source.mesh) : this.#file(source.file, node, wanted);
+    });
     this.#queue = made.catch(() => {});
     return made;
   }
 
-  #mesh(mesh: number): Promise<Object3D> {
-    const model = this.#meshes.findLast(({ first }) => first <= mesh);
-    if (!model) return Promise.reject(new Error(`mesh ${mesh} is not known here`));
-    return instantiateMesh(model.gltf, mesh - model.first);
+  async #mesh(mesh: number): Promise<Object3D> {
+    const file = this.#files.findLast(({ first }) => first.mesh <= mesh);
+    if (!file || mesh >= this.#next.mesh) throw new Error(`mesh ${mesh} is not known here`);
+    const object = await instantiateMesh(file.gltf, mesh - file.first.mesh);
+    this.content.addMaterials(file.gltf, object, file.first.material);
+    return object;
   }
 
-  async #file(file: string, node: number): Promise<Object3D> {
+  async #file(file: string, node: number, wanted: () => boolean): Promise<Object3D | undefined> {
     const gltf = await loadGltf(this.urlOf(file));
+    if (!wanted()) return undefined;
     // The instance's own node comes first.
     this.#add(gltf, file, node + 1);
     return gltf.scene;
@@ -70,7 +79,7 @@ export class Models {
     if (first === undefined) {
       first = this.#next;
       this.#first.set(name, first);
-      this.#meshes.push({ gltf, first: first.mesh });
+      this.#files.push({ gltf, first });
       const { meshes = [], materials = [] } = gltf.parser.json as Counted;
       this.#next = {
         mesh: first.mesh + meshes.length,

@@ -57,19 +57,20 @@ export class Replica implements Values {
 
   /** Starts again from the file's state. */
   applySnapshot(edits: readonly Edit[]): void {
-    for (const [node, object] of this.#added) this.#take(node, object);
-    this.#added.clear();
+    // What was removed from an added file goes with it.
     for (const [object, parent] of this.#removed) {
       parent.add(object);
       this.events.added(object);
     }
     this.#removed.clear();
+    for (const object of this.#added.values()) this.#take(object);
+    this.#added.clear();
     for (const node of this.#adopted.keys()) {
       if (edits.some((edit) => edit.edit === 'add_light' && edit.node === node)) continue;
       this.#adopted.delete(node);
       this.content.deleteNode(node);
     }
-    this.#models.restart();
+    for (const thing of this.#models.restart()) this.#reconciler.forget(`${thing}/`);
     this.#animations.restart();
     // What the edits add must be there before values are set on it.
     for (const edit of edits) this.#applyStructure(edit, undefined);
@@ -234,7 +235,10 @@ export class Replica implements Values {
 
   async #fillInstance(group: Group, { source, node = 0 }: Edit & { edit: 'add_instance' }): Promise<void> {
     try {
-      group.add(await this.#models.instantiate(source, node));
+      const object = await this.#models.instantiate(source, node);
+      if (!object) return;
+      if (this.content.object(node) !== group) return this.#forgetBelow(object);
+      group.add(object);
       this.#reconciler.arrived();
       this.events.added(group);
       this.revision++;
@@ -247,21 +251,27 @@ export class Replica implements Values {
     const object = this.content.object(node);
     const parent = object?.parent;
     if (!object || !parent) return;
-    if (this.#added.delete(node)) return this.#take(node, object);
+    if (this.#added.delete(node)) return this.#take(object);
     this.#removed.set(object, parent);
     parent.remove(object);
     this.events.removed(object);
   }
 
   /** Takes an added object out for good: its numbers are never used again. */
-  #take(node: number, object: Object3D): void {
-    for (const below of [node, ...this.content.nodesBelow(object)]) {
-      this.content.deleteNode(below);
-      this.#reconciler.forget(`node/${below}/`);
-      this.#reconciler.forget(`light/${below}/`);
-    }
+  #take(object: Object3D): void {
+    this.#forgetBelow(object);
     object.removeFromParent();
     this.events.removed(object);
+  }
+
+  /** Forgets the nodes that an object and all below it stand for. */
+  #forgetBelow(object: Object3D): void {
+    for (const node of this.content.nodesBelow(object)) {
+      this.content.deleteNode(node);
+      this.#added.delete(node);
+      this.#reconciler.forget(`node/${node}/`);
+      this.#reconciler.forget(`light/${node}/`);
+    }
   }
 }
 
