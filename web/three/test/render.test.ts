@@ -126,6 +126,25 @@ describe.skipIf(!chromiumProgram)('drawn by', () => {
       60_000,
     );
 
+    it('an occlusion map dims streamed light, and no other', async () => {
+      const coefficients = Array.from({ length: 24 * 27 }, (_, i) => (i % 27 < 3 ? 2 : 0));
+      const light = { type: 'point' as const, height: 1.5, intensity: 10, range: 0, inner: 0, outer: 0 };
+      const middle = async (occlusion: number | undefined) => {
+        const [indirect, direct] = await page.evaluate(
+          async ([kind, coefficients, light, occlusion]) => [
+            await window.measure!.volume(kind, coefficients, 1, 2, occlusion),
+            await window.measure!.lamp(kind, light, true, occlusion),
+          ],
+          [kind, coefficients, light, occlusion] as const,
+        );
+        return [indirect[SIZE / 2][0], direct[SIZE / 2][0]];
+      };
+      const [open, occluded] = [await middle(undefined), await middle(0.4)];
+      expect(open[0]).toBeCloseTo(2 * 0.282095, 2);
+      expect(occluded[0]).toBeCloseTo(0.4 * open[0], 3);
+      expect(occluded[1]).toBeCloseTo(open[1], 5);
+    }, 60_000);
+
     it('an environment picture stands as the server has it', async () => {
       // −Z red, +X green, −X blue, and white behind: u = ½ + atan2(x, −z) / 2π.
       const uri = hdr([WHITE, BLUE, RED, GREEN]);

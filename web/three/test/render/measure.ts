@@ -6,6 +6,7 @@
 import type { Field, LightState, SessionEvents } from '@lumencast/client';
 import {
   type Camera,
+  DataTexture,
   DoubleSide,
   FloatType,
   Mesh,
@@ -89,13 +90,15 @@ async function middleRow(
   );
 }
 
-/** A white floor, four metres across, seen from straight above. */
-function floor(): { scene: Scene; camera: OrthographicCamera } {
+/** A white floor, four metres across, seen from straight above; with an occlusion map of one value if any. */
+function floor(occlusion?: number): { scene: Scene; camera: OrthographicCamera } {
   const scene = new Scene();
-  const plane = new Mesh(
-    new PlaneGeometry(4, 4),
-    new MeshLambertMaterial({ color: 0xffffff, side: DoubleSide }),
-  );
+  const material = new MeshLambertMaterial({ color: 0xffffff, side: DoubleSide });
+  if (occlusion !== undefined) {
+    material.aoMap = new DataTexture(new Uint8Array([255 * occlusion, 0, 0, 255]), 1, 1);
+    material.aoMap.needsUpdate = true;
+  }
+  const plane = new Mesh(new PlaneGeometry(4, 4), material);
   plane.rotation.x = -Math.PI / 2;
   scene.add(plane);
   const camera = new OrthographicCamera(-2, 2, 2, -2, 0.1, 10);
@@ -118,8 +121,9 @@ async function lamp(
     outer: number;
   },
   withPlugin = true,
+  occlusion?: number,
 ): Promise<Radiance[]> {
-  const { scene, camera } = floor();
+  const { scene, camera } = floor(occlusion);
   const three = light.type === 'point' ? new PointLight() : new SpotLight();
   three.intensity = light.intensity;
   three.distance = light.range;
@@ -136,8 +140,14 @@ async function lamp(
 }
 
 /** Radiance along x of the floor under a volume whose light grows with x. */
-async function volume(kind: Kind, coefficients: number[], scale: number, order: number): Promise<Radiance[]> {
-  const { scene, camera } = floor();
+async function volume(
+  kind: Kind,
+  coefficients: number[],
+  scale: number,
+  order: number,
+  occlusion?: number,
+): Promise<Radiance[]> {
+  const { scene, camera } = floor(occlusion);
   const field: Field = {
     id: 0,
     kind: 'volume',
