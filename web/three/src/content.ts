@@ -165,9 +165,19 @@ export async function loadGltf(
   const gltf = await new GLTFLoader().loadAsync(url, (event) =>
     progress?.(event.loaded, event.lengthComputable ? event.total : undefined),
   );
+  if (gltf.scenes.length > 1) await nameNodes(gltf);
   // Matrices decompose into what edits set.
   gltf.scene.traverse((object) => void (object.matrixAutoUpdate = true));
   return gltf;
+}
+
+/** Of a file with several scenes GLTFLoader forgets which object is which node; its parser still knows. */
+async function nameNodes({ parser }: GLTF): Promise<void> {
+  const { nodes = [] } = parser.json as { nodes?: readonly unknown[] };
+  for (const index of nodes.keys()) {
+    const object = (await parser.getDependency('node', index)) as Object3D;
+    parser.associations.set(object, { ...parser.associations.get(object), nodes: index });
+  }
 }
 
 /**

@@ -302,6 +302,20 @@ describe('add_instance of a file', () => {
   });
 });
 
+describe('a file of several scenes', () => {
+  it('has nodes by number all the same', async () => {
+    const nodes = [{ name: 'elsewhere' }, { name: 'post', children: [2] }, { name: 'sign' }];
+    const { gltf, replica, accept } = await replicaOf({
+      scene: 1,
+      scenes: [{ nodes: [0] }, { nodes: [1] }],
+      nodes,
+    });
+    accept({ edit: 'move_node', node: 2, translation: [0, 3, 0] });
+    expect(gltf.scene.getObjectByName('sign')!.position.y).toBe(3);
+    expect(replica.content.object(1)).toBe(gltf.scene.getObjectByName('post'));
+  });
+});
+
 describe('lights', () => {
   it('of all kinds come below the node that add_light names, as it says', async () => {
     const { scene, replica, accept } = await replicaOf(ROOM);

@@ -33,8 +33,8 @@ export function glbUrl(parts: object): string {
     type,
     componentType: bytes ? BYTE : FLOAT,
     count: values.length / ({ SCALAR: 1, VEC3: 3, VEC4: 4 }[type] ?? 1),
-    min: type === 'SCALAR' ? [0] : undefined,
-    max: type === 'SCALAR' ? [2] : undefined,
+    ...(type === 'SCALAR' ? { min: [0], max: [2] } : {}),
+    ...(type === 'VEC3' ? { min: [0, 0, 0], max: [1, 4, 1] } : {}),
   }));
   const json = {
     asset: { version: '2.0' },
