@@ -151,7 +151,7 @@ export interface Session {
   readonly status: Status;
   /** Resolves once the server has said what it offers; rejects when the session is closed before. */
   readonly ready: Promise<void>;
-  /** What the server offers; `undefined` before it has said so. */
+  /** What the server offers, until it has said so what a saved light field holds; else `undefined`. */
   readonly catalog: Catalog | undefined;
   readonly stats: SessionStats;
 
@@ -169,7 +169,8 @@ export interface Session {
   light(now?: number): LightState;
   /**
    * Scene time in seconds at which animations stand on the server, estimated for `now`; less `delay`
-   * seconds (0.1 unless given), so that it seldom runs ahead of what has arrived.
+   * seconds (0.1 unless given), so that it seldom runs ahead of what has arrived. It is that of a saved
+   * light field until the server has said its own.
    */
   sceneTime(now?: number, delay?: number): number | undefined;
   /** Where the camera is, in world space: near regions come first. */
@@ -179,8 +180,8 @@ export interface Session {
    * its frames come late, and are no measure of the way.
    */
   timings(): readonly Timing[];
-  /** Ends the session; pending edits reject. */
-  close(): void;
+  /** Ends the session; pending edits reject, with the reason if there is one. The light stays. */
+  close(reason?: string): void;
 }
 
 /** Why an edit came to nothing. */

@@ -40,6 +40,8 @@ export class Cache {
   private following = false;
   /** Whether the catalog is that of a file. */
   private saved = false;
+  /** Scene time that the file's light is of, seconds. */
+  private savedTime = 0;
   private readonly edits = new PendingEdits();
   private happened: CacheEvent[] = [];
 
@@ -77,7 +79,9 @@ export class Cache {
     const { catalog, frames } = readLightFile(file);
     this.setCatalog(catalog);
     this.saved = true;
-    for (const { field, region, frame } of frames) this.addProbes(field, region, frame, now);
+    for (const { field, region, frame } of frames) {
+      this.savedTime = this.addProbes(field, region, frame, now)?.header.time ?? this.savedTime;
+    }
   }
 
   private setCatalog(catalog: Catalog): void {
@@ -237,6 +241,11 @@ export class Cache {
   delayOf(field: number, tick: number, now: number): number | undefined {
     const clock = this.isOwn(field) ? this.clock.of(tick) : undefined;
     return clock === undefined ? undefined : now - clock;
+  }
+
+  /** Scene time that stands still, while there is only a file's light; seconds. */
+  get standingTime(): number | undefined {
+    return this.saved ? this.savedTime : undefined;
   }
 
   /** Scene time at `now`, seconds; stands still when the server has been silent for a second. */

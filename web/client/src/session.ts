@@ -34,7 +34,10 @@ export interface ConnectOptions {
    * the server itself on this machine's own addresses.
    */
   certificateHash?: string;
-  /** A saved light field (the bytes of a `.light` file) to show until the server's light comes. */
+  /**
+   * A saved light field (the bytes of a `.light` file) to show until the server's light comes: its
+   * catalog is there at once, `ready` waits for the server all the same.
+   */
   saved?: Uint8Array;
   /** Makes connections; tests bring their own. */
   connector?: Connector;
@@ -56,7 +59,7 @@ const ANIMATION_DELAY = 0.1;
 /**
  * Connects to a scene's light, `https://host:port/scene`. Returns at once; the session connects, and
  * connects again after a loss, by itself.
- * @throws TypeError when the address is none, or names no scene.
+ * @throws TypeError when the address is none, or names no scene; WireError when `saved` is no light file.
  */
 export function connect(url: string | URL, options: ConnectOptions = {}): Session {
   return new LiveSession(target(new URL(url), options), options);
@@ -123,7 +126,11 @@ class LiveSession implements Session, Sink {
     this.ready = new Promise((resolve, reject) => (this.settleReady = { resolve, reject }));
     // Who does not wait for it need not hear that it failed.
     this.ready.catch(() => {});
-    if (options.saved) this.cache.load(options.saved, seconds());
+    if (options.saved) {
+      this.cache.load(options.saved, seconds());
+      // Nobody listens yet; the catalog is there to be read.
+      this.cache.events();
+    }
     void this.run();
   }
 
@@ -347,7 +354,7 @@ class LiveSession implements Session, Sink {
 
   sceneTime(now: number = performance.now(), delay: number = ANIMATION_DELAY): number | undefined {
     const time = this.cache.sceneTime(now / 1000);
-    return time === undefined ? undefined : time - delay;
+    return time === undefined ? this.cache.standingTime : time - delay;
   }
 
   setCamera(position: Vec3): void {
@@ -360,8 +367,8 @@ class LiveSession implements Session, Sink {
     return this.meter.timings((field, tick) => this.cache.clockOfTick(field, tick));
   }
 
-  close(): void {
-    this.end('the session was closed');
+  close(reason = 'the session was closed'): void {
+    this.end(reason);
   }
 
   /** Ends the session for good. */

@@ -4,7 +4,7 @@ import { Cache, type CacheEvent } from '../src/cache.js';
 import type { Edit } from '../src/edit.js';
 import { WireError } from '../src/wire-error.js';
 import { FakeServer, json, type SentFrame, TICK } from './support/fake-server.js';
-import { join, varint } from './support/probe-encoder.js';
+import { lightFile } from './support/light-file.js';
 import { random } from './support/random.js';
 import { SimulatedLink } from './support/simulated-link.js';
 
@@ -423,18 +423,9 @@ describe('a field with an epoch of its own', () => {
 });
 
 describe('a saved light field', () => {
-  /** A `.light` file: the catalog and a keyframe of each region. */
-  function file(server: FakeServer): Uint8Array {
-    const record = (bytes: Uint8Array) => join(varint(bytes.length), bytes);
-    const frames = server
-      .step()
-      .probes.map(({ bytes }, region) => record(join(varint(0), varint(region), bytes)));
-    return join(new TextEncoder().encode('LUMENCST'), [1], record(server.catalog), ...frames);
-  }
-
   it('is shown until the server’s light comes', () => {
     const cache = new Cache(ME);
-    cache.load(file(new FakeServer({ brightness: () => 7 })), 0);
+    cache.load(lightFile(new FakeServer({ brightness: () => 7 })), 0);
     expect(shown(cache, 0)).toBeCloseTo(7, 2);
     expect(cache.age(100)).toBeUndefined();
     const { seq } = cache.edit(move(1, 1));
@@ -448,7 +439,7 @@ describe('a saved light field', () => {
   });
 
   it('that is damaged is refused', () => {
-    const good = file(new FakeServer({ regions: 2 }));
+    const good = lightFile(new FakeServer({ regions: 2 }));
     for (let length = 0; length < good.length; length++) {
       // Cut between two records it is a whole file with less in it.
       try {

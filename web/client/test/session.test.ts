@@ -5,6 +5,7 @@ import type { Edit } from '../src/edit.js';
 import { connect, type ConnectOptions } from '../src/session.js';
 import { FakeNet } from './support/fake-link.js';
 import { FakeServer, json, TICK } from './support/fake-server.js';
+import { lightFile } from './support/light-file.js';
 
 const MOVE: Edit = { edit: 'move_node', node: 1, translation: [1, 2, 3] };
 const sessions: Session[] = [];
@@ -106,6 +107,60 @@ describe('connecting', () => {
     await pass(60);
     expect(net.links.length).toBe(1);
     expect(net.link.closed).toBe(true);
+  });
+});
+
+describe('a saved light field', () => {
+  const saved = () => lightFile(new FakeServer({ brightness: () => 7 }));
+  const red = (session: Session) => session.light().fields[0].coefficients[0];
+
+  it('is shown with no server, while one is looked for', async () => {
+    const net = new FakeNet();
+    net.refuse = 'connection refused';
+    const { session, statuses } = open(net, { saved: saved() });
+    expect(session.catalog).toMatchObject({ scene: { name: 'test', root: 'test.glb' } });
+    expect(red(session)).toBeCloseTo(7, 2);
+    expect([session.light().age, session.sceneTime()]).toEqual([undefined, 0]);
+    const ready = vi.fn();
+    void session.ready.then(ready, () => {});
+    await pass(3);
+    expect(statuses.at(-1)?.state).toBe('lost');
+    expect(red(session)).toBeCloseTo(7, 2);
+    expect(ready).not.toHaveBeenCalled();
+  });
+
+  it('gives way to the server’s light, and says so once', async () => {
+    const net = new FakeNet();
+    const { session } = open(net, { saved: saved() });
+    const [catalogs, snapshots] = [vi.fn(), vi.fn()];
+    session.on('catalog', catalogs);
+    session.on('snapshot', snapshots);
+    await pass(0);
+    const server = new FakeServer({ brightness: () => 9 });
+    net.link.deliver('catalog', server.catalog);
+    await session.ready;
+    expect(red(session)).toBeCloseTo(7, 2);
+    net.link.tick(server);
+    await run(net, server, 1);
+    expect(red(session)).toBeCloseTo(9, 2);
+    expect(session.light().age).toBeLessThan(TICK);
+    expect(catalogs).toHaveBeenCalledOnce();
+    expect(snapshots).toHaveBeenCalledOnce();
+  });
+
+  it('stays when the session ends, and edits say why it did', async () => {
+    const net = new FakeNet();
+    const { session } = open(net, { saved: saved() });
+    session.close('there is no server');
+    expect(session.status).toEqual({ state: 'closed', reason: 'there is no server' });
+    expect(red(session)).toBeCloseTo(7, 2);
+    await expect(session.edit(MOVE)).rejects.toMatchObject({ kind: 'closed', message: 'there is no server' });
+  });
+
+  it('that is none fails where it is given', () => {
+    const net = new FakeNet();
+    expect(() => open(net, { saved: new Uint8Array(20) })).toThrow('not a light file');
+    expect(net.links).toEqual([]);
   });
 });
 

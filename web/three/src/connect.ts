@@ -1,7 +1,7 @@
 import { connect, type ConnectOptions as SessionOptions, type Session } from '@lumencast/client';
 import type { Mesh, Scene } from 'three';
 import { loadGltf } from './content.js';
-import { type AttachOptions, LumencastLight, type SceneEvent } from './light.js';
+import { type AttachOptions, LumencastLight, type SceneEvent, sceneFile } from './light.js';
 import type { Platform } from './platform.js';
 
 export interface ConnectOptions extends AttachOptions {
@@ -21,10 +21,9 @@ export async function connectWith(
   try {
     let { gltf } = options;
     if (!gltf && !hasMesh(options.scene)) {
-      await session.ready;
-      const { root } = session.catalog!.scene;
-      const file = new URL(`/scene/${encodeURIComponent(root)}`, session.origin).href;
-      gltf = await loadGltf(file, options.onProgress);
+      // A saved light field knows its scene without a server.
+      if (!session.catalog) await session.ready;
+      gltf = await loadGltf(sceneFile(session.origin, session.catalog!.scene.root), options.onProgress);
       options.scene.add(gltf.scene);
     }
     return new LumencastLight(session, platform, { ...options, gltf }, missed());

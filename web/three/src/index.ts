@@ -22,9 +22,10 @@ export type { ShadowOptions } from './shadows.js';
 
 /**
  * Connects to the light of a scene. Without `gltf`, and when the scene shows nothing yet, the server's
- * scene file is loaded and added to it.
+ * scene file is loaded and added to it. With `session: { saved }`, the bytes of a `.light` file, its
+ * light shows before the server answers, and without one.
  * @param url the server's address with the scene's name as path
- * @throws Error when the server cannot be reached at first; a connection lost later is taken up again
+ * @throws Error when the scene's file cannot be loaded; connections are tried until one comes about
  */
 export function connect(
   url: string,

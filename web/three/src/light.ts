@@ -32,6 +32,11 @@ export type Shown = 'both' | 'direct' | 'indirect';
 /** Edits of one object that may be under way at once: more would only queue on a slow link. */
 const MAX_UNDER_WAY = 4;
 
+/** The address of a file of a server's scene. */
+export function sceneFile(origin: string, file: string): string {
+  return new URL(`/scene/${file.split('/').map(encodeURIComponent).join('/')}`, origin).href;
+}
+
 /** What a session tells of the scene. */
 export type SceneEvent = { readonly snapshot: readonly Edit[] } | { readonly accepted: AcceptedEdit };
 
@@ -165,7 +170,7 @@ export class LumencastLight {
 
   /** The address of a file of the scene. */
   urlOf(file: string): string {
-    return new URL(`/scene/${file.split('/').map(encodeURIComponent).join('/')}`, this.session.origin).href;
+    return sceneFile(this.session.origin, file);
   }
 
   /** Ends the session and gives the scene back without its indirect light. */

@@ -2,20 +2,17 @@ import type { Edit, Field, LightState, SessionEvents } from '@lumencast/client';
 import {
   DataUtils,
   Group,
-  Light,
   Mesh,
   MeshStandardMaterial,
   PerspectiveCamera,
   PointLight,
   Scene,
   SpotLight,
-  Vector3,
-  Box3,
 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { beforeEach, describe, expect, it, vi } from 'vitest';
 import { type LightSession, LumencastLight } from '../src/light.js';
-import type { Platform, ProbeGrid } from '../src/platform.js';
+import { platform } from './support/platform.js';
 
 const camera = new PerspectiveCamera();
 const settle = () => new Promise((resolve) => setTimeout(resolve));
@@ -46,26 +43,6 @@ class FakeSession {
   setCamera = vi.fn();
   close = () => void (this.closed = true);
 }
-
-class FakeGrid extends Light {
-  resolution = new Vector3();
-  boundingBox = new Box3();
-  priority = 0;
-  texture: ProbeGrid['texture'] = null;
-  width = 0;
-  height = 0;
-  depth = 0;
-  updateBoundingBox(): void {}
-}
-
-const platform: Platform = {
-  createGrid: () => new FakeGrid() as ProbeGrid,
-  scaleIn: 'atlas',
-  freeGrids: () => 2,
-  max3DTextureSize: 256,
-  patch: () => {},
-  unpatch: () => {},
-};
 
 const field: Field = {
   id: 4,

@@ -57,7 +57,7 @@ export async function openPage(find: () => Promise<Source>): Promise<void> {
     curtain.say('Connecting to the light…');
     document.body.insertBefore(viewer.controls.element, curtain.element);
     // Compiling shaders keeps the page busy for so long that WebTransport would lose against a WebSocket.
-    await Promise.race([viewer.session.ready, afterSeconds(4)]);
+    if (!viewer.session.catalog) await Promise.race([viewer.session.ready, afterSeconds(4)]);
     curtain.say('Preparing the picture…');
     viewer.start();
     window.lumencast = inside(viewer);

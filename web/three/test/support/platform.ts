@@ -1,0 +1,23 @@
+import { Box3, Light, Vector3 } from 'three';
+import type { Platform, ProbeGrid } from '../../src/platform.js';
+
+class FakeGrid extends Light {
+  resolution = new Vector3();
+  boundingBox = new Box3();
+  priority = 0;
+  texture: ProbeGrid['texture'] = null;
+  width = 0;
+  height = 0;
+  depth = 0;
+  updateBoundingBox(): void {}
+}
+
+/** A renderer of which nothing is drawn. */
+export const platform: Platform = {
+  createGrid: () => new FakeGrid() as ProbeGrid,
+  scaleIn: 'atlas',
+  freeGrids: () => 2,
+  max3DTextureSize: 256,
+  patch: () => {},
+  unpatch: () => {},
+};
