@@ -4,18 +4,17 @@
  *
  * LUMENCAST_BIN names the program, CHROMIUM the browser, LUMENCAST_SHOTS a folder for screenshots.
  */
-import { mkdirSync, mkdtempSync, rmSync } from 'node:fs';
+import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { buildPage, openPage } from './browser.js';
+import { buildPage, difference, look, openPage, type Pixel, SHOTS, shoot } from './browser.js';
 import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
 
 /** Small: every pixel is drawn by the processor. */
 const VIEWPORT = { width: 400, height: 300 };
-const SHOTS = process.env.LUMENCAST_SHOTS;
 
 const program = lumencastProgram();
 
@@ -31,7 +30,6 @@ describe('the page', () => {
 
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), 'lumencast-page-'));
-    if (SHOTS) mkdirSync(SHOTS, { recursive: true });
     await buildPage(folder);
     browser = await launchBrowser();
     server = await start('cornell', await freePort());
@@ -55,7 +53,7 @@ describe('the page', () => {
     // Red and green walls, not one grey.
     expect(picture.some(([r, g]) => r > 1.5 * g && r > 40)).toBe(true);
     expect(picture.some(([r, g]) => g > 1.2 * r && g > 40)).toBe(true);
-    await shoot(page, 'cornell');
+    await shoot(page, 'cornell.png');
   }, 60_000);
 
   it('brightens what direct light does not reach', async () => {
@@ -116,7 +114,7 @@ describe('the page', () => {
     expect(await page.textContent('.notice.standing')).toMatch(/lost/i);
     const after = await look(page, 'both');
     expect(difference(before, after)).toBeLessThan(0.05);
-    await shoot(page, 'connection-lost');
+    await shoot(page, 'connection-lost.png');
 
     const revision = await page.evaluate(() => window.lumencast!.light.lightRevision);
     server = await start('cornell', port);
@@ -252,7 +250,7 @@ describe('the page', () => {
         await view.evaluate(() => window.lumencast!.viewer.meter());
         // Without a GPU they are those of a server starved by the page's drawing.
         await view.click('[title^="Figures"]');
-        await shoot(view, 'sponza');
+        await shoot(view, 'sponza.jpg');
         await view.close();
       } finally {
         await other.kill();
@@ -261,46 +259,3 @@ describe('the page', () => {
     240_000,
   );
 });
-
-type Pixel = [r: number, g: number, b: number];
-
-/** Points of the picture on a grid, with one part of the light shown. */
-function look(page: Page, shown: 'both' | 'direct' | 'indirect'): Promise<Pixel[]> {
-  return page.evaluate((shown) => {
-    const { pixels, setMode } = window.lumencast!;
-    setMode(shown);
-    const points: [number, number][] = [];
-    for (let y = 10; y < innerHeight; y += 15) {
-      for (let x = 10; x < innerWidth; x += 15) points.push([x, y]);
-    }
-    return pixels(points);
-  }, shown);
-}
-
-/** Mean difference of two pictures over their mean brightness. */
-function difference(a: readonly Pixel[], b: readonly Pixel[]): number {
-  const [va, vb] = [a.flat(), b.flat()];
-  const sum = va.reduce((total, value, i) => total + Math.abs(value - vb[i]), 0);
-  return (
-    sum /
-    Math.max(
-      va.reduce((total, value) => total + value),
-      1,
-    )
-  );
-}
-
-async function shoot(page: Page, name: string): Promise<void> {
-  if (!SHOTS) return;
-  await page.evaluate(() => {
-    const { viewer } = window.lumencast!;
-    viewer.draw();
-    viewer.controls.update();
-  });
-  await page.screenshot({
-    path: join(SHOTS, `${name}.jpg`),
-    quality: 90,
-    timeout: 60_000,
-    animations: 'disabled',
-  });
-}

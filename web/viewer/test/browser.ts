@@ -1,6 +1,10 @@
-import { resolve } from 'node:path';
+import { mkdirSync } from 'node:fs';
+import { join, resolve } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { build } from 'vite';
+
+/** Where pictures of the page go; none are made unless it is set. */
+export const SHOTS = process.env.LUMENCAST_SHOTS;
 
 /** Builds the page into a folder, for `lumencast serve --page`. */
 export async function buildPage(folder: string): Promise<void> {
@@ -14,16 +18,16 @@ export async function buildPage(folder: string): Promise<void> {
 /**
  * Opens the page and waits for its first light, at a fixed exposure. From then on it draws when asked
  * to: a page that draws without pause in software leaves the server no processor, and never comes to
- * rest for a screenshot.
+ * rest for a screenshot. What goes wrong in it is added to `errors`.
  */
 export async function openPage(
   browser: Browser,
   address: string,
   viewport: { width: number; height: number },
   query: Readonly<Record<string, string>> = {},
+  errors: string[] = [],
 ): Promise<Page> {
   const page = await browser.newPage({ viewport });
-  const errors: string[] = [];
   page.on('pageerror', (error) => errors.push(String(error)));
   page.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
   try {
@@ -44,4 +48,55 @@ export async function openPage(
       cause: error,
     });
   }
+}
+
+/** Red, green, blue, 0 to 255. */
+export type Pixel = [r: number, g: number, b: number];
+
+/** Points of the picture on a grid, with one part of the light shown. */
+export function look(page: Page, shown: 'both' | 'direct' | 'indirect'): Promise<Pixel[]> {
+  return page.evaluate((shown) => {
+    const { pixels, setMode } = window.lumencast!;
+    setMode(shown);
+    const points: [number, number][] = [];
+    for (let y = 10; y < innerHeight; y += 15) {
+      for (let x = 10; x < innerWidth; x += 15) points.push([x, y]);
+    }
+    return pixels(points);
+  }, shown);
+}
+
+/** Mean difference of two pictures over their mean brightness. */
+export function difference(a: readonly Pixel[], b: readonly Pixel[]): number {
+  const [va, vb] = [a.flat(), b.flat()];
+  const sum = va.reduce((total, value, i) => total + Math.abs(value - vb[i]), 0);
+  return (
+    sum /
+    Math.max(
+      va.reduce((total, value) => total + value),
+      1,
+    )
+  );
+}
+
+/** A picture of the page as it now is, where any are wanted; the name says of which kind. */
+export async function shoot(page: Page, name: string): Promise<void> {
+  if (!SHOTS) return;
+  mkdirSync(SHOTS, { recursive: true });
+  await draw(page);
+  await page.screenshot({
+    path: join(SHOTS, name),
+    ...(name.endsWith('.jpg') ? { quality: 90 } : {}),
+    timeout: 60_000,
+    animations: 'disabled',
+  });
+}
+
+/** One picture, so many seconds after the one before, and the panels as they then are. */
+export function draw(page: Page, seconds = 0): Promise<void> {
+  return page.evaluate((seconds) => {
+    const { viewer } = window.lumencast!;
+    viewer.draw(performance.now(), seconds);
+    viewer.controls.update();
+  }, seconds);
 }

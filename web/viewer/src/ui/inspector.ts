@@ -5,7 +5,7 @@ import type { Gizmo } from '../view/selection.js';
 import { h, iconButton, setPressed, slider } from './dom.js';
 
 export interface InspectorActions {
-  /** The object has been changed by hand. */
+  /** The object is about to be changed by hand. */
   touched(object: Object3D): void;
   /** What is turned where the object belongs to a node. */
   carrier(object: Object3D): Object3D;
@@ -87,8 +87,8 @@ export class Inspector {
     value: { get: () => number; set: (value: number) => void },
   ): HTMLElement {
     const { element, set } = slider(label, range, format, (input) => {
-      value.set(input);
       if (this.#object) this.actions.touched(this.#object);
+      value.set(input);
     });
     this.#refresh.push(() => set(value.get()));
     return element;
@@ -99,8 +99,8 @@ export class Inspector {
       type: 'color',
       'aria-label': 'Colour',
       oninput: () => {
-        light.color.setStyle(input.value, SRGBColorSpace);
         this.actions.touched(light);
+        light.color.setStyle(input.value, SRGBColorSpace);
       },
     });
     this.#refresh.push(() => {
@@ -123,7 +123,12 @@ export class Inspector {
 }
 
 export function nameOf(object: Object3D): string {
-  return object.name || object.parent?.name || kindOf(object);
+  return namedInFile(object) || (object.parent && namedInFile(object.parent)) || kindOf(object);
+}
+
+/** GLTFLoader keeps the name that a node has in its file; the object's own is without spaces. */
+function namedInFile({ name, userData }: Object3D): string {
+  return typeof userData.name === 'string' ? userData.name : name;
 }
 
 function kindOf(object: Object3D): string {

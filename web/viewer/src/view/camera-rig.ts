@@ -49,6 +49,7 @@ export class CameraRig {
 
   /** A view of the whole scene. */
   overview(): void {
+    this.#flight = undefined;
     const size = this.bounds.getSize(new Vector3());
     const target = this.bounds.getCenter(new Vector3());
     const distance = (0.6 * size.length()) / Math.tan(MathUtils.degToRad(25));
@@ -113,6 +114,13 @@ export class CameraRig {
 
   /** A point ahead to orbit about: a third of the scene away. */
   #aimOrbit(): void {
+    // What is left of an earlier turn must not carry the camera on from here: it is spent at once.
+    const { position, rotation } = this.#pose();
+    this.#orbit.enableDamping = false;
+    this.#orbit.update();
+    this.#orbit.enableDamping = true;
+    this.camera.position.copy(position);
+    this.camera.quaternion.copy(rotation);
     const ahead = this.camera.getWorldDirection(new Vector3());
     const distance = this.bounds.getSize(new Vector3()).length() / 5;
     this.#orbit.target.copy(this.camera.position).addScaledVector(ahead, distance);

@@ -51,10 +51,9 @@ export class Selection {
     this.#controls.addEventListener('dragging-changed', ({ value }) => {
       this.dragging = value === true;
       onDragging(this.dragging);
+      this.#hold();
     });
-    this.#controls.addEventListener('objectChange', () => {
-      if (this.#selected) this.touch.touch(this.#selected);
-    });
+    this.#controls.addEventListener('objectChange', () => this.#hold());
     canvas.addEventListener('pointerdown', ({ clientX: x, clientY: y }) => (this.#pressed = { x, y }));
     canvas.addEventListener('pointerup', (event) => this.#click(event));
   }
@@ -89,8 +88,14 @@ export class Selection {
     return lights;
   }
 
+  /** The page owns what the gizmo drags from the moment that the hand takes it, also while it rests. */
+  #hold(): void {
+    if (this.dragging && this.#selected) this.touch.touch(this.#selected);
+  }
+
   /** Lets glyphs follow their lights. */
   update(): void {
+    this.#hold();
     const lights = this.lights.filter((light) => !(light instanceof DirectionalLight));
     for (const [light, glyph] of this.#glyphs) {
       if (lights.includes(light)) continue;

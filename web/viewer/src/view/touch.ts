@@ -10,7 +10,7 @@ export class Touch {
 
   constructor(private readonly light: LumencastLight) {}
 
-  /** The page has changed, or is about to change, the object. */
+  /** The page is about to change the object: what it is before is known, what it is then is sent. */
   touch(object: Object3D, now: number = performance.now()): void {
     const held = this.#held.get(object);
     if (held) held.until = now + LINGER;
