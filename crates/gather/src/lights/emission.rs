@@ -2,8 +2,8 @@
 //!
 //! The texture is integrated over the triangle's footprint in it, line by line. What a line adds
 //! comes from running sums along the texture's rows, so that its cost does not depend on how many
-//! texels it crosses or how often the texture repeats: some 0.1 µs, two lines a row of texels.
-//! Sums take 4 bytes a texel while new triangles are measured; what is found is kept with the mesh.
+//! texels it crosses or how often the texture repeats; there are two lines a row of texels. Sums
+//! take 4 bytes a texel while new triangles are measured; what is found is kept with the mesh.
 //!
 //! Textures count as grey, so that a change of the emitted colour changes nothing here. What comes
 //! out only guides the choice of triangles, and is 0 only where the texture is black.

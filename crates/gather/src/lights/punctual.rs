@@ -12,8 +12,10 @@
 //! Which light is asked at a vertex depends on what the vertex makes of all of them, so the density
 //! of that choice cannot be stated; but it does not have to be. The two weights only have to sum to
 //! one at every direction (Veach 1997, section 9.2.1), and they do when both compare the density
-//! *within* the cone, 1/Ω, with the BSDF's. That is also about the best weight, since lights are
-//! chosen almost in proportion to what they contribute.
+//! *within* the cone, 1/Ω, with the BSDF's: the weights are those of a scene with this light alone.
+//!
+//! Lights with a size cost a ray at the end of every path, which points do without, and a test of
+//! every scattered ray against each of them.
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
@@ -102,7 +104,7 @@ pub(crate) fn incident(placed: &PlacedLight, at: Vec3) -> Option<Incident> {
                 direction: -placed.direction,
                 distance: f32::INFINITY,
                 irradiance: intensity,
-                sine: (0.5 * angle).sin(),
+                sine: if angle > 0.0 { (0.5 * angle).sin() } else { 0.0 },
             });
         }
     };
@@ -206,14 +208,14 @@ impl Punctual {
                 (index, 1.0 / (p * count as f32))
             };
             let Some(incident) = incident(&self.lights[index], at) else { continue };
-            let (incident, light) = if incident.sine > 0.0 {
-                let point = incident.toward(on_disc);
-                let Scatter { value, pdf } = scatter(point.direction);
-                let share = power_heuristic(incident.pdf(), pdf);
-                (point, value * point.irradiance * (share * copies))
+            let (incident, density) = if incident.sine > 0.0 {
+                (incident.toward(on_disc), incident.pdf())
             } else {
-                (incident, scatter(incident.direction).value * incident.irradiance * copies)
+                (incident, f32::INFINITY)
             };
+            let Scatter { value, pdf } = scatter(incident.direction);
+            let share = power_heuristic(density, pdf);
+            let light = value * incident.irradiance * (share * copies);
             let weight = luminance(light);
             if weight > 0.0 {
                 total += weight;

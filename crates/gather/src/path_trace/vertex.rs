@@ -27,7 +27,7 @@ impl Shader<'_> {
         let world = self.world;
         let depth = self.depth;
         let part = Part::after(depth);
-        if depth > 0 {
+        if depth > 0 && world.lights.punctual.have_size() {
             let end = path.hit.map_or(f32::INFINITY, |hit| hit.t);
             let discs = path.throughput * self.discs(&path.segment, end);
             path.seen.add(Part::after(depth - 1), self.limited(depth, discs));
