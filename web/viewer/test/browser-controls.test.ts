@@ -234,8 +234,11 @@ describe('a person at the page', () => {
     expect(await page.getAttribute('.inspector [title^="Turn"]', 'aria-pressed')).toBe('true');
     await shoot(page, 'turning.png');
     const [x, y] = await onScreen([-0.4, 0.4, -0.4]);
+    const view = await camera();
     // The front of the ring about the vertical, apart from where the other ring crosses it.
     await drag([x + 30, y + 8], [x + 40, y + 8], [x + 60, y + 8], [x + 90, y + 8]);
+    // The hand has the box, not the camera.
+    expect(await camera()).toEqual(view);
     await expect
       .poll(
         async () => {
@@ -333,7 +336,9 @@ describe('a person at the page', () => {
   it('finds all of it on a telephone', async () => {
     await page.setViewportSize({ width: 390, height: 780 });
     // The page hears of it with the browser's next picture.
-    await page.evaluate(() => new Promise((heard) => requestAnimationFrame(() => requestAnimationFrame(heard))));
+    await page.evaluate(
+      () => new Promise((heard) => requestAnimationFrame(() => requestAnimationFrame(heard))),
+    );
     await draw(page);
     expect(brightness(await picture())).toBeGreaterThan(30);
     await shoot(page, 'telephone.png');

@@ -18,8 +18,7 @@ export class CameraRig {
   #view: { fov: number; aspect: number } = { fov: 50, aspect: 16 / 9 };
   #flight: { from: Pose; to: Pose; seconds: number } | undefined;
   #look: { id: number; x: number; y: number } | undefined;
-  /** Set while something else is dragged. */
-  locked = false;
+  #locked = false;
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -45,6 +44,12 @@ export class CameraRig {
     this.#mode = mode;
     this.#flight = undefined;
     if (mode === 'orbit') this.#aimOrbit();
+  }
+
+  /** Set while something else is dragged, of which the camera sees the pointer too. */
+  set locked(locked: boolean) {
+    this.#locked = locked;
+    if (locked) this.#orbit.enabled = false;
   }
 
   /** A view of the whole scene. */
@@ -85,7 +90,7 @@ export class CameraRig {
 
   /** Moves on by a frame of that many seconds. */
   update(seconds: number): void {
-    this.#orbit.enabled = this.#mode === 'orbit' && !this.locked && this.#flight === undefined;
+    this.#orbit.enabled = this.#mode === 'orbit' && !this.#locked && this.#flight === undefined;
     if (this.#flight) this.#fly(this.#flight, seconds);
     else if (this.#mode === 'orbit') this.#orbit.update(seconds);
     else this.#walk(seconds);
@@ -139,7 +144,7 @@ export class CameraRig {
     addEventListener('keyup', (event) => this.#pressed.delete(event.code));
     addEventListener('blur', () => this.#pressed.clear());
     this.canvas.addEventListener('pointerdown', ({ pointerId: id, clientX: x, clientY: y }) => {
-      if (this.#mode === 'fly' && !this.locked) this.#look = { id, x, y };
+      if (this.#mode === 'fly' && !this.#locked) this.#look = { id, x, y };
     });
     addEventListener('pointermove', (event) => this.#turn(event));
     for (const end of ['pointerup', 'pointercancel'] as const) {
@@ -154,7 +159,7 @@ export class CameraRig {
 
   #turn({ pointerId, clientX, clientY }: PointerEvent): void {
     const look = this.#look;
-    if (look?.id !== pointerId || this.locked) return;
+    if (look?.id !== pointerId || this.#locked) return;
     const perPixel = MathUtils.degToRad(this.camera.fov) / innerHeight;
     const euler = new Euler().setFromQuaternion(this.camera.quaternion, 'YXZ');
     euler.y += (clientX - look.x) * perPixel;
