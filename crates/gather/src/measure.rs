@@ -209,6 +209,25 @@ pub fn build_seconds(scene: &Snapshot) -> f64 {
     update_seconds(&mut AccelCache::default(), scene)
 }
 
+/// The most memory, bytes, that building every hierarchy of a scene takes at once, what is kept of it
+/// included; to be asked before other work leaves memory to be used again. `None` where the system
+/// does not tell.
+#[must_use]
+pub fn build_peak_bytes(scene: &Snapshot) -> Option<u64> {
+    // Linux forgets the peak so far (man 5 proc_pid_clear_refs).
+    std::fs::write("/proc/self/clear_refs", "5").ok()?;
+    let before = memory("VmRSS:")?;
+    build_seconds(scene);
+    Some(memory("VmHWM:")?.saturating_sub(before))
+}
+
+/// A line of this process's status, bytes.
+fn memory(line: &str) -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let value = status.lines().find_map(|l| l.strip_prefix(line))?;
+    Some(1024 * value.trim().strip_suffix(" kB")?.parse::<u64>().ok()?)
+}
+
 /// Seconds of building the top level over `count` small instances that overlap a little.
 #[must_use]
 pub fn top_level_seconds(scene: &Snapshot, count: u32) -> f64 {

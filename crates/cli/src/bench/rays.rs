@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use lumencast_gather::measure::{RayBench, build_seconds, top_level_seconds};
+use lumencast_gather::measure::{RayBench, build_peak_bytes, build_seconds, top_level_seconds};
 use serde_json::json;
 
 use super::Spread;
@@ -52,6 +52,7 @@ impl BenchRays {
         let mut scene = self.scene.open()?;
         let view = camera::view(&scene, self.camera.as_ref())?;
         let snapshot = scene.snapshot();
+        let peak = build_peak_bytes(&snapshot);
         let spinner = output::spinner("Finding rays".into());
         let bench = RayBench::new(&snapshot, view, self.rays as usize, self.threads)
             .context("cannot start the threads that trace")?;
@@ -79,7 +80,9 @@ impl BenchRays {
 
         let triangles = bench.triangles().len();
         let threads = bench.install(|| self.threads.map_or_else(cores, NonZeroUsize::get));
-        let bytes = bench.bytes();
+        let a_triangle = |bytes: f64| bytes / triangles as f64;
+        let bytes = a_triangle(bench.bytes() as f64);
+        let peak = peak.map(|peak| a_triangle(peak as f64));
         let [closest, any, build, top] = [closest, any, build, top].map(Spread::of);
         if self.json {
             return output::json(&json!({
@@ -93,8 +96,8 @@ impl BenchRays {
                 "build_ms": build,
                 "top_level_ms": top,
                 "top_level_instances": INSTANCES,
-                "bytes": bytes,
-                "bytes_a_triangle": bytes as f64 / triangles as f64,
+                "bytes_a_triangle": bytes,
+                "peak_bytes_a_triangle": peak,
             }));
         }
         println!("{}: {triangles} triangles, {threads} threads", scene.name());
@@ -113,7 +116,10 @@ impl BenchRays {
         };
         time("build", &build);
         time("top level", &top);
-        println!("memory       {:.1} bytes a triangle", bytes as f64 / triangles as f64);
+        println!("memory       {bytes:.1} bytes a triangle");
+        if let Some(peak) = peak {
+            println!("at most      {peak:.0} bytes a triangle while it is built");
+        }
         Ok(())
     }
 }
