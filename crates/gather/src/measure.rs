@@ -217,7 +217,7 @@ pub fn build_peak_bytes(scene: &Snapshot) -> Option<u64> {
     // Linux forgets the peak so far (man 5 proc_pid_clear_refs).
     std::fs::write("/proc/self/clear_refs", "5").ok()?;
     let before = memory("VmRSS:")?;
-    build_seconds(scene);
+    update_seconds(&mut AccelCache::default(), scene);
     Some(memory("VmHWM:")?.saturating_sub(before))
 }
 
