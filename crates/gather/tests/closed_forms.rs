@@ -2,7 +2,6 @@
 //! might write who forgot a cosine, and has to refuse it.
 
 use std::f32::consts::PI;
-use std::path::Path;
 use std::sync::Arc;
 
 use glam::{UVec2, Vec3};
@@ -12,6 +11,7 @@ use lumencast_gather::reference::{
 use lumencast_light::{Order, sh};
 use lumencast_scene::{AlphaMode, Environment, Light, LightKind, Material, Projection, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
+use lumencast_testkit::vectors::GgxAlbedo;
 
 const BLACK: Vec3 = Vec3::ZERO;
 /// ∫ Y₀₀ dω = 2√π.
@@ -169,22 +169,27 @@ fn lamp_over_a_plane(lamp: Light) {
     check(&e, &zonal(Vec3::NEG_Y, moments(3.0)), &zonal(Vec3::NEG_Y, moments(2.0)), 1e-3);
 }
 
+/// A wide floor under a slanting sun, and the cosine at which it is lit.
+fn sunlit_floor(albedo: Vec3, illuminance: f32) -> (Stage, f32) {
+    let mut stage = Stage::default();
+    let floor = stage.material(lambert(albedo, BLACK));
+    stage.quad(Vec3::new(-1e4, 0.0, 1e4), Vec3::X * 2e4, Vec3::NEG_Z * 2e4, floor);
+    let sun = Light {
+        kind: LightKind::Directional { angle: 0.0 },
+        color: Vec3::ONE,
+        intensity: illuminance,
+        range: None,
+    };
+    stage.light(sun, Vec3::ZERO, Vec3::new(1.0, -1.0, 0.5));
+    (stage, 1.0 / (1.0f32 + 1.0 + 0.25).sqrt())
+}
+
 /// The sun on a plane: ρE cos θ/π from the whole lower half. From starlight to full sun.
 #[test]
 fn sun_on_a_plane() {
     for illuminance in [1e-3, 1.0, 1e5] {
         let albedo = Vec3::new(0.9, 0.5, 0.1);
-        let mut stage = Stage::default();
-        let floor = stage.material(lambert(albedo, BLACK));
-        stage.quad(Vec3::new(-1e4, 0.0, 1e4), Vec3::X * 2e4, Vec3::NEG_Z * 2e4, floor);
-        let sun = Light {
-            kind: LightKind::Directional { angle: 0.0 },
-            color: Vec3::ONE,
-            intensity: illuminance,
-            range: None,
-        };
-        stage.light(sun, Vec3::ZERO, Vec3::new(1.0, -1.0, 0.5));
-        let cos = 1.0 / (1.0f32 + 1.0 + 0.25).sqrt();
+        let (stage, cos) = sunlit_floor(albedo, illuminance);
         let moments = |cos: f32| {
             let radiance = albedo * illuminance * cos / PI;
             [2.0 * PI * Y0 * radiance, PI * Y1 * radiance, BLACK]
@@ -198,18 +203,8 @@ fn sun_on_a_plane() {
 #[test]
 fn sun_and_sky_on_a_plane() {
     let (albedo, sky, illuminance) = (Vec3::new(0.9, 0.5, 0.1), Vec3::new(1.0, 2.0, 4.0), 30.0);
-    let mut stage = Stage::default();
-    let floor = stage.material(lambert(albedo, BLACK));
-    stage.quad(Vec3::new(-1e4, 0.0, 1e4), Vec3::X * 2e4, Vec3::NEG_Z * 2e4, floor);
-    let sun = Light {
-        kind: LightKind::Directional { angle: 0.0 },
-        color: Vec3::ONE,
-        intensity: illuminance,
-        range: None,
-    };
-    stage.light(sun, Vec3::ZERO, Vec3::new(1.0, -1.0, 0.5));
+    let (mut stage, cos) = sunlit_floor(albedo, illuminance);
     stage.environment(Environment::Constant { radiance: sky });
-    let cos = 1.0 / (1.0f32 + 1.0 + 0.25).sqrt();
     let of = |from_sky: f32| {
         let floor = albedo * (illuminance * cos / PI + from_sky * sky);
         zonal(Vec3::Y, [2.0 * PI * Y0 * (sky + floor), PI * Y1 * (sky - floor), BLACK])
@@ -318,20 +313,11 @@ fn nothing_gives_nothing() {
     assert_eq!(probe(&scene, Vec3::ZERO, 3).sh, vec![BLACK; 9]);
 }
 
-#[derive(serde::Deserialize)]
-struct AlbedoTable {
-    roughness: Vec<f32>,
-    cos: Vec<f32>,
-    by_f0: Vec<Vec<f32>>,
-    by_f90: Vec<Vec<f32>>,
-}
-
 /// A floor in a sky of radiance 1 shows its directional albedo: 1 for Lambert and for smooth
 /// surfaces, and for rough metal that of single-scatter GGX (`vectors/ggx_albedo.json`).
 #[test]
 fn floors_in_a_furnace() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vectors/ggx_albedo.json");
-    let table: AlbedoTable = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let table = GgxAlbedo::load();
     let gltf = |metallic, roughness| Material { metallic, roughness, ..Material::default() };
     let mut floors = vec![
         (lambert(Vec3::ONE, BLACK), 0.6, 1.0),
@@ -341,7 +327,8 @@ fn floors_in_a_furnace() {
     ];
     for (i, &roughness) in table.roughness.iter().enumerate() {
         for (j, &cos) in table.cos.iter().enumerate().filter(|(_, cos)| **cos < 1.0) {
-            floors.push((gltf(1.0, roughness), cos, table.by_f0[i][j] + table.by_f90[i][j]));
+            let albedo = table.by_f0[i][j] + table.by_f90[i][j];
+            floors.push((gltf(1.0, roughness), cos, albedo as f32));
         }
     }
     let settings = PictureSettings { size: UVec2::splat(16), bounces: 1, ..Default::default() };

@@ -3,5 +3,6 @@
 pub mod embree;
 mod link;
 pub mod scenes;
+pub mod vectors;
 
 pub use link::{Conditions, Link};

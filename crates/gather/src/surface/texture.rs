@@ -28,8 +28,7 @@ pub(crate) enum Coding {
 /// The texture at mesh coordinates `uv` (before KHR_texture_transform).
 pub(crate) fn sample(texture: &TextureRef, uv: Vec2, coding: Coding) -> Vec4 {
     let image = &*texture.image;
-    let size = Vec2::new(image.width as f32, image.height as f32);
-    let at = texture.texture_from_mesh.transform_point2(uv) * size;
+    let at = in_texels(texture, uv);
     if !at.is_finite() {
         return Vec4::ONE;
     }
@@ -49,12 +48,16 @@ pub(crate) fn sample(texture: &TextureRef, uv: Vec2, coding: Coding) -> Vec4 {
     }
 }
 
+/// Where mesh coordinates lie in the texture, in texels from its corner.
+fn in_texels(texture: &TextureRef, uv: Vec2) -> Vec2 {
+    let size = Vec2::new(texture.image.width as f32, texture.image.height as f32);
+    texture.texture_from_mesh.transform_point2(uv) * size
+}
+
 /// Asks for the texels that [`sample`] reads; the next in a row is mostly in the same line.
 pub(crate) fn fetch_texels(texture: &TextureRef, uv: Vec2) {
     let image = &*texture.image;
-    let size = Vec2::new(image.width as f32, image.height as f32);
-    let at = texture.texture_from_mesh.transform_point2(uv) * size - 0.5;
-    let p = at.floor().as_ivec2();
+    let p = (in_texels(texture, uv) - 0.5).floor().as_ivec2();
     let x = wrapped(p.x, image.width, texture.wrap[0]);
     for y in [p.y, p.y.wrapping_add(1)] {
         let y = wrapped(y, image.height, texture.wrap[1]);

@@ -1,8 +1,7 @@
 //! White furnace: what a surface reflects where the same light comes from everywhere.
 
-use std::path::Path;
-
 use glam::DVec3;
+use lumencast_testkit::vectors::GgxAlbedo;
 
 use super::*;
 
@@ -80,22 +79,13 @@ fn no_surface_reflects_more_than_arrives() {
     assert!(albedo(&bsdf, v, naive).0.y > 1.2);
 }
 
-#[derive(serde::Deserialize)]
-struct AlbedoTable {
-    roughness: Vec<f32>,
-    cos: Vec<f32>,
-    by_f0: Vec<Vec<f64>>,
-    by_f90: Vec<Vec<f64>>,
-}
-
 /// How many entries of `vectors/ggx_albedo.json`, single-scatter GGX integrated elsewhere, a metal
 /// and a black dielectric do not reflect as much as.
 fn disagreements(
     alpha_of: impl Fn(f32) -> f32,
     fault: impl Fn(&Bsdf, Vec3, &Chosen) -> f32,
 ) -> (usize, String) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vectors/ggx_albedo.json");
-    let table: AlbedoTable = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let table = GgxAlbedo::load();
     let (mut wrong, mut said) = (0, String::new());
     for (i, &roughness) in table.roughness.iter().enumerate() {
         for (j, &cos) in table.cos.iter().enumerate() {
