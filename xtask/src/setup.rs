@@ -153,17 +153,27 @@ fn install_packages(purpose: Purpose) -> Result<()> {
         println!("The demo goes on without.");
         return Ok(());
     }
+    match install_as_root(&stable, &backports, source) {
+        Err(error) if can_wait => {
+            println!("\n{error:#}\nThe demo goes on without.");
+            Ok(())
+        }
+        result => result,
+    }
+}
+
+fn install_as_root(stable: &[&str], backports: &[&str], source: Option<String>) -> Result<()> {
     if let Some(source) = source {
         fs::write(BACKPORTS_FILE, source)
             .context("could not add bookworm-backports to the package sources")?;
     }
     step("package lists", apt(&["update", "-q"]))?;
     if !stable.is_empty() {
-        step("packages", apt(&[&["install", "-y", "-q"], &stable[..]].concat()))?;
+        step("packages", apt(&[&["install", "-y", "-q"], stable].concat()))?;
     }
     if !backports.is_empty() {
         let flags = ["install", "-y", "-q", "-t", "bookworm-backports"];
-        step("packages from backports", apt(&[&flags, &backports[..]].concat()))?;
+        step("packages from backports", apt(&[&flags, backports].concat()))?;
     }
     Ok(())
 }

@@ -119,6 +119,10 @@ pub(crate) struct TickArguments {
     /// the ratio alone.
     #[arg(long, default_value = "3.5", value_parser = parse_positive)]
     significance: f32,
+    /// Lets paths go on, where they end, in the light of the tick before: all bounces for the price
+    /// of few, as coarse as the probes are.
+    #[arg(long)]
+    feedback: bool,
     /// A script of edits (JSON lines, {"at": seconds, "edit": …}), played by scene time.
     #[arg(long, value_name = "FILE")]
     edits: Option<PathBuf>,
@@ -137,6 +141,7 @@ impl TickArguments {
             period: 1.0 / self.rate,
             samples: self.samples,
             gather: gather.options(blend),
+            feedback: self.feedback,
             volumes: volumes.volumes(scene)?,
             script: self.edits.as_deref().map(read_script).transpose()?,
             source: gather.source(),

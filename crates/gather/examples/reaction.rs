@@ -45,9 +45,9 @@ fn gather(tracer: &mut CpuPathTracer, scene: &Arc<Snapshot>, samples: u32, seed:
         size: Vec3::splat(2.0),
         resolution: UVec3::splat(8),
     };
-    let receivers = grid.positions().map(|position| Receiver { position, samples }).collect();
-    let job =
-        Job { scene: scene.clone(), receivers, order: Order::L2, bounces: 3, clamp: 10.0, seed };
+    let receivers: Vec<_> =
+        grid.positions().map(|position| Receiver::probe(position, samples)).collect();
+    let job = Job { clamp: 10.0, seed, ..Job::new(scene.clone(), receivers) };
     let ticket = tracer.submit(job);
     tracer.wait(ticket).unwrap_or_else(|| unreachable!("nobody cancels"))
 }
@@ -86,7 +86,8 @@ fn main() -> std::io::Result<()> {
             .collect();
         for significance in [2.5, 3.0, 3.5, 4.0, 5.0, f32::INFINITY] {
             let settings = BlendSettings { ratio: 0.01, significance };
-            let mut history = History::new(settings, updates[0].sums.len(), Order::L2);
+            let mut history =
+                History::new(settings, updates[0].sums.len(), Order::L2.coefficients());
             let fields: Vec<Field> = updates
                 .iter()
                 .map(|u| {

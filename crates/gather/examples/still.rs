@@ -25,9 +25,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = scene.volumes()[0].grid;
     let mut tracer = CpuPathTracer::new(Options::default())?;
     let mut gather = |samples: u32, seed: u64| -> Vec<Sums> {
-        let receivers = grid.positions().map(|position| Receiver { position, samples }).collect();
-        let (scene, order, clamp) = (snapshot.clone(), Order::L2, f32::INFINITY);
-        let ticket = tracer.submit(Job { scene, receivers, order, bounces: 3, clamp, seed });
+        let receivers: Vec<_> =
+            grid.positions().map(|position| Receiver::probe(position, samples)).collect();
+        let (scene, clamp) = (snapshot.clone(), f32::INFINITY);
+        let ticket = tracer.submit(Job { clamp, seed, ..Job::new(scene, receivers) });
         tracer.wait(ticket).map_or_else(Vec::new, |gathered| gathered.sums)
     };
     let converged: Vec<f32> =
@@ -37,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut histories: Vec<(f32, History)> = [2.5, 3.5, 5.0, f32::INFINITY]
         .map(|significance| {
             let settings = BlendSettings { significance, ..BlendSettings::default() };
-            (significance, History::new(settings, converged.len(), Order::L2))
+            (significance, History::new(settings, converged.len(), Order::L2.coefficients()))
         })
         .into();
     println!("updates,significance,median error,95 %,largest");

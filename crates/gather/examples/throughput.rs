@@ -12,7 +12,7 @@ use std::time::Instant;
 use glam::{Quat, UVec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Receiver};
-use lumencast_light::{Grid, Order};
+use lumencast_light::Grid;
 use lumencast_scene::{Scene, Snapshot};
 
 fn measure(
@@ -24,7 +24,7 @@ fn measure(
     threads: usize,
 ) {
     let receivers: Arc<[_]> =
-        grid.positions().map(|position| Receiver { position, samples }).collect();
+        grid.positions().map(|position| Receiver::probe(position, samples)).collect();
     let threads = NonZeroUsize::new(threads);
     let Ok(mut tracer) = CpuPathTracer::new(Options { threads, ..Options::default() }) else {
         return;
@@ -33,14 +33,7 @@ fn measure(
     let mut rays = 0;
     for seed in 0..30 {
         let start = Instant::now();
-        let job = Job {
-            scene: scene.clone(),
-            receivers: receivers.clone(),
-            order: Order::L2,
-            bounces,
-            clamp: 10.0,
-            seed,
-        };
+        let job = Job { bounces, clamp: 10.0, seed, ..Job::new(scene.clone(), receivers.clone()) };
         let ticket = tracer.submit(job);
         let Some(gathered) = tracer.wait(ticket) else { return };
         ticks.push(start.elapsed().as_secs_f64());

@@ -32,7 +32,6 @@
 //! Memory: 4 means a receiver, 12 bytes a coefficient and 24 more each (528 bytes at L2). All in f32.
 
 use glam::Vec3;
-use lumencast_light::Order;
 
 use crate::Sums;
 use crate::sampling::luminance;
@@ -47,7 +46,7 @@ const SCATTER: f32 = 0.64;
 /// Standard deviations that are enough while a change is expected, and for how many updates it is.
 const EXPECTED: f32 = 2.0;
 const EXPECTING: u32 = 12;
-/// Coefficients that are watched: bands 0 and 1.
+/// Coefficients that are watched, where there are so many: bands 0 and 1.
 const WATCHED: usize = 4;
 
 /// How updates are blended.
@@ -76,10 +75,10 @@ pub struct History {
 }
 
 impl History {
-    /// Nothing known yet about `receivers` receivers.
-    pub fn new(settings: BlendSettings, receivers: usize, order: Order) -> Self {
-        let ladder =
-            Ladder::new(settings.ratio.clamp(f32::MIN_POSITIVE, 1.0), order.coefficients());
+    /// Nothing known yet about `receivers` receivers of so many sums each: an order's coefficients
+    /// for probes, one for lumels.
+    pub fn new(settings: BlendSettings, receivers: usize, sums: usize) -> Self {
+        let ladder = Ladder::new(settings.ratio.clamp(f32::MIN_POSITIVE, 1.0), sums);
         Self { settings, receivers: vec![ladder; receivers], expecting: 0 }
     }
 
@@ -150,7 +149,8 @@ impl Update {
             return None;
         }
         let variance = std::array::from_fn(|k| {
-            let square = sums.sum_of_squares[k] / samples - mean[k] * mean[k];
+            let Some(mean) = mean.get(k) else { return 0.0 };
+            let square = sums.sum_of_squares[k] / samples - mean * mean;
             // Channels vary together, so deviations add up.
             luminance(square.max(Vec3::ZERO).map(f32::sqrt)).powi(2)
         });
@@ -163,7 +163,7 @@ impl Update {
 }
 
 fn watched(coefficients: &[Vec3]) -> [f32; WATCHED] {
-    std::array::from_fn(|k| luminance(coefficients[k]))
+    std::array::from_fn(|k| coefficients.get(k).map_or(0.0, |c| luminance(*c)))
 }
 
 /// The means of one receiver, the quickest first, the estimate last.
@@ -307,11 +307,11 @@ mod tests {
         let sum: Vec<Vec3> = (0..9).map(|k| n * value(k)).collect();
         let sum_of_squares =
             sum.iter().map(|s| s * s / n + Vec3::splat(n * n * noise * noise)).collect();
-        Sums { sum, sum_of_squares, count: COUNT, back_face_fraction: 0.0, mean_distance: 1.0 }
+        Sums { sum, sum_of_squares, count: COUNT, ..Sums::default() }
     }
 
     fn blend(settings: BlendSettings, updates: impl IntoIterator<Item = Sums>) -> Vec<f32> {
-        let mut history = History::new(settings, 1, Order::L2);
+        let mut history = History::new(settings, 1, 9);
         updates
             .into_iter()
             .map(|s| {
@@ -319,6 +319,21 @@ mod tests {
                 history.coefficients(0)[0].x
             })
             .collect()
+    }
+
+    #[test]
+    fn single_sums_are_blended_too() {
+        let mut history = History::new(BlendSettings::default(), 2, 1);
+        let one = |value: f32| Sums {
+            sum: vec![Vec3::splat(value * 4.0)],
+            sum_of_squares: vec![Vec3::splat(value * value * 4.0)],
+            count: 4,
+            ..Sums::default()
+        };
+        history.update(&[one(1.0), one(5.0)]);
+        history.update(&[one(3.0), one(5.0)]);
+        assert_eq!(history.coefficients(0), [Vec3::splat(2.0)]);
+        assert_eq!(history.coefficients(1), [Vec3::splat(5.0)]);
     }
 
     #[test]
@@ -342,7 +357,7 @@ mod tests {
     #[test]
     fn weights_follow_samples() {
         let mut history =
-            History::new(BlendSettings { ratio: 1e-6, significance: f32::INFINITY }, 1, Order::L2);
+            History::new(BlendSettings { ratio: 1e-6, significance: f32::INFINITY }, 1, 9);
         let mut few = sums(1.0, 0.0, 1);
         let scaled = |s: &Sums, n: u32| Sums {
             sum: s.sum.iter().map(|x| x / COUNT as f32 * n as f32).collect(),
@@ -398,7 +413,7 @@ mod tests {
         let settings = BlendSettings::default();
         let after = |expected: bool| {
             let answers = (0..100).map(|receiver| {
-                let mut history = History::new(settings, 1, Order::L2);
+                let mut history = History::new(settings, 1, 9);
                 (0..400).for_each(|t| history.update(&[sums(10.0, 1.0, receiver * 2000 + t)]));
                 if expected {
                     history.expect_change();

@@ -17,7 +17,7 @@ mod world;
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumencast_light::Order;
+use lumencast_light::{LightField, Order};
 use lumencast_scene::Snapshot;
 
 /// One request for light.
@@ -25,6 +25,11 @@ use lumencast_scene::Snapshot;
 pub struct Job {
     /// The scene at the moment to compute.
     pub scene: Arc<Snapshot>,
+    /// The light as it was known before, if paths are to go on in it: the surface that a path ends at
+    /// then also sends what it scatters, of punctual lights and of this field. Each job so adds
+    /// another bounce to what the last one found (the feedback of the first paper). Without it,
+    /// light that is scattered more than `bounces` times is left out.
+    pub previous: Option<Arc<LightField>>,
     /// Points to gather at, each with its budget.
     pub receivers: Arc<[Receiver]>,
     /// Order of the expansion for probes.
@@ -35,25 +40,84 @@ pub struct Job {
     /// Upper limit of one path vertex's contribution (luminance, cd/m²), against fireflies;
     /// infinite for none. The second paper's clamp (4.1.1).
     pub clamp: f32,
+    /// Asks for [`Sums::distances`]: up to how many metres a distance counts. What is farther, or
+    /// nowhere, counts as so far.
+    pub distances: Option<f32>,
     /// Rotates the lattice and seeds the sampler: another tick, other directions. Results depend on
     /// it and on the receivers, never on the number of threads.
     pub seed: u64,
 }
 
+impl Job {
+    /// A job of L2 with three bounces, without clamp, distances, or light from before.
+    pub fn new(scene: Arc<Snapshot>, receivers: impl Into<Arc<[Receiver]>>) -> Self {
+        Self {
+            scene,
+            previous: None,
+            receivers: receivers.into(),
+            order: Order::L2,
+            bounces: 3,
+            clamp: f32::INFINITY,
+            distances: None,
+            seed: 0,
+        }
+    }
+}
+
 /// A point that light arrives at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Receiver {
-    /// World position, metres.
-    pub position: Vec3,
+    /// Where, and from which directions.
+    pub place: Place,
     /// Directions to sample, at least 1.
     pub samples: u32,
 }
 
+impl Receiver {
+    /// A probe at a world position, metres.
+    pub fn probe(position: Vec3, samples: u32) -> Self {
+        Self { place: Place::Probe { position }, samples }
+    }
+}
+
+/// Where light is received.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    /// A point in space that light reaches from everywhere: its sums are coefficients of radiance.
+    Probe {
+        /// World position, metres.
+        position: Vec3,
+    },
+    /// A piece of a surface: its sum is irradiance.
+    Lumel {
+        /// World position of its middle, metres.
+        position: Vec3,
+        /// World unit normal.
+        normal: Vec3,
+        /// Two edges of the parallelogram about the middle that it covers, metres; zero for a point.
+        footprint: [Vec3; 2],
+    },
+}
+
+impl Place {
+    /// Terms of a sample, and so entries of [`Sums::sum`], for probes of an order.
+    pub fn terms(&self, order: Order) -> usize {
+        match self {
+            Self::Probe { .. } => order.coefficients(),
+            Self::Lumel { .. } => 1,
+        }
+    }
+}
+
 /// What arrived at one receiver.
+///
+/// A *term* is what one sample adds: for a probe 4π·Y_lm(ω), one of each of `order.coefficients()`,
+/// directions being spread evenly over the sphere; for a lumel the single π, directions being spread
+/// by the cosine about its normal and origins over its footprint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sums {
-    /// Sum over samples of 4π·L(ω)·Y_lm(ω), `order.coefficients()` entries: divided by `count`, the
-    /// unbiased estimate of the coefficients of arriving radiance.
+    /// Sum over samples of terms times radiance, cd/m²: divided by `count`, the unbiased estimate
+    /// of the coefficients of arriving radiance, or of irradiance in lux.
     pub sum: Vec<Vec3>,
     /// Sum over samples of the squares of the same.
     pub sum_of_squares: Vec<Vec3>,
@@ -61,8 +125,9 @@ pub struct Sums {
     pub count: u32,
     /// Share of the samples that met the back of a surface first: near 1 for probes inside walls.
     pub back_face_fraction: f32,
-    /// Mean distance to the first surface, metres; infinite where every sample left the scene.
-    pub mean_distance: f32,
+    /// Sums over samples of terms times the distance to the first surface, and times its square
+    /// (metres, square metres); empty unless [`Job::distances`] asks for them.
+    pub distances: Vec<[f32; 2]>,
 }
 
 /// A submitted job.

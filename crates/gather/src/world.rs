@@ -79,6 +79,12 @@ impl World {
         world
     }
 
+    /// The largest coordinate of any surface, metres; 0 without any.
+    pub(crate) fn extent(&self) -> f32 {
+        let bounds = self.accel.bounds();
+        if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() }
+    }
+
     fn find_emitters(&mut self, cache: &mut EmissionCache) {
         let mut emitters = emitters::Emitters::default();
         for (index, instance) in (0..).zip(&self.snapshot.instances) {

@@ -42,7 +42,6 @@ fn is_estimate(e: &ProbeEstimate) -> bool {
         && e.sh.iter().all(|c| c.is_finite())
         && is_light(&e.standard_error)
         && (0.0..=1.0).contains(&e.back_face_fraction)
-        && e.mean_distance >= 0.0
 }
 
 /// Gathers and draws at every place, with both models of materials, and scans what comes.
@@ -72,7 +71,7 @@ fn scans_find_what_they_look_for() {
     let mut bad = sound.clone();
     bad.sh[5].z = f32::NAN;
     assert!(!is_estimate(&bad));
-    assert!(!is_estimate(&ProbeEstimate { mean_distance: f32::NAN, ..sound }));
+    assert!(!is_estimate(&ProbeEstimate { back_face_fraction: f32::NAN, ..sound }));
 }
 
 /// Each triangle with three vertices of its own.
@@ -495,5 +494,5 @@ fn a_million_instances() {
     assert!((0.3..0.95).contains(&mean), "cubes are seen, and lit: {mean}");
     let settings = ProbeSettings { samples: 256, lattices: 2, ..ProbeSettings::default() };
     let e = probe_sh(&scene, &[Vec3::splat(49.5)], &settings).unwrap().remove(0);
-    assert!(is_estimate(&e) && e.mean_distance < 50.0, "{e:?}");
+    assert!(is_estimate(&e), "{e:?}");
 }

@@ -38,7 +38,7 @@ pub fn bake(
         let samples = (last - first).max(1) as u32;
         for field in &mut fields {
             let seed = u64::from(pass) << 8 | u64::from(field.id().0);
-            let ticket = gatherer.submit(field.job(scene.clone(), samples, options, seed));
+            let ticket = gatherer.submit(field.job(scene.clone(), None, samples, options, seed));
             if let Some(gathered) = gatherer.wait(ticket) {
                 field.blend(&gathered);
             }

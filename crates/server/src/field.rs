@@ -6,7 +6,7 @@ use glam::{IVec3, Vec3};
 use lumencast_codec::{self as codec, EncodedRegion, ProbeEncoder, UpdateInfo, limits};
 use lumencast_gather::blend::{BlendSettings, History};
 use lumencast_gather::{Gathered, Job, Receiver};
-use lumencast_light::{Grid, Order, ProbeVolume, VolumeId};
+use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
@@ -44,7 +44,7 @@ impl Field {
         Self {
             volume: ProbeVolume::dark(id, grid, order),
             positions: grid.positions().collect(),
-            history: History::new(blend, grid.probe_count(), order),
+            history: History::new(blend, grid.probe_count(), order.coefficients()),
             buried: Buried::new(grid.probe_count()),
             encoder: ProbeEncoder::new(grid.resolution, order),
             update: 0,
@@ -91,14 +91,16 @@ impl Field {
     pub(crate) fn job(
         &self,
         scene: Arc<Snapshot>,
+        previous: Option<Arc<LightField>>,
         samples: u32,
         options: GatherOptions,
         seed: u64,
     ) -> Job {
-        let receivers =
-            self.positions.iter().map(|&position| Receiver { position, samples }).collect();
+        let probe = |&position: &Vec3| Receiver::probe(position, samples);
+        let receivers: Vec<_> = self.positions.iter().map(probe).collect();
         let GatherOptions { bounces, clamp, .. } = options;
-        Job { scene, receivers, order: self.volume.order, bounces, clamp, seed }
+        let order = self.volume.order;
+        Job { previous, order, bounces, clamp, seed, ..Job::new(scene, receivers) }
     }
 
     /// The scene was edited: light may be another from now on.

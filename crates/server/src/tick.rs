@@ -10,7 +10,7 @@ use lumencast_codec::{
 };
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::{Gather, Gathered};
-use lumencast_light::ProbeVolume;
+use lumencast_light::{LightField, ProbeVolume};
 use lumencast_scene::{Edit, Environment, InstanceSource, Scene, Script, Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
@@ -29,6 +29,9 @@ pub struct TickOptions {
     pub samples: SampleRange,
     /// How light is gathered and blended.
     pub gather: GatherOptions,
+    /// Whether paths go on, where they end, in the light of the tick before
+    /// ([`lumencast_gather::Job::previous`]): all bounces for the price of few.
+    pub feedback: bool,
     /// Volumes in place of the scene's own.
     pub volumes: Vec<VolumeSpec>,
     /// Edits at set times.
@@ -44,6 +47,7 @@ impl Default for TickOptions {
             period: 1.0 / 25.0,
             samples: SampleRange::default(),
             gather: GatherOptions::default(),
+            feedback: false,
             volumes: Vec::new(),
             script: None,
             source: String::new(),
@@ -148,6 +152,11 @@ impl Tick {
         self.fields.iter().map(Field::volume)
     }
 
+    /// The same as one field.
+    fn light(&self) -> LightField {
+        LightField::new(self.volumes().cloned().collect())
+    }
+
     /// Seconds from one tick to the next.
     pub fn period(&self) -> f64 {
         self.options.period
@@ -242,12 +251,14 @@ impl Tick {
     /// Light for every field, all fields' jobs under way at once.
     fn gather(&mut self, scene: &Arc<Snapshot>) -> Vec<Gathered> {
         let samples = self.budget.samples();
+        let previous = self.options.feedback.then(|| Arc::new(self.light()));
         let tickets: Vec<_> = self
             .fields
             .iter()
             .map(|field| {
                 let seed = self.number << 8 | u64::from(field.id().0);
-                let job = field.job(scene.clone(), samples, self.options.gather, seed);
+                let job =
+                    field.job(scene.clone(), previous.clone(), samples, self.options.gather, seed);
                 self.gatherer.submit(job)
             })
             .collect();

@@ -13,7 +13,7 @@ use lumencast_scene::{
     Edit, InstanceSource, LightSpec, NodeId, Scene, Script, Transform, VolumeSpec,
 };
 use lumencast_server::{
-    Inbox, Limits, Mail, Outlet, Received, Report, SampleRange, Tick, TickOptions,
+    GatherOptions, Inbox, Limits, Mail, Outlet, Received, Report, SampleRange, Tick, TickOptions,
 };
 
 const PERIOD: f64 = 0.04;
@@ -127,6 +127,20 @@ fn light_follows_an_edit() {
     stepped.step(mail(2, Edit::MoveNode { node: lamp, transform: away }));
     stepped.steps(15);
     assert!(stepped.mean_c0() < 0.5 * after, "{after}, then {}", stepped.mean_c0());
+}
+
+/// With feedback, paths of one bounce bring the light of many.
+#[test]
+fn feedback_adds_the_bounces_that_paths_leave_out() {
+    let light = |bounces, feedback| {
+        let gather = GatherOptions { bounces, ..options().gather };
+        let mut stepped = Stepped::new(TickOptions { feedback, gather, ..options() });
+        stepped.steps(40);
+        stepped.mean_c0()
+    };
+    let (all, alone, fed_back) = (light(24, false), light(1, false), light(1, true));
+    assert!(alone < 0.85 * all, "{alone} {all}");
+    assert!((fed_back / all - 1.0).abs() < 0.05, "{fed_back} {all}");
 }
 
 #[test]

@@ -6,6 +6,7 @@
 //! happens at a vertex is in [`super::vertex`].
 
 use glam::Vec3;
+use lumencast_light::LightField;
 
 use super::vertex::Shader;
 use crate::accel::{Hit, Ray, Stack};
@@ -14,13 +15,16 @@ use crate::world::{Itself, World};
 
 /// Which paths to follow.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Paths {
+pub(crate) struct Paths<'a> {
     /// Scattering events on a path.
     pub(crate) bounces: u32,
     /// Upper limit of the luminance that a vertex adds to scattered light, cd/m².
     pub(crate) clamp: f32,
     /// Scattering events from which on paths may end by chance.
     pub(crate) roulette_from: u32,
+    /// The light that the last surface of a path scatters, beside that of punctual lights; without
+    /// it, that surface only shines itself.
+    pub(crate) previous: Option<&'a LightField>,
 }
 
 /// Where to look from, and where to.
@@ -126,7 +130,7 @@ const AHEAD: usize = 16;
 /// waiting for vertices and texels, which this way are asked for before they are needed.
 pub(crate) struct Integrator<'a> {
     world: &'a World,
-    limits: Paths,
+    limits: Paths<'a>,
     stack: Stack,
     /// Rays traced so far.
     pub(crate) rays: u64,
@@ -137,7 +141,7 @@ pub(crate) struct Integrator<'a> {
 }
 
 impl<'a> Integrator<'a> {
-    pub(crate) fn new(world: &'a World, limits: Paths) -> Self {
+    pub(crate) fn new(world: &'a World, limits: Paths<'a>) -> Self {
         Self {
             world,
             limits,
@@ -147,6 +151,11 @@ impl<'a> Integrator<'a> {
             alive: Vec::new(),
             connections: Vec::new(),
         }
+    }
+
+    /// The largest coordinate of the world, metres.
+    pub(crate) fn extent(&self) -> f32 {
+        self.world.extent()
     }
 
     /// Light arriving at each origin from its direction, scattered at most `bounces` times, in order.

@@ -1,14 +1,13 @@
 //! One job: many paths a receiver, spread over all cores, summed in a fixed order.
 
-use std::f32::consts::PI;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use lumencast_light::sh;
 use rayon::prelude::*;
 
-use super::integrator::{Integrator, Look, Paths};
-use crate::sampling::{Sampler, lattice};
+use super::aim::Aim;
+use super::integrator::{Integrator, Paths};
 use crate::world::World;
 use crate::{Job, Sums};
 
@@ -36,8 +35,8 @@ struct Tile {
 struct TileSums {
     sum: [Vec3; sh::MAX_COEFFICIENTS],
     squares: [Vec3; sh::MAX_COEFFICIENTS],
-    distance: f32,
-    hits: u32,
+    /// Of distances and their squares.
+    distances: [Vec2; sh::MAX_COEFFICIENTS],
     backs: u32,
     rays: u64,
 }
@@ -45,7 +44,12 @@ struct TileSums {
 /// Gathers; `None` when cancelled. Returns the sums and the number of rays.
 pub(super) fn gather(job: &Job, world: &World, watch: &Watch) -> Option<(Vec<Sums>, u64)> {
     let tiles = tiles(job);
-    let paths = Paths { bounces: job.bounces, clamp: job.clamp, roulette_from: u32::MAX };
+    let paths = Paths {
+        bounces: job.bounces,
+        clamp: job.clamp,
+        roulette_from: u32::MAX,
+        previous: job.previous.as_deref(),
+    };
     let integrator = || Integrator::new(world, paths);
     let found: Option<Vec<TileSums>> = tiles
         .par_iter()
@@ -67,7 +71,11 @@ pub(super) fn gather(job: &Job, world: &World, watch: &Watch) -> Option<(Vec<Sum
         while let Some((tile, t)) = rest.next_if(|(tile, _)| tile.receiver == receiver) {
             of_receiver.push((tile.end - tile.first, t));
         }
-        sums.push(reduce(job.order.coefficients(), &of_receiver));
+        sums.push(reduce(
+            job,
+            job.receivers[receiver as usize].place.terms(job.order),
+            &of_receiver,
+        ));
     }
     Some((sums, rays))
 }
@@ -83,57 +91,55 @@ fn tiles(job: &Job) -> Vec<Tile> {
 }
 
 fn trace(job: &Job, tile: &Tile, integrator: &mut Integrator<'_>) -> TileSums {
-    let receiver = &job.receivers[tile.receiver as usize];
-    let turn = lattice::turn(job.seed, tile.receiver);
+    let aim = Aim::new(job, tile.receiver, integrator.extent());
+    let count = job.receivers[tile.receiver as usize].place.terms(job.order);
     let rays_before = integrator.rays;
     let mut t = TileSums {
         sum: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
         squares: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
-        distance: 0.0,
-        hits: 0,
+        distances: [Vec2::ZERO; sh::MAX_COEFFICIENTS],
         backs: 0,
         rays: 0,
     };
     let samples = tile.first..tile.end;
-    let direction = |sample| (turn * lattice::direction(sample, receiver.samples)).normalize();
-    let looks = samples.clone().map(|sample| Look {
-        origin: receiver.position,
-        direction: direction(sample),
-        sampler: Sampler::new(job.seed, tile.receiver, sample),
-    });
+    let looks = samples.clone().map(|sample| aim.look(sample));
     for (seen, sample) in integrator.radiance(looks).zip(samples) {
-        let direction = direction(sample);
         let radiance = seen.radiance();
-        let basis = sh::basis(job.order, direction);
-        for (k, y) in basis.iter().enumerate().take(job.order.coefficients()) {
-            let term = 4.0 * PI * y * radiance;
+        let terms = aim.terms(sample);
+        let terms = &terms[..count];
+        for (k, factor) in terms.iter().enumerate() {
+            let term = *factor * radiance;
             t.sum[k] += term;
             t.squares[k] += term * term;
         }
-        if seen.distance.is_finite() {
-            t.distance += seen.distance;
-            t.hits += 1;
-            t.backs += u32::from(seen.back);
+        if let Some(farthest) = job.distances {
+            let distance = seen.distance.min(farthest);
+            for (sum, factor) in t.distances.iter_mut().zip(terms) {
+                *sum += *factor * Vec2::new(distance, distance * distance);
+            }
         }
+        t.backs += u32::from(seen.back);
     }
     t.rays = integrator.rays - rays_before;
     t
 }
 
 /// Adds a receiver's tiles up, in order.
-fn reduce(coefficients: usize, tiles: &[(u32, &TileSums)]) -> Sums {
+fn reduce(job: &Job, terms: usize, tiles: &[(u32, &TileSums)]) -> Sums {
     let add = |of: &dyn Fn(&TileSums) -> Vec3| {
         tiles.iter().map(|(_, t)| of(t).as_dvec3()).sum::<DVec3>().as_vec3()
     };
+    let distances = |k: usize| {
+        let sum: DVec2 = tiles.iter().map(|(_, t)| t.distances[k].as_dvec2()).sum();
+        sum.as_vec2().to_array()
+    };
     let count: u32 = tiles.iter().map(|(n, _)| n).sum();
-    let total = |of: fn(&TileSums) -> u32| tiles.iter().map(|(_, t)| of(t)).sum::<u32>();
-    let hits = total(|t| t.hits);
-    let distance: f64 = tiles.iter().map(|(_, t)| f64::from(t.distance)).sum();
+    let backs: u32 = tiles.iter().map(|(_, t)| t.backs).sum();
     Sums {
-        sum: (0..coefficients).map(|k| add(&|t| t.sum[k])).collect(),
-        sum_of_squares: (0..coefficients).map(|k| add(&|t| t.squares[k])).collect(),
+        sum: (0..terms).map(|k| add(&|t| t.sum[k])).collect(),
+        sum_of_squares: (0..terms).map(|k| add(&|t| t.squares[k])).collect(),
         count,
-        back_face_fraction: total(|t| t.backs) as f32 / count.max(1) as f32,
-        mean_distance: if hits > 0 { (distance / f64::from(hits)) as f32 } else { f32::INFINITY },
+        back_face_fraction: backs as f32 / count.max(1) as f32,
+        distances: job.distances.map_or_else(Vec::new, |_| (0..terms).map(distances).collect()),
     }
 }

@@ -1,5 +1,6 @@
 //! Gathering by path tracing.
 
+mod aim;
 pub(crate) mod integrator;
 mod job;
 #[cfg(test)]

@@ -10,7 +10,7 @@ use lumencast_testkit::scenes::{Stage, lambert};
 
 use super::integrator::{Integrator, Look, Paths};
 use super::*;
-use crate::Receiver as Probe;
+use crate::Receiver;
 use crate::sampling::Sampler;
 
 const BLACK: Vec3 = Vec3::ZERO;
@@ -29,7 +29,7 @@ fn look(
         Kernel::detect(),
         &mut WorldCache::default(),
     );
-    let paths = Paths { bounces, clamp, roulette_from: u32::MAX };
+    let paths = Paths { bounces, clamp, roulette_from: u32::MAX, previous: None };
     let mut integrator = Integrator::new(&world, paths);
     let (groups, samples) = (32, 512);
     let means: Vec<Vec3> = (0..groups)
@@ -262,16 +262,9 @@ fn shading_normals_make_no_light() {
 }
 
 fn job(scene: &Arc<Snapshot>, seed: u64) -> Job {
-    let probe =
-        |k: u32| Probe { position: Vec3::new(0.1 * k as f32, 0.5, 0.0), samples: 1 + 40 * k };
-    Job {
-        scene: scene.clone(),
-        receivers: (0..9).map(probe).collect(),
-        order: Order::L3,
-        bounces: 2,
-        clamp: f32::INFINITY,
-        seed,
-    }
+    let probe = |k: u32| Receiver::probe(Vec3::new(0.1 * k as f32, 0.5, 0.0), 1 + 40 * k);
+    let receivers: Vec<_> = (0..9).map(probe).collect();
+    Job { order: Order::L3, bounces: 2, seed, ..Job::new(scene.clone(), receivers) }
 }
 
 fn lit_room() -> Arc<Snapshot> {
@@ -298,7 +291,7 @@ fn paths_do_not_depend_on_each_other() {
     let scene = lit_room();
     let world =
         World::new(scene, MaterialModel::Full, Kernel::detect(), &mut WorldCache::default());
-    let paths = Paths { bounces: 4, clamp: f32::INFINITY, roulette_from: 2 };
+    let paths = Paths { bounces: 4, clamp: f32::INFINITY, roulette_from: 2, previous: None };
     let look = |sample| {
         let mut sampler = Sampler::new(3, 0, sample);
         let direction = crate::sampling::sphere(sampler.square());
@@ -339,8 +332,8 @@ fn jobs_run_beside_each_other_and_can_be_given_up() {
     let scene = lit_room();
     let mut tracer = tracer(2);
     let mut huge = job(&scene, 1);
-    huge.receivers = vec![Probe { position: Vec3::ZERO, samples: u32::MAX }; 4].into();
-    huge.receivers = Arc::from([Probe { position: Vec3::ZERO, samples: 20_000_000 }]);
+    huge.receivers = vec![Receiver::probe(Vec3::ZERO, u32::MAX); 4].into();
+    huge.receivers = Arc::from([Receiver::probe(Vec3::ZERO, 20_000_000)]);
     let endless = tracer.submit(huge.clone());
     let queued = tracer.submit(job(&scene, 2));
     let wanted = tracer.submit(job(&scene, 3));
@@ -379,7 +372,7 @@ fn lambert_model_takes_only_base_colour() {
     stage.environment(Environment::Constant { radiance: Vec3::ONE });
     let model = MaterialModel::Lambert;
     let world = World::new(stage.snapshot(), model, Kernel::detect(), &mut WorldCache::default());
-    let paths = Paths { bounces: 1, clamp: f32::INFINITY, roulette_from: u32::MAX };
+    let paths = Paths { bounces: 1, clamp: f32::INFINITY, roulette_from: u32::MAX, previous: None };
     let mut integrator = Integrator::new(&world, paths);
     for (origin, direction) in [(Vec3::Y, down()), (Vec3::NEG_Y, -down())] {
         let look = |s| Look { origin, direction, sampler: Sampler::new(1, 1, s) };

@@ -1,6 +1,7 @@
 //! What happens at the vertices of paths: emission, light reached for, scattering.
 
 use glam::{Mat3, Vec3};
+use lumencast_light::OffsetPolicy;
 
 use super::integrator::{Connection, Part, Path, Paths, Segment};
 use crate::accel::Ray;
@@ -13,7 +14,7 @@ use crate::world::{World, itself};
 /// What happens where a path's ray has arrived.
 pub(super) struct Shader<'a> {
     pub(super) world: &'a World,
-    pub(super) limits: &'a Paths,
+    pub(super) limits: &'a Paths<'a>,
     /// Scattering events so far.
     pub(super) depth: u32,
     /// Lights to reach for.
@@ -44,17 +45,23 @@ impl Shader<'_> {
         }
         let emitted = path.throughput * self.emission(&point, &path.segment);
         path.seen.add(part, self.limited(depth, emitted));
-        if depth == self.limits.bounces {
+        let is_last = depth == self.limits.bounces;
+        if is_last && self.limits.previous.is_none() {
             return None;
         }
         let (bsdf, frame) = point.scattering(world.frames(hit.instance), world.model)?;
         let view = -path.segment.ray.direction;
         let vertex = Vertex { point: &point, bsdf, frame, model: world.model, view };
 
-        self.punctual(&vertex, index, path);
+        self.punctual(&vertex, index, path, is_last);
+        if is_last {
+            let light = path.throughput * self.previous(&vertex, &mut path.sampler);
+            path.seen.add(Part::Indirect, self.limited(depth + 1, light));
+            return None;
+        }
         self.area(&vertex, index, path);
-        if depth + 1 == self.limits.bounces && world.lights.are_points() {
-            // The last ray could only meet a source.
+        let only_sources = depth + 1 == self.limits.bounces && self.limits.previous.is_none();
+        if only_sources && world.lights.are_points() {
             return None;
         }
         let (next, weight) = vertex.scatter(&mut path.sampler)?;
@@ -94,13 +101,17 @@ impl Shader<'_> {
         power_heuristic(segment.pdf, other) * emitted
     }
 
-    /// Reaches for one punctual light.
-    fn punctual(&mut self, vertex: &Vertex<'_>, index: u32, path: &mut Path) {
+    /// Reaches for one punctual light; from the last vertex no scattered ray will meet it by chance.
+    fn punctual(&mut self, vertex: &Vertex<'_>, index: u32, path: &mut Path, is_last: bool) {
         let choice = path.sampler.number();
         let at = vertex.point.position;
         let lights = &self.world.lights.punctual;
         let on_disc = || path.sampler.square();
-        let Some((incident, light)) = lights.choose(at, choice, on_disc, |l| vertex.eval(l)) else {
+        let eval = |l| {
+            let found = vertex.eval(l);
+            Scatter { pdf: if is_last { 0.0 } else { found.pdf }, ..found }
+        };
+        let Some((incident, light)) = lights.choose(at, choice, on_disc, eval) else {
             return;
         };
         let light = self.limited(self.depth + 1, path.throughput * light);
@@ -155,6 +166,19 @@ impl Shader<'_> {
             ends: [Some(itself(&vertex.point.hit)), target],
             key: path.key(self.depth) + 2,
         });
+    }
+
+    /// What a vertex scatters of the light that was known before. Negative lobes of the field are kept:
+    /// cut off here, light would be added at every bounce.
+    fn previous(&self, vertex: &Vertex<'_>, sampler: &mut Sampler) -> Vec3 {
+        let Some((next, weight)) = vertex.scatter(sampler) else { return Vec3::ZERO };
+        let direction = next.ray.direction;
+        let normal = vertex.frame.z_axis;
+        let side = normal * 1.0f32.copysign(normal.dot(direction));
+        let field = self.limits.previous;
+        let arriving =
+            field.and_then(|f| f.sample(vertex.point.position, side, OffsetPolicy::HalfCell));
+        arriving.map_or(Vec3::ZERO, |light| weight * light.radiance(direction))
     }
 
     /// Scattered light held to the limit; what the receiver sees itself is left alone. A value that

@@ -158,7 +158,12 @@ impl Renderer {
         let tiles = tiles_across * size.y.div_ceil(TILE);
         let (done, stopped, rays) = (AtomicU64::new(0), AtomicBool::new(false), AtomicU64::new(0));
         let s = &self.settings;
-        let paths = Paths { bounces: s.bounces, clamp: s.clamp, roulette_from: s.roulette_from };
+        let paths = Paths {
+            bounces: s.bounces,
+            clamp: s.clamp,
+            roulette_from: s.roulette_from,
+            previous: None,
+        };
         let integrator = || Integrator::new(&self.world, paths);
         let tile = |integrator: &mut Integrator<'_>, tile: u32| {
             if stopped.load(Ordering::Relaxed) {

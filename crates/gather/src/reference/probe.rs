@@ -52,8 +52,6 @@ pub struct ProbeEstimate {
     pub standard_error: Vec<Vec3>,
     /// As in [`Sums::back_face_fraction`].
     pub back_face_fraction: f32,
-    /// As in [`Sums::mean_distance`], of one of the lattices.
-    pub mean_distance: f32,
 }
 
 /// Estimates the light at points, in order.
@@ -69,16 +67,15 @@ pub fn probe_sh(
     let mut tracer = CpuPathTracer::new(options)?;
     let samples = settings.samples.max(1);
     let receivers: Arc<[_]> =
-        points.iter().map(|&position| Receiver { position, samples }).collect();
+        points.iter().map(|&position| Receiver::probe(position, samples)).collect();
     let mut lattices = Vec::new();
     for lattice in 0..settings.lattices.max(2) {
         let ticket = tracer.submit(Job {
-            scene: scene.clone(),
-            receivers: receivers.clone(),
             order: settings.order,
             bounces: settings.bounces,
             clamp: settings.clamp,
             seed: crate::sampling::mix2(settings.seed, u64::from(lattice)),
+            ..Job::new(scene.clone(), receivers.clone())
         });
         let gathered =
             tracer.wait(ticket).ok_or_else(|| std::io::Error::other("gathering ended early"))?;
@@ -105,6 +102,5 @@ fn combine(lattices: &[&Sums]) -> ProbeEstimate {
         standard_error,
         back_face_fraction: (lattices.iter().map(|s| f64::from(s.back_face_fraction)).sum::<f64>()
             / n) as f32,
-        mean_distance: lattices[0].mean_distance,
     }
 }

@@ -10,7 +10,7 @@ use crate::bsdf::{Bsdf, Substance, frame};
 use texture::{Coding, interpolate_normal, interpolate_uv, sample};
 
 /// γ(n) of Higham: bound of the relative error of n roundings.
-const fn gamma(n: f32) -> f32 {
+pub(crate) const fn gamma(n: f32) -> f32 {
     let e = n * f32::EPSILON * 0.5;
     e / (1.0 - e)
 }

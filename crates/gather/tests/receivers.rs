@@ -1,0 +1,215 @@
+//! What jobs may ask for beside the radiance of probes: irradiance of lumels, distances, and light
+//! from before. Against closed forms, each of which must refuse a wrong answer.
+
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+use glam::{Quat, UVec3, Vec3};
+use lumencast_gather::path_trace::{CpuPathTracer, Options};
+use lumencast_gather::{Gather, Job, Place, Receiver, Sums};
+use lumencast_light::{Grid, LightField, OffsetPolicy, Order, ProbeVolume, VolumeId};
+use lumencast_scene::{Environment, Light, LightKind, Material, Snapshot};
+use lumencast_testkit::scenes::{Stage, lambert};
+
+const BLACK: Vec3 = Vec3::ZERO;
+/// ∫ Y₀₀ dω = 2√π.
+const C0: f32 = 3.544_907_7;
+const Y1: f32 = 0.488_602_5;
+
+fn gather(job: Job) -> Vec<Sums> {
+    let mut tracer = CpuPathTracer::new(Options::default()).unwrap();
+    let ticket = tracer.submit(job);
+    tracer.wait(ticket).unwrap().sums
+}
+
+fn lumel(position: Vec3, normal: Vec3, footprint: [Vec3; 2]) -> Receiver {
+    Receiver { place: Place::Lumel { position, normal, footprint }, samples: 1 << 16 }
+}
+
+/// Irradiance of a lumel whose light comes straight from sources.
+fn irradiance(scene: &Arc<Snapshot>, lumel: Receiver) -> f32 {
+    let sums = gather(Job { bounces: 0, ..Job::new(scene.clone(), [lumel]) }).remove(0);
+    assert_eq!((sums.sum.len(), sums.sum_of_squares.len(), sums.count), (1, 1, lumel.samples));
+    assert_eq!(sums.back_face_fraction, 0.0);
+    sums.sum[0].x / sums.count as f32
+}
+
+#[track_caller]
+fn check(found: f32, expected: f32, wrong: f32, tolerance: f32) {
+    let near = |value: f32| (found - value).abs() <= tolerance * value.abs();
+    assert!(near(expected), "{found}, expected {expected}");
+    assert!(!near(wrong), "this check cannot fail: it takes {wrong} too");
+}
+
+/// π, whichever way a lumel faces; a surface that it lies on takes nothing away, near the origin or
+/// far from it, large or small.
+#[test]
+fn lumels_under_a_constant_sky() {
+    for position in [BLACK, Vec3::new(1234.5, -67.8, 9e3)] {
+        for normal in [Vec3::Y, Vec3::new(0.3, -0.8, 0.1).normalize()] {
+            for size in [0.0, 0.01, 1.0] {
+                let (u, v) = normal.any_orthonormal_pair();
+                let mut stage = Stage::default();
+                stage.environment(Environment::Constant { radiance: Vec3::ONE });
+                let black = Material { double_sided: true, ..lambert(BLACK, BLACK) };
+                let black = stage.material(black);
+                stage.quad(position - 50.0 * (u + v), 100.0 * u, 100.0 * v, black);
+                let lumel = lumel(position, normal, [size * u, size * v]);
+                check(irradiance(&stage.snapshot(), lumel), PI, 2.0 * PI, 1e-5);
+            }
+        }
+    }
+}
+
+/// Irradiance of unit radiance from a rectangle, of which one corner lies straight above: `a` and `b`
+/// are its sides over its height, as are their signs.
+fn corner(a: f32, b: f32) -> f32 {
+    let part = |a: f32, b: f32| {
+        let root = (1.0 + a * a).sqrt();
+        a / root * (b / root).atan()
+    };
+    0.5 * (part(a, b) + part(b, a))
+}
+
+/// A rectangle of light above a floor, from a point, and over all of a footprint.
+#[test]
+fn lumels_under_a_rectangle_of_light() {
+    let (half, height) = (0.3, 0.5);
+    let mut stage = Stage::default();
+    let lamp = stage.material(lambert(BLACK, Vec3::ONE));
+    let side = 2.0 * half;
+    stage.quad(Vec3::new(-half, height, -half), Vec3::X * side, Vec3::Z * side, lamp);
+    let scene = stage.snapshot();
+    let at = |x: f32, z: f32| {
+        let ends = |p: f32| [(half - p) / height, (half + p) / height];
+        let corners = ends(x).map(|a| ends(z).map(|b| corner(a, b)));
+        corners.iter().flatten().sum::<f32>()
+    };
+    let place = Vec3::new(0.25, 0.0, 0.1);
+    let point = at(place.x, place.z);
+    check(irradiance(&scene, lumel(place, Vec3::Y, [BLACK; 2])), point, 1.02 * point, 3e-3);
+
+    let footprint = [Vec3::new(1.0, 0.0, 0.4), Vec3::new(0.0, 0.0, 0.8)];
+    let steps = || (0..200).map(|i| (i as f32 + 0.5) / 200.0 - 0.5);
+    let mean = steps().flat_map(|u| {
+        steps().map(move |v| place + u * footprint[0] + v * footprint[1]).map(|p| at(p.x, p.z))
+    });
+    let mean = mean.sum::<f32>() / 4e4;
+    check(irradiance(&scene, lumel(place, Vec3::Y, footprint)), mean, point, 1e-2);
+}
+
+/// Above an endless plane at height h, distances counted up to D: below they are h/cos θ.
+#[test]
+fn distances_have_their_moments() {
+    let (h, far) = (2.0f32, 10.0f32);
+    let mut stage = Stage::default();
+    let floor = stage.material(lambert(Vec3::ONE, BLACK));
+    stage.quad(Vec3::new(-50.0, 0.0, 50.0), Vec3::X * 100.0, Vec3::NEG_Z * 100.0, floor);
+    let probe = Receiver::probe(Vec3::Y * h, 1 << 14);
+    let lumel = lumel(Vec3::Y * h, Vec3::NEG_Y, [BLACK; 2]);
+    let job = Job { bounces: 0, ..Job::new(stage.snapshot(), [probe, lumel]) };
+    assert!(gather(job.clone())[0].distances.is_empty(), "nobody asked");
+    let sums = gather(Job { distances: Some(far), ..job });
+    let mean = |receiver: usize, k: usize, moment: usize| {
+        sums[receiver].distances[k][moment] / sums[receiver].count as f32
+    };
+    assert_eq!((sums[0].distances.len(), sums[1].distances.len()), (9, 1));
+    // ∫ min(h/μ, D)ⁿ μᵏ dμ from 0 to 1, by n and k.
+    let (d1, d1_mu) = (h + h * (far / h).ln(), h - h * h / (2.0 * far));
+    let (d2, d2_mu) = (2.0 * h * far - h * h, h * h * (0.5 + (far / h).ln()));
+    let y0 = C0 / (4.0 * PI);
+    check(mean(0, 0, 0), 2.0 * PI * y0 * (far + d1), C0 * d1, 2e-3);
+    check(mean(0, 0, 1), 2.0 * PI * y0 * (far * far + d2), C0 * d2, 2e-3);
+    check(mean(0, 1, 0), 2.0 * PI * Y1 * (0.5 * far - d1_mu), 2.0 * PI * Y1 * d1_mu, 2e-3);
+    check(mean(1, 0, 0), 2.0 * PI * d1_mu, 2.0 * PI * d1, 3e-3);
+    check(mean(1, 0, 1), 2.0 * PI * d2_mu, 2.0 * PI * d2, 3e-3);
+}
+
+/// Eight probes in a box about the origin.
+fn grid(size: Vec3) -> Grid {
+    Grid { center: BLACK, rotation: Quat::IDENTITY, size, resolution: UVec3::splat(2) }
+}
+
+/// What a job found for the probes of a [`grid`].
+fn field(size: Vec3, sums: &[Sums]) -> Arc<LightField> {
+    let mut volume = ProbeVolume::dark(VolumeId(0), grid(size), Order::L2);
+    for (i, sums) in sums.iter().enumerate() {
+        for (c, sum) in volume.probe_mut(i).iter_mut().zip(&sums.sum) {
+            *c = sum / sums.count as f32;
+        }
+    }
+    Arc::new(LightField::new(vec![volume]))
+}
+
+/// The same radiance everywhere.
+fn uniform(radiance: f32) -> Arc<LightField> {
+    let mut sum = vec![BLACK; 9];
+    sum[0] = Vec3::splat(C0 * radiance);
+    field(Vec3::ONE, &vec![Sums { sum, count: 1, ..Sums::default() }; 8])
+}
+
+fn lamp(radius: f32, intensity: f32) -> Light {
+    Light { kind: LightKind::Point { radius }, color: Vec3::ONE, intensity, range: None }
+}
+
+/// In a closed room each job adds a bounce to the last one's light, whether it begins at the walls or
+/// at a lamp: in the end 1/(1 − ρ) of what was there first.
+#[test]
+fn bounces_add_up_from_job_to_job() {
+    let (albedo, radius, size) = (0.7, 2.0, Vec3::splat(2.0));
+    for emission in [1.0, 0.0] {
+        let mut stage = Stage::default();
+        let wall = stage.material(lambert(Vec3::splat(albedo), Vec3::splat(emission)));
+        stage.sphere(BLACK, -radius, 64, wall);
+        let intensity = 3.0 * (1.0 - emission);
+        stage.light(lamp(0.0, intensity), BLACK, Vec3::X);
+        let first = emission + albedo * intensity / (PI * radius * radius);
+        let probes: Arc<[_]> = grid(size).positions().map(|p| Receiver::probe(p, 256)).collect();
+        let light = (0..30).fold(uniform(0.0), |before, seed| {
+            let job = Job { bounces: 0, seed, ..Job::new(stage.snapshot(), probes.clone()) };
+            field(size, &gather(Job { previous: Some(before), ..job }))
+        });
+        let found = light.sample(BLACK, BLACK, OffsetPolicy::None).unwrap().coefficients[0].x;
+        check(found, C0 * first / (1.0 - albedo), C0 * first * (1.0 + albedo), 5e-3);
+    }
+}
+
+/// White and smooth surfaces in a field of 1 under a sky of 1 cannot be seen, and those that the field
+/// lights alone reflect nothing but it.
+#[test]
+fn the_last_surface_reflects_the_light_from_before() {
+    let smooth = Material { metallic: 0.0, roughness: 0.0, ..Material::default() };
+    for material in
+        [lambert(Vec3::ONE, BLACK), smooth.clone(), Material { transmission: 1.0, ..smooth }]
+    {
+        let mut stage = Stage::default();
+        stage.environment(Environment::Constant { radiance: Vec3::ONE });
+        let material = stage.material(material);
+        stage.quad(Vec3::new(-50.0, 0.0, 50.0), Vec3::X * 100.0, Vec3::NEG_Z * 100.0, material);
+        let at = Receiver::probe(Vec3::Y, 4096);
+        let seen = |radiance| {
+            let previous = Some(uniform(radiance));
+            let job = Job { bounces: 0, previous, ..Job::new(stage.snapshot(), [at]) };
+            let sums = gather(job).remove(0);
+            sums.sum[0].x / sums.count as f32
+        };
+        check(seen(1.0), C0, seen(0.9), 3e-3);
+    }
+}
+
+/// A lamp with a size lights the last surface as it lights those before: ρI cos³θ/πh² under it.
+#[test]
+fn the_last_surface_is_lit_by_lamps_with_a_size() {
+    let (albedo, height, intensity) = (0.6, 0.7, 50.0);
+    let mut stage = Stage::default();
+    let floor = stage.material(lambert(Vec3::splat(albedo), BLACK));
+    stage.quad(Vec3::new(-2e3, 0.0, 2e3), Vec3::X * 4e3, Vec3::NEG_Z * 4e3, floor);
+    stage.light(lamp(0.6, intensity), Vec3::Y * height, Vec3::X);
+    let previous = Some(uniform(0.0));
+    let at = Receiver::probe(Vec3::Y * height, 1 << 15);
+    let sums = gather(Job { bounces: 0, previous, ..Job::new(stage.snapshot(), [at]) }).remove(0);
+    let peak = albedo * intensity / (PI * height * height);
+    // ∫ cos³θ dω = 2π/4.
+    let expected = C0 / (4.0 * PI) * peak * 0.5 * PI;
+    check(sums.sum[0].x / sums.count as f32, expected, 0.95 * expected, 1e-2);
+}
