@@ -98,11 +98,10 @@ describe('the page', () => {
       }
       await light.edit({ edit: 'move_node', node, translation: home });
       await light.edit({ edit: 'set_light', node, intensity });
-      return moves.sort((a, b) => a - b);
+      return moves;
     });
     console.log(`the light changed ${moves.map((ms) => ms.toFixed(0)).join(', ')} ms after a lamp was moved`);
-    // The middle one: on a busy machine a single picture can take half a second.
-    expect(moves[1]).toBeLessThan(1000);
+    for (const ms of moves) expect(ms).toBeLessThan(1000);
   }, 90_000);
 
   it('keeps the picture when the server dies, and goes on when it is back', async () => {
