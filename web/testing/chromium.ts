@@ -23,5 +23,10 @@ export const chromiumProgram = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr
 /** Starts {@link chromiumProgram}; an error where there is none. */
 export function launchBrowser(...flags: string[]): Promise<Browser> {
   if (!chromiumProgram) throw new Error('the test needs Chromium; CHROMIUM names another place for it');
-  return chromium.launch({ executablePath: chromiumProgram, headless: true, args: [...FLAGS, ...flags] });
+  return launchProgram(chromiumProgram, ...flags);
+}
+
+/** Starts a program that is Chromium, or becomes it. */
+export function launchProgram(program: string, ...flags: string[]): Promise<Browser> {
+  return chromium.launch({ executablePath: program, headless: true, args: [...FLAGS, ...flags] });
 }

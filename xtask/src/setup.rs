@@ -60,6 +60,14 @@ const PACKAGES: &[Package] = &[
         present: || runs("openssl", "version"),
     },
     Package {
+        name: "iproute2",
+        release: Release::Stable,
+        purpose: Purpose::Test,
+        why: "makes the slow link of the browser test",
+        optional: false,
+        present: || runs("tc", "-V"),
+    },
+    Package {
         name: "python3-pip",
         release: Release::Stable,
         purpose: Purpose::Test,
@@ -145,7 +153,7 @@ fn install_packages(purpose: Purpose) -> Result<()> {
         return Ok(());
     }
     let source = if backports.is_empty() { None } else { backports_source(&package_sources()) };
-    if output("id", &["-u"]).is_none_or(|id| id.trim() != "0") {
+    if !is_root() {
         let commands = commands(&stable, &backports, source.as_deref());
         println!("\nPaste this into a shell of root (`su -` or `sudo -i`), and start again:\n");
         println!("{commands}");
@@ -219,6 +227,11 @@ fn backports_source(sources: &str) -> Option<String> {
         "Types: deb\nURIs: {mirror}\nSuites: bookworm-backports\nComponents: main\n\
          Signed-By: /usr/share/keyrings/debian-archive-keyring.gpg\n"
     ))
+}
+
+/// Whether this process may do anything on this machine.
+pub(crate) fn is_root() -> bool {
+    output("id", &["-u"]).is_some_and(|id| id.trim() == "0")
 }
 
 fn apt(args: &[&str]) -> std::process::Command {

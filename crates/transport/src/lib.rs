@@ -37,6 +37,7 @@ mod broadcast;
 mod client;
 mod error;
 mod http;
+mod in_order;
 mod listen;
 mod origin_check;
 mod quic;
@@ -45,6 +46,8 @@ mod server;
 mod session;
 mod tcp;
 mod tls;
+#[cfg(target_os = "linux")]
+mod unsent;
 mod websocket;
 
 use std::time::Duration;

@@ -14,6 +14,8 @@ use tokio_rustls::TlsAcceptor;
 
 use crate::http::Front;
 use crate::session::{Failure, HANDSHAKE};
+#[cfg(target_os = "linux")]
+use crate::unsent;
 
 /// How long to wait after a connection could not be accepted, which is usually for want of file
 /// descriptors.
@@ -56,6 +58,8 @@ async fn connection(
     // Else the end of each frame waits until the client has acknowledged its beginning.
     stream.set_nodelay(true)?;
     let peer = Peer { remote, stats: stats(&stream) };
+    #[cfg(target_os = "linux")]
+    let stream = unsent::Limited::new(stream)?;
     match tls {
         Some(tls) => {
             let stream = tokio::time::timeout(HANDSHAKE, tls.accept(stream)).await??;

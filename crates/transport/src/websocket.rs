@@ -10,6 +10,7 @@ use moq_relay::auth;
 use qmux::ws::tokio_tungstenite::WebSocketStream;
 use qmux::ws::tungstenite::{handshake, protocol::Role};
 
+use crate::in_order;
 use crate::session::{Ask, Backend, Failure, MAX_STREAMS};
 use crate::tcp::Peer;
 
@@ -65,7 +66,7 @@ async fn session(
     backend: Backend,
     lease: auth::Lease,
 ) -> Result<(), Failure> {
-    let io = TokioIo::new(on_upgrade.await?);
+    let (io, taken) = in_order::Socket::new(TokioIo::new(on_upgrade.await?));
     let socket = WebSocketStream::from_raw_socket(io, Role::Server, None).await;
     let mut config = qmux::Config::default();
     config.max_streams_bidi = MAX_STREAMS.into();
@@ -78,7 +79,7 @@ async fn session(
     if let Some(stats) = peer.stats {
         upgraded = upgraded.with_socket_stats(stats);
     }
-    backend.serve(upgraded.accept(), lease).await
+    backend.serve(in_order::Session::new(upgraded.accept(), taken), lease).await
 }
 
 /// The first protocol of ours that the client offers: a MoQ version, by the framing it rides on.

@@ -231,7 +231,7 @@ class LiveSession implements Session, Sink {
     // Tracks of a former epoch or set of fields are read no more.
     this.reading?.close();
     this.meter.restart();
-    this.reading = new Reading(link, this.cache.catalog, this);
+    this.reading = new Reading(link, this.cache.catalog, this, now);
     this.reading.setCamera(this.camera);
     this.reading.adapt(now);
     this.outbox.connected((bytes) => link.sendEdit(bytes), now);

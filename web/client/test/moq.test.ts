@@ -10,7 +10,7 @@ function frame(value: number): Group.Frame {
 }
 
 /** Reads as over a connection, which holds a handle of its own. */
-function read(broadcast: () => Broadcast.Producer) {
+function read(broadcast: () => Broadcast.Producer, options = OPTIONS) {
   const held = new Map<Broadcast.Producer, Broadcast.Consumer>();
   const consume = () => {
     const base = held.get(broadcast()) ?? broadcast().consume();
@@ -18,7 +18,7 @@ function read(broadcast: () => Broadcast.Producer) {
     return base.clone();
   };
   const frames: number[] = [];
-  const reader = new MoqReader(consume, 'light', OPTIONS, (bytes) => frames.push(bytes[0]));
+  const reader = new MoqReader(consume, 'light', options, (bytes) => frames.push(bytes[0]));
   return { reader, frames };
 }
 
@@ -37,6 +37,40 @@ describe('a reader', () => {
     second.close();
     track.appendGroup().writeFrame(frame(4));
     await vi.waitFor(() => expect(frames).toEqual([1, 2, 3, 4]));
+    reader.close();
+    broadcast.close();
+  });
+
+  it('does not wait for a group that is held up when newer ones have come', async () => {
+    const broadcast = new Broadcast.Producer();
+    const track = broadcast.createTrack('light');
+    const { reader, frames } = read(() => broadcast);
+    const heldUp = track.appendGroup();
+    heldUp.writeFrame(frame(1));
+    await vi.waitFor(() => expect(frames).toEqual([1]));
+    const alsoHeldUp = track.appendGroup();
+    const newest = track.appendGroup();
+    newest.writeFrame(frame(4));
+    await vi.waitFor(() => expect(frames).toEqual([1, 4]));
+    heldUp.writeFrame(frame(2));
+    alsoHeldUp.writeFrame(frame(3));
+    newest.writeFrame(frame(5));
+    await vi.waitFor(() => expect(frames).toEqual([1, 4, 5]));
+    reader.close();
+    broadcast.close();
+  });
+
+  it('waits for a group that is held up as long as it was told to', async () => {
+    const broadcast = new Broadcast.Producer();
+    const track = broadcast.createTrack('light');
+    const { reader, frames } = read(() => broadcast, { ...OPTIONS, maxAge: 200 });
+    const heldUp = track.appendGroup();
+    heldUp.writeFrame(frame(1));
+    track.appendGroup().writeFrame(frame(3));
+    await new Promise((resolve) => setTimeout(resolve, 50));
+    heldUp.writeFrame(frame(2));
+    await vi.waitFor(() => expect(frames).toEqual([1, 2]));
+    await vi.waitFor(() => expect(frames).toEqual([1, 2, 3]));
     reader.close();
     broadcast.close();
   });

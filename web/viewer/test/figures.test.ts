@@ -40,7 +40,7 @@ describe('the delay from the end of a tick to the update in a page', () => {
     async (transport) => {
       // Fewer samples than there is time for: queueing behind the tracer is no part of the way.
       const server = await Server.start(program, 'cornell', await freePort(), ['--samples', '16'], {
-        RUST_LOG: 'warn,lumencast_server=debug',
+        environment: { RUST_LOG: 'warn,lumencast_server=debug' },
       });
       try {
         const page = await openPage(browser, server.address, VIEWPORT, { transport });

@@ -36,6 +36,15 @@ export function freePort(): Promise<number> {
   });
 }
 
+/** Where and how a server runs, if otherwise than usual. */
+interface Surroundings {
+  readonly environment?: Readonly<Record<string, string>>;
+  /** Address to listen at. */
+  readonly host?: string;
+  /** Words before the program that start it elsewhere. */
+  readonly inside?: readonly string[];
+}
+
 /** A running `lumencast serve`, of which only this process is ever killed. */
 export class Server {
   /** Where its page is, by its own words. */
@@ -52,9 +61,11 @@ export class Server {
     scene: string,
     port: number,
     options: readonly string[],
-    environment: Readonly<Record<string, string>> = {},
+    { environment = {}, host = '127.0.0.1', inside = [] }: Surroundings = {},
   ): Promise<Server> {
-    const child = spawn(program, ['serve', scene, '--listen', `127.0.0.1:${port}`, ...options], {
+    const listen = ['--listen', `${host}:${port}`];
+    const [first, ...words] = [...inside, program, 'serve', scene, ...listen, ...options];
+    const child = spawn(first, words, {
       stdio: ['ignore', 'pipe', 'pipe'],
       env: { ...process.env, ...environment },
     });

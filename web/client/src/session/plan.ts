@@ -4,6 +4,8 @@ import type { Vec3, Vec4 } from '../edit.js';
 /** Priorities of the tracks that are always read. */
 export const CATALOG_PRIORITY = 255;
 export const STATE_PRIORITY = 254;
+/** Priority of the lowest layer of a region that has its turn. */
+const TURN_PRIORITY = 252;
 /** Regions of different priority in each layer; those farther away share the last. */
 const RANKS = 80;
 /**
@@ -23,9 +25,15 @@ export interface TrackPlan {
 
 /**
  * The tracks to read, most important first: layer 0 of all regions before layer 1 of any, since light
- * that is seldom renewed beats light that is not; within a layer near regions before far ones.
+ * that is seldom renewed beats light that is not; within a layer near regions before far ones. Only the
+ * track `turn` goes before all of them.
  */
-export function planTracks(catalog: Catalog, layers: number, camera: Vec3 | undefined): TrackPlan[] {
+export function planTracks(
+  catalog: Catalog,
+  layers: number,
+  camera: Vec3 | undefined,
+  turn?: string,
+): TrackPlan[] {
   const regions = catalog.fields
     .flatMap((field) =>
       field.regions.map((region) => ({
@@ -39,12 +47,14 @@ export function planTracks(catalog: Catalog, layers: number, camera: Vec3 | unde
   for (let layer = 0; layer < layers; layer++) {
     regions.forEach(({ field, region }, rank) => {
       if (layer >= field.layers) return;
+      const name = `f${field.id}/r${region.id}/l${layer}`;
+      const ranked = STATE_PRIORITY - 4 - RANKS * layer - Math.min(rank, RANKS - 1);
       plan.push({
-        name: `f${field.id}/r${region.id}/l${layer}`,
+        name,
         field: field.id,
         region: region.id,
         layer,
-        priority: STATE_PRIORITY - 4 - RANKS * layer - Math.min(rank, RANKS - 1),
+        priority: name === turn ? TURN_PRIORITY : ranked,
       });
     });
   }

@@ -3,6 +3,7 @@ import type { Vec3 } from '../edit.js';
 import type { Link, TrackReader } from '../transport.js';
 import { LayerControl } from './layers.js';
 import { planTracks, STATE_PRIORITY, type TrackPlan } from './plan.js';
+import { Turns } from './turns.js';
 
 /** Milliseconds for which state frames are waited for: every one of them counts. */
 const STATE_AGE = 5000;
@@ -18,6 +19,7 @@ export class Reading {
   readonly layers: LayerControl;
   private readonly stateReader: TrackReader;
   private readonly readers = new Map<string, TrackReader>();
+  private readonly turns: Turns;
   private camera: Vec3 | undefined;
   private stale = true;
 
@@ -25,6 +27,7 @@ export class Reading {
     private readonly link: Link,
     private readonly catalog: Catalog,
     private readonly sink: Sink,
+    now: number,
   ) {
     const most = Math.max(1, ...catalog.fields.map((field) => field.layers));
     // Only of the catalog's own server are clock and updates known by which delivery is judged.
@@ -34,6 +37,8 @@ export class Reading {
       framesPerUpdate(planTracks(catalog, layers, undefined).filter(({ field }) => judged.has(field))),
     );
     this.layers = new LayerControl(most, catalog.tickSeconds, (layers) => perUpdate[layers - 1]);
+    const lowest = planTracks(catalog, 1, undefined).map(({ name }) => name);
+    this.turns = new Turns(lowest, catalog.tickSeconds, now);
     this.stateReader = link.subscribe('state', { priority: STATE_PRIORITY, maxAge: STATE_AGE }, (frame) =>
       sink.state(frame),
     );
@@ -47,9 +52,11 @@ export class Reading {
   /** Adapts to the link and the camera. To be called some times a second. */
   adapt(now: number): void {
     if (this.layers.judge(now, this.link.bandwidth())) this.stale = true;
+    if (this.turns.judge(now, this.layers.layers === 1)) this.stale = true;
     if (!this.stale) return;
     this.stale = false;
-    const plan = planTracks(this.catalog, this.layers.layers, this.camera);
+    const planned = planTracks(this.catalog, this.layers.layers, this.camera, this.turns.turn);
+    const plan = planned.filter(({ name }) => this.turns.reads(name));
     const wanted = new Set(plan.map((track) => track.name));
     for (const [name, reader] of this.readers) {
       if (wanted.has(name)) continue;
@@ -66,7 +73,10 @@ export class Reading {
     const options = { priority, maxAge: 0 };
     this.readers.set(
       name,
-      this.link.subscribe(name, options, (frame) => this.sink.probes(track, frame)),
+      this.link.subscribe(name, options, (frame) => {
+        this.turns.heard(name);
+        this.sink.probes(track, frame);
+      }),
     );
   }
 

@@ -114,15 +114,36 @@ export class MoqReader implements TrackReader {
     }
   }
 
+  /**
+   * Groups are read one after the other. But a link that is too slow may hold one up, even for good,
+   * and bring newer ones meanwhile: those wait for it no longer than `maxAge`.
+   */
   private async read(subscriber: Track.Subscriber): Promise<void> {
+    let newest = -1;
+    let before: Promise<void> = Promise.resolve();
     for (;;) {
       const group = await subscriber.nextGroup();
-      if (!group) return;
-      await this.readGroup(group);
+      if (!group) return before;
+      const former = before;
+      const waited = this.waitedFor(group).then((long) => (long ? undefined : former));
+      before = Promise.race([former, waited]).then(() => {
+        if (group.sequence < newest) return;
+        newest = group.sequence;
+        return this.readGroup(group, () => group.sequence === newest);
+      });
     }
   }
 
-  private async readGroup(group: Group.Consumer): Promise<void> {
+  /** Resolves once a group has had a frame for `maxAge`, or has ended; tells whether it has one. */
+  private async waitedFor(group: Group.Consumer): Promise<boolean> {
+    await group.readable();
+    if (group.done) return false;
+    const { maxAge } = this.options;
+    if (maxAge > 0) await new Promise((resolve) => setTimeout(resolve, maxAge));
+    return true;
+  }
+
+  private async readGroup(group: Group.Consumer, isNewest: () => boolean): Promise<void> {
     for (;;) {
       let frame: Group.Frame | undefined;
       try {
@@ -131,7 +152,7 @@ export class MoqReader implements TrackReader {
         // The group went stale before it was all sent (52, `Old`): the next one has what is newer.
         return;
       }
-      if (!frame || this.closed) return;
+      if (!frame || this.closed || !isNewest()) return;
       if (frame.payload.length <= LIMITS.frameBytes) this.onFrame(frame.payload);
     }
   }
