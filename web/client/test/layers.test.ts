@@ -88,6 +88,17 @@ describe('temporal layers', () => {
     expect(history.at(-1)?.layers).toBe(3);
   });
 
+  it('come back soon also after many tries that failed', () => {
+    // Two layers of three pass, for long: the third is tried ever more seldom. Then hardly one, then all.
+    const rate = (now: number) => (now < 150 ? 0.7 : now < 160 ? 0.3 : 3) * FULL;
+    const history = simulate(rate, 240);
+    const back = (layers: number) =>
+      history.find((moment) => moment.now > 160 && moment.layers === layers)!.now - 160;
+    expect(history.find(({ now }) => now > 159)?.layers).toBe(1);
+    expect(back(2)).toBeLessThan(12);
+    expect(back(3)).toBeLessThan(75);
+  });
+
   it('are dropped when nothing comes though the server goes on', () => {
     const control = new LayerControl(3, TICK, perUpdate);
     for (let tick = 0; tick < 50; tick++) {

@@ -62,7 +62,7 @@ describe.skipIf(!link)('a link that is too slow', () => {
   }, 30_000);
 
   const allLayers = (page: Page) =>
-    page.waitForFunction(() => window.lumencast!.session.stats.layers === 3, undefined, { timeout: 30_000 });
+    page.waitForFunction(() => window.lumencast!.session.stats.layers === 3, undefined, { timeout: 60_000 });
 
   it.each(['webtransport', 'websocket'])(
     'over %s',
@@ -118,7 +118,7 @@ describe.skipIf(!link)('a link that is too slow', () => {
       expect(await page.evaluate(() => window.watched!.lost)).toBe(0);
       await page.close();
     },
-    120_000,
+    150_000,
   );
 });
 

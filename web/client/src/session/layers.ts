@@ -2,8 +2,11 @@
 const WINDOW = { seconds: 0.5, ticks: 12 } as const;
 /** Seconds after a change before the next judgement: what was under way must pass first. */
 const SETTLE = 1.5;
-/** Seconds of good delivery before a layer is added again, at first and at most. */
-const PATIENCE = { first: 4, most: 64 } as const;
+/**
+ * Seconds of good delivery before a layer is added again: at first, at least where the estimate says that
+ * it would not fit, and at most.
+ */
+const PATIENCE = { first: 4, tight: 16, most: 64 } as const;
 /** A layer that had to be dropped within this time of being added makes the next try wait longer. */
 const REGRET = 10;
 /** Share of the frames that should have come. */
@@ -18,7 +21,7 @@ const DRAIN = 0.05;
  * Decides how many temporal layers to ask for. The link is too slow when light comes later and later
  * after it was computed, when frames that should have come did not, or when none comes at all while the
  * server goes on; then the top layer is dropped, half the bytes. After some seconds of good delivery it
- * is tried again; each failed try doubles the wait. Owns no clock; times in seconds.
+ * is tried again; each failed try doubles the wait for that layer. Owns no clock; times in seconds.
  */
 export class LayerControl {
   private current: number;
@@ -30,7 +33,8 @@ export class LayerControl {
   private windowStart = -Infinity;
   private settledAt = -Infinity;
   private goodSince: number | undefined;
-  private patience: number = PATIENCE.first;
+  /** By the layer to be added. */
+  private readonly patience: number[];
   private addedAt = -Infinity;
   private badWindows = 0;
   private excess: number | undefined;
@@ -50,6 +54,7 @@ export class LayerControl {
     private readonly framesPerUpdate: (layers: number) => number,
   ) {
     this.current = most;
+    this.patience = Array<number>(most + 1).fill(PATIENCE.first);
     this.window = Math.max(WINDOW.seconds, WINDOW.ticks * tickSeconds);
   }
 
@@ -138,20 +143,21 @@ export class LayerControl {
     this.goodSince = undefined;
     // One bad window may be a hiccup, of the server or of this machine.
     if (++this.badWindows < 2 || this.current === 1) return false;
-    if (now - this.addedAt < REGRET) this.patience = Math.min(2 * this.patience, PATIENCE.most);
+    if (now - this.addedAt < REGRET) {
+      this.patience[this.current] = Math.min(2 * this.patience[this.current], PATIENCE.most);
+    }
     this.change(this.current - 1, now);
     return true;
   }
 
   private good(now: number, bitRate: number, bandwidth: number | undefined): boolean {
     this.goodSince ??= now;
-    if (this.current === this.most) {
-      if (now - this.addedAt > 3 * REGRET) this.patience = PATIENCE.first;
-      return false;
-    }
+    if (now - this.addedAt > 3 * REGRET) this.patience[this.current] = PATIENCE.first;
+    if (this.current === this.most) return false;
     // Each layer doubles the rate. Estimates of an idle link run low, so this only delays.
     const tight = bandwidth !== undefined && bandwidth < 2.2 * bitRate;
-    if (now - this.goodSince < (tight ? 4 : 1) * this.patience) return false;
+    const wait = Math.max(this.patience[this.current + 1], tight ? PATIENCE.tight : 0);
+    if (now - this.goodSince < wait) return false;
     this.addedAt = now;
     this.change(this.current + 1, now);
     return true;
