@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::Aabb;
 
+/// The most bins, a power of two.
 const BINS: usize = 16;
 /// Below this depth, splits halve the number of items, so that depth is bounded whatever the input.
 const SAH_DEPTH: u32 = 40;
@@ -47,18 +48,13 @@ struct Extent {
 }
 
 impl Extent {
-    const EMPTY: Self = Self { bounds: Aabb::EMPTY, centers: Aabb::EMPTY };
-
     fn of(items: &[Item]) -> Self {
-        items.iter().fold(Self::EMPTY, |mut extent, item| {
-            extent.add(item);
-            extent
-        })
-    }
-
-    fn add(&mut self, item: &Item) {
-        self.bounds = self.bounds.union(item.bounds);
-        self.centers = self.centers.with(item.bounds.center());
+        let mut extent = Self { bounds: Aabb::EMPTY, centers: Aabb::EMPTY };
+        for item in items {
+            extent.bounds = extent.bounds.union(item.bounds);
+            extent.centers = extent.centers.with(item.bounds.center());
+        }
+        extent
     }
 }
 
@@ -70,7 +66,7 @@ pub(super) fn tree(items: &mut [Item], leaf: usize) -> Tree<'_> {
 
 fn split(items: &mut [Item], extent: Extent, leaf: usize, depth: u32) -> Tree<'_> {
     let bounds = extent.bounds;
-    if items.len() <= 1 {
+    if items.len() <= 1 || leaf_cost(items.len(), leaf) <= NODE_COST {
         return Tree::Leaf(bounds, items);
     }
     let (middle, extents) = match best_split(items, &extent, leaf, depth) {
@@ -95,6 +91,8 @@ struct Plane {
     axis: usize,
     bin: usize,
     binning: Binning,
+    /// Around the items of each side.
+    bounds: [Aabb; 2],
 }
 
 enum Split {
@@ -108,34 +106,37 @@ struct Binning {
     scale: Vec3A,
     /// Bins along each axis, at most [`BINS`].
     count: usize,
+    /// The last of them, along each axis.
+    last: Vec3A,
 }
 
 impl Binning {
     fn new(centers: &Aabb, items: usize) -> Self {
-        // Few items need no more; most ranges are small, and clearing bins takes time.
-        let count = if items > BINS { BINS } else { BINS / 2 };
+        // Most ranges are small, and sweeping over bins takes time.
+        let count = (8 + items / 16).min(BINS);
         let extent = (centers.max - centers.min).max(Vec3A::splat(f32::MIN_POSITIVE));
-        Self { origin: centers.min, scale: count as f32 * 0.9999 / extent, count }
-    }
-
-    /// Where an item's centre lies, in bins.
-    fn place(&self, item: &Item) -> Vec3A {
-        (item.bounds.center() - self.origin) * self.scale
+        let scale = (count as f32 * 0.9999 / extent).min(Vec3A::splat(f32::MAX));
+        Self { origin: centers.min, scale, count, last: Vec3A::splat(count as f32 - 1.0) }
     }
 
     /// The bin along each axis.
     fn bins(&self, item: &Item) -> [usize; 3] {
         // Adding 2²³ leaves the number, rounded, in the last bits: conversions that saturate take
         // several times as long.
-        let bits = (self.place(item) - 0.5).max(Vec3A::ZERO) + 8_388_608.0;
-        bits.to_array().map(|bits| (bits.to_bits() as usize & (BINS - 1)).min(self.count - 1))
+        let place = (item.bounds.center() - self.origin) * self.scale - 0.5;
+        let bits = place.clamp(Vec3A::ZERO, self.last) + 8_388_608.0;
+        bits.to_array().map(|bits| bits.to_bits() as usize & (BINS - 1))
     }
 
-    /// Whether an item lies in the bins below `bin` of an axis.
-    fn is_below(&self, item: &Item, axis: usize, bin: usize) -> bool {
-        // As `bins` rounds: to the nearest, and halves to even.
-        let place = ((self.place(item)[axis] - 0.5).max(0.0) + 8_388_608.0) - 8_388_608.0;
-        place < bin as f32
+    /// Which items lie in the bins below `bin` of an axis.
+    fn is_below(&self, axis: usize, bin: usize) -> impl Fn(&Item) -> bool {
+        let (origin, scale, bin) = (self.origin[axis], self.scale[axis], bin as f32);
+        move |item| {
+            // As `bins` rounds: to the nearest, and halves to even.
+            let center = 0.5 * (item.bounds.min[axis] + item.bounds.max[axis]);
+            let place = (center - origin) * scale - 0.5;
+            (place.max(0.0) + 8_388_608.0) - 8_388_608.0 < bin
+        }
     }
 }
 
@@ -181,19 +182,27 @@ fn best_split(items: &[Item], extent: &Extent, leaf: usize, depth: u32) -> Optio
         return (items.len() <= leaf).then_some(Split::Leaf);
     }
     let binning = Binning::new(&extent.centers, items.len());
-    let bins = fill_in_parallel(items, &binning);
+    let (cost, plane) = cheapest(&fill_in_parallel(items, &binning), binning, leaf);
+    let area = extent.bounds.half_area();
+    if items.len() <= leaf && leaf_cost(items.len(), leaf) * area <= NODE_COST * area + cost {
+        return Some(Split::Leaf);
+    }
+    cost.is_finite().then_some(Split::At(plane))
+}
+
+/// The cheapest plane along any axis, and its cost (times area); infinite where there is none.
+fn cheapest(bins: &Bins, binning: Binning, leaf: usize) -> (f32, Plane) {
     let mut best = (f32::INFINITY, 0, 0);
-    for axis in (0..3).filter(|&a| size[a] > f32::MIN_POSITIVE) {
-        let (cost, bin) = sweep(&bins[axis][..binning.count], leaf);
+    for (axis, bins) in bins.iter().enumerate() {
+        let (cost, bin) = sweep(&bins[..binning.count], leaf);
         if cost < best.0 {
             best = (cost, axis, bin);
         }
     }
-    let area = extent.bounds.half_area();
-    if items.len() <= leaf && leaf_cost(items.len(), leaf) * area <= NODE_COST * area + best.0 {
-        return Some(Split::Leaf);
-    }
-    best.0.is_finite().then_some(Split::At(Plane { axis: best.1, bin: best.2, binning }))
+    let (cost, axis, bin) = best;
+    let around = |bins: &[(Aabb, u32)]| bins.iter().fold(Aabb::EMPTY, |b, bin| b.union(bin.0));
+    let (below, above) = bins[axis][..binning.count].split_at(bin);
+    (cost, Plane { axis, bin, binning, bounds: [around(below), around(above)] })
 }
 
 /// Cheapest plane along one axis: its cost (times area) and the first bin of its right side.
@@ -218,18 +227,24 @@ fn sweep(bins: &[(Aabb, u32)], leaf: usize) -> (f32, usize) {
 
 /// Brings the left side to the front; returns its length and what is known of both sides.
 fn partition(items: &mut [Item], plane: &Plane) -> (usize, [Extent; 2]) {
-    let mut extents = [Extent::EMPTY; 2];
+    let is_below = plane.binning.is_below(plane.axis, plane.bin);
     let mut middle = 0;
     for i in 0..items.len() {
-        let is_left = plane.binning.is_below(&items[i], plane.axis, plane.bin);
-        extents[usize::from(!is_left)].add(&items[i]);
-        if is_left {
-            items.swap(i, middle);
-            middle += 1;
-        }
+        let is_left = is_below(&items[i]);
+        // Also where it stays right, so that there is no branch to guess.
+        items.swap(i, middle);
+        middle += usize::from(is_left);
     }
     debug_assert!(0 < middle && middle < items.len(), "binning and partition agree");
-    (middle, extents)
+    let (left, right) = items.split_at(middle);
+    let extent =
+        |side: usize, items| Extent { bounds: plane.bounds[side], centers: centers(items) };
+    (middle, [extent(0, left), extent(1, right)])
+}
+
+/// Around the centres of items.
+fn centers(items: &[Item]) -> Aabb {
+    items.iter().fold(Aabb::EMPTY, |centers, item| centers.with(item.bounds.center()))
 }
 
 /// Splits at the median of the widest axis.
