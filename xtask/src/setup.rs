@@ -139,13 +139,12 @@ fn install_packages(purpose: Purpose) -> Result<()> {
         println!("missing: {} ({})", package.name, package.why);
     }
     let can_wait = purpose == Purpose::Demo && wanted.iter().all(|p| p.optional);
-    let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
-    if !release.contains("VERSION_CODENAME=bookworm") {
+    if !is_bookworm() {
         ensure!(can_wait, "only on Debian 12 are they installed: install them by other means");
         return Ok(());
     }
     let source = if backports.is_empty() { None } else { backports_source(&package_sources()) };
-    if output("id", &["-u"]).is_none_or(|id| id.trim() != "0") {
+    if !is_root() {
         let commands = commands(&stable, &backports, source.as_deref());
         println!("\nPaste this into a shell of root (`su -` or `sudo -i`), and start again:\n");
         println!("{commands}");
@@ -221,7 +220,17 @@ fn backports_source(sources: &str) -> Option<String> {
     ))
 }
 
-fn apt(args: &[&str]) -> std::process::Command {
+/// Whether this is Debian 12.
+pub(crate) fn is_bookworm() -> bool {
+    let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
+    release.contains("VERSION_CODENAME=bookworm")
+}
+
+pub(crate) fn is_root() -> bool {
+    output("id", &["-u"]).is_some_and(|id| id.trim() == "0")
+}
+
+pub(crate) fn apt(args: &[&str]) -> std::process::Command {
     let mut command = command("apt-get", args);
     command.env("DEBIAN_FRONTEND", "noninteractive");
     command
