@@ -1,7 +1,8 @@
 //! What one runs by hand in this repository: `cargo xtask demo`, `cargo xtask test`,
-//! `cargo xtask figures`, `cargo xtask setup`.
+//! `cargo xtask arm`, `cargo xtask figures`, `cargo xtask setup`.
 #![expect(clippy::print_stdout, reason = "a program for the terminal")]
 
+mod arm;
 mod demo;
 mod figures;
 mod oracles;
@@ -26,6 +27,8 @@ enum Command {
     Demo(demo::Demo),
     /// Everything that CI runs: formatting, lints, tests, licences, the web packages, the browser
     Test(test::Test),
+    /// The library tests of `gather` for aarch64, in emulation; installs what that needs (as root)
+    Arm,
     /// Measure this machine: ticks, and the way to a page; writes benches/results/NAME.json
     Figures(figures::Figures),
     /// Install what building and testing need (as root), or print the commands that do
@@ -36,6 +39,7 @@ fn main() -> ExitCode {
     let outcome = match Args::parse().command {
         Command::Demo(demo) => demo.run(),
         Command::Test(test) => test.run(),
+        Command::Arm => arm::run(),
         Command::Figures(figures) => figures.run(),
         Command::Setup => setup::install(setup::Purpose::Test),
     };

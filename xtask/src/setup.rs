@@ -147,8 +147,7 @@ fn install_packages(purpose: Purpose) -> Result<()> {
         println!("missing: {} ({})", package.name, package.why);
     }
     let can_wait = purpose == Purpose::Demo && wanted.iter().all(|p| p.optional);
-    let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
-    if !release.contains("VERSION_CODENAME=bookworm") {
+    if !is_bookworm() {
         ensure!(can_wait, "only on Debian 12 are they installed: install them by other means");
         return Ok(());
     }
@@ -229,12 +228,18 @@ fn backports_source(sources: &str) -> Option<String> {
     ))
 }
 
+/// Whether this is Debian 12.
+pub(crate) fn is_bookworm() -> bool {
+    let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
+    release.contains("VERSION_CODENAME=bookworm")
+}
+
 /// Whether this process may do anything on this machine.
 pub(crate) fn is_root() -> bool {
     output("id", &["-u"]).is_some_and(|id| id.trim() == "0")
 }
 
-fn apt(args: &[&str]) -> std::process::Command {
+pub(crate) fn apt(args: &[&str]) -> std::process::Command {
     let mut command = command("apt-get", args);
     command.env("DEBIAN_FRONTEND", "noninteractive");
     command

@@ -1,7 +1,7 @@
 //! The walk through the hierarchies.
 //!
 //! The walk itself ([`trace_with`]) is written once; what tests eight boxes or eight triangles is
-//! passed in, so that it can be compiled with and without AVX2. `is_x86_feature_detected!` chooses.
+//! passed in, so that it can be compiled for AVX2 or NEON or neither; [`Kernel::detect`] chooses.
 //!
 //! Boxes: the slab test with far distances widened by 1 + 2γ(3), so that rounding errs towards
 //! visiting (Ize 2013, "Robust BVH ray traversal"). Triangles: the vertices are sheared so that the
@@ -18,7 +18,7 @@ use super::wide::{LEAF, Node};
 use super::{Accel, Hit, Placed, Ray};
 
 /// Directions' components are kept at least this far from zero, so that no infinities arise.
-const TINY: f32 = 1e-18;
+pub(super) const TINY: f32 = 1e-18;
 /// 1 + 2γ(3).
 pub(super) const WIDEN: f32 = 1.0 + 2.0 * 3.0 * f32::EPSILON;
 
@@ -30,6 +30,9 @@ pub(crate) enum Kernel {
     /// AVX2 and FMA.
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
+    /// NEON, which every aarch64 processor has.
+    #[cfg(target_arch = "aarch64")]
+    Neon,
 }
 
 /// Proof that the processor has AVX2 and FMA.
@@ -43,6 +46,11 @@ impl Kernel {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
             return Self::Avx2(Avx2(()));
+        }
+        // Never false; asked so that `Portable`, which tests compare with, is no dead code.
+        #[cfg(target_arch = "aarch64")]
+        if cfg!(target_feature = "neon") {
+            return Self::Neon;
         }
         Self::Portable
     }
@@ -73,7 +81,7 @@ pub(super) struct Setup {
 
 impl Setup {
     #[inline(always)]
-    fn new(origin: Vec3A, direction: Vec3A) -> Self {
+    pub(super) fn new(origin: Vec3A, direction: Vec3A) -> Self {
         let origin = origin.to_array();
         let direction = direction.to_array();
         let mut inverse = [0.0; 3];
@@ -142,6 +150,14 @@ pub(super) fn trace<const ANY: bool>(
             // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for AVX2 and FMA.
             unsafe {
                 super::kernel_avx2::trace::<ANY>(accel, ray, stack, accept)
+            }
+        }
+        #[cfg(target_arch = "aarch64")]
+        Kernel::Neon => {
+            #[expect(unsafe_code, reason = "calls code compiled for NEON")]
+            // SAFETY: `kernel_neon` refuses to compile for a target without NEON.
+            unsafe {
+                super::kernel_neon::trace::<ANY>(accel, ray, stack, accept)
             }
         }
     }
@@ -272,18 +288,39 @@ fn enter<const ANY: bool>(
 /// Asks for a node or block that will be visited soon: most come from the third level of cache.
 #[inline(always)]
 pub(crate) fn fetch_ahead<T>(value: &T) {
-    #[cfg(target_arch = "x86_64")]
     for line in (0..size_of::<T>()).step_by(64) {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        #[expect(unsafe_code, reason = "there is no safe prefetch")]
-        // SAFETY: a prefetch reads nothing and cannot fault; SSE is part of x86-64.
-        unsafe {
-            _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast::<i8>().wrapping_add(line));
-        }
+        fetch_line(std::ptr::from_ref(value).cast::<i8>().wrapping_add(line));
     }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = value;
 }
+
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn fetch_line(at: *const i8) {
+    use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+    #[expect(unsafe_code, reason = "there is no safe prefetch")]
+    // SAFETY: a prefetch reads nothing and cannot fault; SSE is part of x86-64.
+    unsafe {
+        _mm_prefetch::<_MM_HINT_T0>(at);
+    }
+}
+
+/// `std` has no stable prefetch here.
+#[cfg(target_arch = "aarch64")]
+#[inline(always)]
+fn fetch_line(at: *const i8) {
+    #[expect(unsafe_code, reason = "there is no safe prefetch")]
+    // SAFETY: a prefetch reads nothing and cannot fault.
+    unsafe {
+        std::arch::asm!(
+            "prfm pldl1keep, [{at}]",
+            at = in(reg) at,
+            options(nomem, nostack, preserves_flags),
+        );
+    }
+}
+
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+fn fetch_line(_: *const i8) {}
 
 /// Insertion sort by falling distance: at most eight entries, mostly one or two.
 #[inline(always)]
@@ -334,7 +371,7 @@ fn nearest(
 }
 
 #[inline(always)]
-fn boxes_portable(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
+pub(super) fn boxes_portable(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
     let mut hits = BoxHits { mask: 0, t: [0.0; 8] };
     for lane in 0..8 {
         let mut enter = 0.0f32;
@@ -352,7 +389,7 @@ fn boxes_portable(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
     hits
 }
 
-fn triangles_portable(block: &Block, ray: &Setup, t_max: f32) -> TriangleHits {
+pub(super) fn triangles_portable(block: &Block, ray: &Setup, t_max: f32) -> TriangleHits {
     let mut hits = TriangleHits { mask: 0, t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES] };
     // Sheared x and y, and z, of a corner.
     let corner = |vertex: usize, lane: usize| {

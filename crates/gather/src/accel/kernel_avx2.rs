@@ -33,7 +33,7 @@ pub(super) fn trace<const ANY: bool>(
 
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
+pub(super) fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
     let mut enter = _mm256_setzero_ps();
     let mut leave = _mm256_set1_ps(t_max);
     for axis in 0..3 {
@@ -53,7 +53,7 @@ fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
 
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn triangles(block: &Block, ray: &Setup, t_max: f32) -> TriangleHits {
+pub(super) fn triangles(block: &Block, ray: &Setup, t_max: f32) -> TriangleHits {
     let a = corner(block, 0, ray);
     let b = corner(block, 1, ray);
     let c = corner(block, 2, ray);

@@ -30,14 +30,14 @@ pub(super) struct Block {
 }
 
 impl Block {
-    const EMPTY: Self = Self {
+    pub(super) const EMPTY: Self = Self {
         corners: [[[0.0; LANES]; 3]; 3],
         primitive: [0; LANES],
         triangle: [UNUSED; LANES],
         unused: [0; 4],
     };
 
-    fn set(&mut self, lane: usize, corners: [Vec3A; 3]) {
+    pub(super) fn set(&mut self, lane: usize, corners: [Vec3A; 3]) {
         for (vertex, corner) in corners.iter().enumerate() {
             for axis in 0..3 {
                 self.corners[vertex][axis][lane] = corner[axis];

@@ -3,7 +3,7 @@
 //! Two levels: one bounding-volume hierarchy a mesh in object space ([`mesh_bvh`]), kept from
 //! snapshot to snapshot by [`cache`], and a small one over the placed instances, rebuilt whenever
 //! the scene has changed. Both are built as binary trees by binned SAH ([`build`]), collapsed to
-//! eight children a node ([`wide`]) and walked by the code in [`kernel`], with AVX2 where the
+//! eight children a node ([`wide`]) and walked by the code in [`kernel`], with AVX2 or NEON where the
 //! processor has it.
 //!
 //! What holds at edges: triangles of one mesh that share an edge (bit-equal positions) leave no gap,
@@ -15,6 +15,8 @@ mod cache;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_avx2;
+#[cfg(target_arch = "aarch64")]
+mod kernel_neon;
 mod mesh_bvh;
 mod pages;
 #[cfg(test)]

@@ -1,3 +1,5 @@
+mod lanes;
+
 use std::sync::Arc;
 
 use glam::{Affine3A, DVec3, Quat, Vec3};

@@ -20,7 +20,7 @@ pub(super) struct Node {
 }
 
 impl Node {
-    const EMPTY: Self = Self {
+    pub(super) const EMPTY: Self = Self {
         planes: [
             [f32::INFINITY; 8],
             [f32::INFINITY; 8],

@@ -1,0 +1,131 @@
+//! Eight boxes, or four triangles, at a time with NEON; see [`super::kernel`].
+
+use std::arch::aarch64::{
+    float32x4_t, uint32x4_t, vaddq_f32, vaddvq_u32, vandq_u32, vceqq_f32, vcgeq_f32, vcgtq_f32,
+    vcleq_f32, vdivq_f32, vdupq_n_f32, vfmaq_f32, vfmsq_f32, vmaxnmq_f32, vminnmq_f32, vmulq_f32,
+    vmvnq_u32, vorrq_u32, vsubq_f32,
+};
+
+use super::kernel::{BoxHits, Setup, Stack, TriangleHits, WIDEN, trace_with};
+use super::mesh_bvh::{Block, LANES};
+use super::wide::Node;
+use super::{Accel, Hit, Ray};
+
+// So that code compiled for NEON may be called wherever this module is.
+const _: () = assert!(cfg!(target_feature = "neon"), "the target has no NEON");
+
+/// [`super::kernel::trace`] compiled for NEON.
+#[target_feature(enable = "neon")]
+pub(super) fn trace<const ANY: bool>(
+    accel: &Accel,
+    ray: &Ray,
+    stack: &mut Stack,
+    accept: impl Fn(&Hit) -> bool,
+) -> Option<Hit> {
+    trace_with::<ANY>(
+        accel,
+        ray,
+        stack,
+        accept,
+        |node, ray, t_max| boxes(node, ray, t_max),
+        |block, ray, t_max| triangles(block, ray, t_max),
+    )
+}
+
+/// Minima and maxima are those that pass over a NaN, as `f32::min` and `f32::max` do: of a ray that
+/// is not finite, what counts is the axes that are.
+#[target_feature(enable = "neon")]
+#[inline]
+pub(super) fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
+    let mut enter = [vdupq_n_f32(0.0); 2];
+    let mut leave = [vdupq_n_f32(t_max); 2];
+    for axis in 0..3 {
+        let near = ray.near[axis];
+        let far = if near < 3 { near + 3 } else { near - 3 };
+        let origin = vdupq_n_f32(ray.origin[axis]);
+        let inverse = vdupq_n_f32(ray.inverse[axis]);
+        let widened = vdupq_n_f32(ray.inverse[axis] * WIDEN);
+        let (near, far) = (load8(&node.planes[near]), load8(&node.planes[far]));
+        for half in 0..2 {
+            let t_near = vmulq_f32(vsubq_f32(near[half], origin), inverse);
+            let t_far = vmulq_f32(vsubq_f32(far[half], origin), widened);
+            enter[half] = vmaxnmq_f32(enter[half], t_near);
+            leave[half] = vminnmq_f32(leave[half], t_far);
+        }
+    }
+    let met = [vcleq_f32(enter[0], leave[0]), vcleq_f32(enter[1], leave[1])];
+    let low = vandq_u32(met[0], bytemuck::cast([1, 2, 4, 8]));
+    let high = vandq_u32(met[1], bytemuck::cast([16, 32, 64, 128]));
+    BoxHits { mask: vaddvq_u32(vorrq_u32(low, high)), t: bytemuck::cast(enter) }
+}
+
+#[target_feature(enable = "neon")]
+#[inline]
+pub(super) fn triangles(block: &Block, ray: &Setup, t_max: f32) -> TriangleHits {
+    let a = corner(block, 0, ray);
+    let b = corner(block, 1, ray);
+    let c = corner(block, 2, ray);
+    let u = cross(c, b);
+    let v = cross(a, c);
+    let w = cross(b, a);
+    let zero = vdupq_n_f32(0.0);
+    let least = vminnmq_f32(vminnmq_f32(u, v), w);
+    let most = vmaxnmq_f32(vmaxnmq_f32(u, v), w);
+    let inside = vorrq_u32(vcgeq_f32(least, zero), vcleq_f32(most, zero));
+    let sum = vaddq_f32(vaddq_f32(u, v), w);
+    let inside = vandq_u32(inside, vmvnq_u32(vceqq_f32(sum, zero)));
+    if mask(inside) == 0 {
+        return TriangleHits { mask: 0, t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES] };
+    }
+
+    let scale = vdivq_f32(vdupq_n_f32(1.0), sum);
+    let z = vfmaq_f32(vfmaq_f32(vmulq_f32(w, c[2]), v, b[2]), u, a[2]);
+    let t = vmulq_f32(vmulq_f32(z, vdupq_n_f32(ray.shear[2])), scale);
+    let before = vcleq_f32(t, vdupq_n_f32(t_max));
+    let ahead = vcgtq_f32(t, zero);
+    TriangleHits {
+        mask: mask(vandq_u32(inside, vandq_u32(before, ahead))),
+        t: bytemuck::cast(t),
+        u: bytemuck::cast(vmulq_f32(v, scale)),
+        v: bytemuck::cast(vmulq_f32(w, scale)),
+    }
+}
+
+/// Sheared x and y, and z, of a corner of each triangle.
+#[target_feature(enable = "neon")]
+#[inline]
+fn corner(block: &Block, vertex: usize, ray: &Setup) -> [float32x4_t; 3] {
+    let at = |k: usize| {
+        let axis = ray.axes[k];
+        vsubq_f32(load4(&block.corners[vertex][axis]), vdupq_n_f32(ray.origin[axis]))
+    };
+    let z = at(2);
+    let sheared = |k: usize| vfmsq_f32(at(k), vdupq_n_f32(ray.shear[k]), z);
+    [sheared(0), sheared(1), z]
+}
+
+/// Of x and y. Not fused: swapping `a` and `b` must give the exact negative.
+#[target_feature(enable = "neon")]
+#[inline]
+fn cross(a: [float32x4_t; 3], b: [float32x4_t; 3]) -> float32x4_t {
+    vsubq_f32(vmulq_f32(a[0], b[1]), vmulq_f32(a[1], b[0]))
+}
+
+/// One bit a lane: NEON has no instruction for it.
+#[target_feature(enable = "neon")]
+#[inline]
+fn mask(lanes: uint32x4_t) -> u32 {
+    vaddvq_u32(vandq_u32(lanes, bytemuck::cast([1, 2, 4, 8])))
+}
+
+#[target_feature(enable = "neon")]
+#[inline]
+fn load4(lanes: &[f32; LANES]) -> float32x4_t {
+    bytemuck::cast(*lanes)
+}
+
+#[target_feature(enable = "neon")]
+#[inline]
+fn load8(lanes: &[f32; 8]) -> [float32x4_t; 2] {
+    bytemuck::cast(*lanes)
+}
