@@ -11,13 +11,15 @@ use std::error::Error;
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
-use lumencast_gather::measure::{RayBench, TestRay, build_seconds};
+use lumencast_gather::measure::{RayBench, TestRay, build_seconds, scattered, top_level_seconds};
 use lumencast_gather::reference::View;
 use lumencast_scene::Scene;
-use lumencast_testkit::embree::{Embree, Quality};
+use lumencast_testkit::embree::{Embree, EmbreeInstances, Quality};
 use rayon::prelude::*;
 
 const ROUNDS: usize = 15;
+/// Instances under the top level that is built.
+const INSTANCES: u32 = 1000;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -46,6 +48,28 @@ fn main() -> Result<(), Box<dyn Error>> {
         builds.push(theirs / ours);
     }
     println!("build: {:.2} of Embree's speed", median(builds));
+
+    let first = &snapshot.instances[0];
+    let mesh = &triangles[..first.mesh.triangle_count()];
+    let mut instances = EmbreeInstances::new(library.as_ref(), mesh, INSTANCES as usize, pool)?;
+    let object_from_world = first.world_from_object.inverse();
+    let places: Vec<_> =
+        scattered(&snapshot, INSTANCES).into_iter().map(|to| to * object_from_world).collect();
+    let (mut tops, mut fastest) = (Vec::new(), [f64::INFINITY; 2]);
+    for _ in 0..10 * ROUNDS {
+        let ours = bench.install(|| top_level_seconds(&snapshot, INSTANCES));
+        let start = Instant::now();
+        instances.place(places.iter().copied());
+        let theirs = start.elapsed().as_secs_f64();
+        fastest = [fastest[0].min(ours), fastest[1].min(theirs)];
+        tops.push(theirs / ours);
+    }
+    println!(
+        "top level over {INSTANCES} instances: {:.2} of Embree's speed (best {:.2} and {:.2} ms)",
+        median(tops),
+        1e3 * fastest[0],
+        1e3 * fastest[1],
+    );
 
     for robust in [true, false] {
         let embree = build(robust)?;

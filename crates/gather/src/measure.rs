@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{Affine3A, Vec2, Vec3};
-use lumencast_scene::Snapshot;
+use lumencast_scene::{Instance, Snapshot};
 use rayon::prelude::*;
 
 use crate::accel::{AccelCache, Hit, Kernel, Ray, Stack};
@@ -228,23 +228,29 @@ fn memory(line: &str) -> Option<u64> {
     Some(1024 * value.trim().strip_suffix(" kB")?.parse::<u64>().ok()?)
 }
 
-/// Seconds of building the top level over `count` small instances that overlap a little.
+/// Seconds of building the top level anew over `count` instances of a scene's first mesh, which
+/// overlap a little ([`scattered`]).
 #[must_use]
 pub fn top_level_seconds(scene: &Snapshot, count: u32) -> f64 {
     let Some(instance) = scene.instances.first() else { return 0.0 };
     let mut cache = AccelCache::default();
     let mut many = scene.clone();
-    many.instances = (0..count)
-        .map(|i| {
-            let mut sampler = Sampler::new(3, i, 0);
-            let at = sampler.square().extend(sampler.number()) * 100.0;
-            let mut copy = instance.clone();
-            copy.world_from_object = Affine3A::from_translation(at) * copy.world_from_object;
-            copy
-        })
-        .collect();
+    let place = |world_from_object| Instance { world_from_object, ..instance.clone() };
+    many.instances = scattered(scene, count).into_iter().map(place).collect();
     update_seconds(&mut cache, &many);
     update_seconds(&mut cache, &many)
+}
+
+/// Places for `count` copies of a scene's first instance, in a cube of 100 m.
+#[must_use]
+pub fn scattered(scene: &Snapshot, count: u32) -> Vec<Affine3A> {
+    let Some(instance) = scene.instances.first() else { return Vec::new() };
+    let place = |i| {
+        let mut sampler = Sampler::new(3, i, 0);
+        let at = sampler.square().extend(sampler.number()) * 100.0;
+        Affine3A::from_translation(at) * instance.world_from_object
+    };
+    (0..count).map(place).collect()
 }
 
 /// Seconds of bringing a cache to a scene; dropping the result is not counted.

@@ -9,16 +9,18 @@ use std::ffi::{c_char, c_uint, c_void};
 use std::mem::ManuallyDrop;
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 use libloading::Library;
 
 type Handle = *mut c_void;
 
 const GEOMETRY_TRIANGLE: c_uint = 0;
+const GEOMETRY_INSTANCE: c_uint = 121;
 const BUFFER_INDEX: c_uint = 0;
 const BUFFER_VERTEX: c_uint = 1;
 const FORMAT_UINT3: c_uint = 0x5003;
 const FORMAT_FLOAT3: c_uint = 0x9003;
+const FORMAT_FLOAT3X4_COLUMN_MAJOR: c_uint = 0x9234;
 const SCENE_ROBUST: c_uint = 1 << 2;
 const NONE: u32 = u32::MAX;
 
@@ -60,16 +62,96 @@ pub struct EmbreeHit {
     pub triangle: u32,
 }
 
+macro_rules! api {
+    ($($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*) => {
+        /// The functions of the library that are used.
+        struct Api {
+            $($field: unsafe extern "C" fn($($argument),*) $(-> $result)?,)*
+            /// Never unloaded: threads of its own may still run its code.
+            _library: ManuallyDrop<Library>,
+        }
+
+        impl Api {
+            fn load(library: &Path) -> Result<Self, libloading::Error> {
+                // SAFETY: the caller names an Embree 4; the signatures are those of its headers.
+                unsafe {
+                    let library = Library::new(library)?;
+                    Ok(Self {
+                        $($field: *library.get($name)?,)*
+                        _library: ManuallyDrop::new(library),
+                    })
+                }
+            }
+        }
+    };
+}
+
+api! {
+    new_device = b"rtcNewDevice": fn(*const c_char) -> Handle;
+    release_device = b"rtcReleaseDevice": fn(Handle);
+    new_scene = b"rtcNewScene": fn(Handle) -> Handle;
+    set_quality = b"rtcSetSceneBuildQuality": fn(Handle, c_uint);
+    set_flags = b"rtcSetSceneFlags": fn(Handle, c_uint);
+    commit_scene = b"rtcCommitScene": fn(Handle);
+    release_scene = b"rtcReleaseScene": fn(Handle);
+    new_geometry = b"rtcNewGeometry": fn(Handle, c_uint) -> Handle;
+    new_buffer = b"rtcSetNewGeometryBuffer":
+        fn(Handle, c_uint, c_uint, c_uint, usize, usize) -> *mut c_void;
+    set_instanced = b"rtcSetGeometryInstancedScene": fn(Handle, Handle);
+    set_transform = b"rtcSetGeometryTransform": fn(Handle, c_uint, c_uint, *const f32);
+    commit_geometry = b"rtcCommitGeometry": fn(Handle);
+    attach = b"rtcAttachGeometry": fn(Handle, Handle) -> c_uint;
+    release_geometry = b"rtcReleaseGeometry": fn(Handle);
+    intersect = b"rtcIntersect1": fn(Handle, *mut RayHit, *const c_void);
+    occluded = b"rtcOccluded1": fn(Handle, *mut RayHit, *const c_void);
+}
+
+impl Api {
+    fn device(&self, threads: usize) -> Handle {
+        let options = format!("threads={threads}\0");
+        // SAFETY: the string ends with a zero.
+        unsafe { (self.new_device)(options.as_ptr().cast()) }
+    }
+
+    /// A committed scene of triangles, made by `device`.
+    fn triangles(
+        &self,
+        device: Handle,
+        triangles: &[[Vec3; 3]],
+        quality: Quality,
+        robust: bool,
+    ) -> Handle {
+        // SAFETY: buffers are written within the lengths that they were made with, and their copies
+        // are Embree's own.
+        unsafe {
+            let scene = (self.new_scene)(device);
+            (self.set_quality)(scene, quality as c_uint);
+            (self.set_flags)(scene, if robust { SCENE_ROBUST } else { 0 });
+            let geometry = (self.new_geometry)(device, GEOMETRY_TRIANGLE);
+            let buffer =
+                |kind, format, count| (self.new_buffer)(geometry, kind, 0, format, 12, count);
+            let corners = buffer(BUFFER_VERTEX, FORMAT_FLOAT3, 3 * triangles.len());
+            let corners: *mut [[f32; 3]; 3] = corners.cast();
+            let indices: *mut [u32; 3] = buffer(BUFFER_INDEX, FORMAT_UINT3, triangles.len()).cast();
+            for (i, triangle) in triangles.iter().enumerate() {
+                let first = 3 * i as u32;
+                corners.add(i).write(triangle.map(|c| c.to_array()));
+                indices.add(i).write([first, first + 1, first + 2]);
+            }
+            (self.commit_geometry)(geometry);
+            (self.attach)(scene, geometry);
+            (self.release_geometry)(geometry);
+            (self.commit_scene)(scene);
+            scene
+        }
+    }
+}
+
 /// A scene of triangles in Embree.
 pub struct Embree {
     scene: Handle,
     device: Handle,
-    intersect: unsafe extern "C" fn(Handle, *mut RayHit, *const c_void),
-    occluded: unsafe extern "C" fn(Handle, *mut RayHit, *const c_void),
-    release_scene: unsafe extern "C" fn(Handle),
-    release_device: unsafe extern "C" fn(Handle),
-    /// Never unloaded: threads of its own may still run its code.
-    _library: ManuallyDrop<Library>,
+    api: Api,
 }
 
 // SAFETY: queries on a committed scene may run on any number of threads (Embree's manual, "Ray
@@ -83,7 +165,7 @@ impl Embree {
     /// mode.
     ///
     /// # Errors
-    /// Where the file is no Embree 4, or Embree finds fault with the triangles.
+    /// Where the file is no Embree 4.
     pub fn new(
         library: &Path,
         triangles: &[[Vec3; 3]],
@@ -91,59 +173,10 @@ impl Embree {
         robust: bool,
         threads: usize,
     ) -> Result<Self, libloading::Error> {
-        // SAFETY: the caller names an Embree 4; the signatures are those of its headers. Buffers are
-        // written within the lengths that they were made with, and their copies are Embree's own.
-        unsafe {
-            let library = Library::new(library)?;
-            macro_rules! function {
-                ($name:literal, fn($($argument:ty),*) $(-> $result:ty)?) => {
-                    *library.get::<unsafe extern "C" fn($($argument),*) $(-> $result)?>($name)?
-                };
-            }
-            let new_device = function!(b"rtcNewDevice", fn(*const c_char) -> Handle);
-            let new_scene = function!(b"rtcNewScene", fn(Handle) -> Handle);
-            let set_quality = function!(b"rtcSetSceneBuildQuality", fn(Handle, c_uint));
-            let set_flags = function!(b"rtcSetSceneFlags", fn(Handle, c_uint));
-            let new_geometry = function!(b"rtcNewGeometry", fn(Handle, c_uint) -> Handle);
-            let new_buffer = function!(
-                b"rtcSetNewGeometryBuffer",
-                fn(Handle, c_uint, c_uint, c_uint, usize, usize) -> Handle
-            );
-            let commit_geometry = function!(b"rtcCommitGeometry", fn(Handle));
-            let attach = function!(b"rtcAttachGeometry", fn(Handle, Handle) -> c_uint);
-            let release_geometry = function!(b"rtcReleaseGeometry", fn(Handle));
-            let commit_scene = function!(b"rtcCommitScene", fn(Handle));
-
-            let options = format!("threads={threads}\0");
-            let device = new_device(options.as_ptr().cast());
-            let scene = new_scene(device);
-            set_quality(scene, quality as c_uint);
-            set_flags(scene, if robust { SCENE_ROBUST } else { 0 });
-            let geometry = new_geometry(device, GEOMETRY_TRIANGLE);
-            let corners =
-                new_buffer(geometry, BUFFER_VERTEX, 0, FORMAT_FLOAT3, 12, 3 * triangles.len());
-            let corners: *mut [[f32; 3]; 3] = corners.cast();
-            let indices = new_buffer(geometry, BUFFER_INDEX, 0, FORMAT_UINT3, 12, triangles.len());
-            let indices: *mut [u32; 3] = indices.cast();
-            for (i, triangle) in triangles.iter().enumerate() {
-                let first = 3 * i as u32;
-                corners.add(i).write(triangle.map(|c| c.to_array()));
-                indices.add(i).write([first, first + 1, first + 2]);
-            }
-            commit_geometry(geometry);
-            attach(scene, geometry);
-            release_geometry(geometry);
-            commit_scene(scene);
-            Ok(Self {
-                scene,
-                device,
-                intersect: function!(b"rtcIntersect1", fn(Handle, *mut RayHit, *const c_void)),
-                occluded: function!(b"rtcOccluded1", fn(Handle, *mut RayHit, *const c_void)),
-                release_scene: function!(b"rtcReleaseScene", fn(Handle)),
-                release_device: function!(b"rtcReleaseDevice", fn(Handle)),
-                _library: ManuallyDrop::new(library),
-            })
-        }
+        let api = Api::load(library)?;
+        let device = api.device(threads);
+        let scene = api.triangles(device, triangles, quality, robust);
+        Ok(Self { scene, device, api })
     }
 
     fn ray(origin: Vec3, direction: Vec3, t_max: f32) -> RayHit {
@@ -172,7 +205,7 @@ impl Embree {
         let mut ray = Self::ray(origin, direction, t_max);
         // SAFETY: the scene is committed; the ray is aligned and as large as Embree wants it. No
         // arguments means the default ones.
-        unsafe { (self.intersect)(self.scene, &raw mut ray, std::ptr::null()) };
+        unsafe { (self.api.intersect)(self.scene, &raw mut ray, std::ptr::null()) };
         (ray.geometry != NONE).then_some(EmbreeHit { t: ray.t_far, triangle: ray.primitive })
     }
 
@@ -182,7 +215,7 @@ impl Embree {
     pub fn occluded(&self, origin: Vec3, direction: Vec3, t_max: f32) -> bool {
         let mut ray = Self::ray(origin, direction, t_max);
         // SAFETY: as in `closest`; only the ray's part is used.
-        unsafe { (self.occluded)(self.scene, &raw mut ray, std::ptr::null()) };
+        unsafe { (self.api.occluded)(self.scene, &raw mut ray, std::ptr::null()) };
         ray.t_far < 0.0
     }
 }
@@ -191,8 +224,78 @@ impl Drop for Embree {
     fn drop(&mut self) {
         // SAFETY: both were made by this library, and nobody else has them.
         unsafe {
-            (self.release_scene)(self.scene);
-            (self.release_device)(self.device);
+            (self.api.release_scene)(self.scene);
+            (self.api.release_device)(self.device);
+        }
+    }
+}
+
+/// Many instances of one mesh in Embree, its default quality.
+pub struct EmbreeInstances {
+    mesh: Handle,
+    top: Handle,
+    instances: Vec<Handle>,
+    device: Handle,
+    api: Api,
+}
+
+impl EmbreeInstances {
+    /// Loads the library and builds `count` instances of a mesh, all at its own place.
+    ///
+    /// # Errors
+    /// Where the file is no Embree 4.
+    pub fn new(
+        library: &Path,
+        mesh: &[[Vec3; 3]],
+        count: usize,
+        threads: usize,
+    ) -> Result<Self, libloading::Error> {
+        let api = Api::load(library)?;
+        let device = api.device(threads);
+        let mesh = api.triangles(device, mesh, Quality::Medium, true);
+        // SAFETY: all handles are of this device.
+        let (top, instances) = unsafe {
+            let top = (api.new_scene)(device);
+            (api.set_quality)(top, Quality::Medium as c_uint);
+            (api.set_flags)(top, SCENE_ROBUST);
+            let instance = || {
+                let instance = (api.new_geometry)(device, GEOMETRY_INSTANCE);
+                (api.set_instanced)(instance, mesh);
+                (api.attach)(top, instance);
+                instance
+            };
+            (top, (0..count).map(|_| instance()).collect())
+        };
+        let mut all = Self { mesh, top, instances, device, api };
+        all.place(std::iter::repeat_n(Affine3A::IDENTITY, count));
+        Ok(all)
+    }
+
+    /// Moves the instances, and builds the top level anew.
+    pub fn place(&mut self, world_from_object: impl IntoIterator<Item = Affine3A>) {
+        // SAFETY: Embree reads twelve numbers before it returns.
+        unsafe {
+            for (&instance, to) in self.instances.iter().zip(world_from_object) {
+                let columns = to.to_cols_array();
+                let format = FORMAT_FLOAT3X4_COLUMN_MAJOR;
+                (self.api.set_transform)(instance, 0, format, columns.as_ptr());
+                (self.api.commit_geometry)(instance);
+            }
+            (self.api.commit_scene)(self.top);
+        }
+    }
+}
+
+impl Drop for EmbreeInstances {
+    fn drop(&mut self) {
+        // SAFETY: all were made by this library, and nobody else has them.
+        unsafe {
+            for &instance in &self.instances {
+                (self.api.release_geometry)(instance);
+            }
+            (self.api.release_scene)(self.top);
+            (self.api.release_scene)(self.mesh);
+            (self.api.release_device)(self.device);
         }
     }
 }
