@@ -76,11 +76,14 @@ fn print_report(report: &Value) {
     println!("page        {page}");
     println!("system      {}, kernel {}", text("/system/name"), text("/system/kernel"));
     println!(
-        "processor   {}, {} cores, AVX2 {}, FMA {}",
+        "processor   {}, {} cores, rays are traced with {}",
         text("/processor/name"),
         text("/processor/cores"),
-        if yes("/processor/avx2") { "yes" } else { "no" },
-        if yes("/processor/fma") { "yes" } else { "no" },
+        match ["/processor/avx2", "/processor/fma", "/processor/neon"].map(yes) {
+            [true, true, _] => "AVX2",
+            [.., true] => "NEON",
+            _ => "portable code: it has neither AVX2 and FMA nor NEON",
+        },
     );
     println!("memory      {} GiB", text("/system/memory_gib"));
     for driver in report["drivers"].as_array().into_iter().flatten() {
@@ -142,7 +145,8 @@ fn processor() -> Value {
     #[cfg(not(target_arch = "x86_64"))]
     let (avx2, fma) = (false, false);
     let cores = thread::available_parallelism().map_or(1, |n| n.get());
-    json!({ "name": name, "cores": cores, "avx2": avx2, "fma": fma })
+    let neon = cfg!(target_arch = "aarch64");
+    json!({ "name": name, "cores": cores, "avx2": avx2, "fma": fma, "neon": neon })
 }
 
 /// Driver manifests where the Vulkan loader looks for them.
