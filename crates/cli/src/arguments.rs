@@ -137,6 +137,7 @@ impl TickArguments {
         gather: &GatherArguments,
     ) -> Result<TickOptions> {
         let blend = BlendSettings { ratio: self.ratio, significance: self.significance };
+        let feedback = if self.feedback { ", feedback" } else { "" };
         Ok(TickOptions {
             period: 1.0 / self.rate,
             samples: self.samples,
@@ -144,7 +145,7 @@ impl TickArguments {
             feedback: self.feedback,
             volumes: volumes.volumes(scene)?,
             script: self.edits.as_deref().map(read_script).transpose()?,
-            source: gather.source(),
+            source: gather.source() + feedback,
         })
     }
 }
