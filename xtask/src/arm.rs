@@ -6,7 +6,7 @@
 use anyhow::{Result, bail, ensure};
 
 use crate::run::{cargo, command, output, step};
-use crate::setup::{apt, is_bookworm, is_root};
+use crate::setup::{apt, ask_root, is_bookworm, is_root};
 
 const PACKAGES: &[&str] = &[
     "gcc-aarch64-linux-gnu",
@@ -36,8 +36,7 @@ fn install() -> Result<()> {
     println!("missing: {}", missing.join(", "));
     ensure!(is_bookworm(), "only on Debian 12 are they installed: install them by other means");
     if !is_root() {
-        println!("\nPaste this into a shell of root (`su -` or `sudo -i`), and start again:\n");
-        println!("{}", commands(&missing));
+        ask_root(&commands(&missing));
         bail!("packages are missing, and only root may install them");
     }
     step("packages for aarch64", command("dpkg", &["--add-architecture", "arm64"]))?;

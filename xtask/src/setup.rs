@@ -154,8 +154,7 @@ fn install_packages(purpose: Purpose) -> Result<()> {
     let source = if backports.is_empty() { None } else { backports_source(&package_sources()) };
     if !is_root() {
         let commands = commands(&stable, &backports, source.as_deref());
-        println!("\nPaste this into a shell of root (`su -` or `sudo -i`), and start again:\n");
-        println!("{commands}");
+        ask_root(&commands);
         ensure!(can_wait, "packages are missing, and only root may install them");
         println!("The demo goes on without.");
         return Ok(());
@@ -183,6 +182,12 @@ fn install_as_root(stable: &[&str], backports: &[&str], source: Option<String>) 
         step("packages from backports", apt(&[&flags, backports].concat()))?;
     }
     Ok(())
+}
+
+/// Prints what root has to type.
+pub(crate) fn ask_root(commands: &str) {
+    println!("\nPaste this into a shell of root (`su -` or `sudo -i`), and start again:\n");
+    println!("{commands}");
 }
 
 /// What root types to install packages, as one block.

@@ -59,8 +59,8 @@ impl Bench {
         let mut volume = ProbeVolume::dark(VolumeId(0), self.grid, Order::L2);
         let Some(gathered) = self.tracer.wait(ticket) else { unreachable!("nobody cancels") };
         for (i, sums) in gathered.sums.iter().enumerate() {
-            for (c, sum) in volume.probe_mut(i).iter_mut().zip(&sums.sum) {
-                *c = sum / sums.count as f32;
+            for (c, mean) in volume.probe_mut(i).iter_mut().zip(sums.mean()) {
+                *c = mean;
             }
         }
         let taken = self.grid.probe_count() as f64 * f64::from(samples);

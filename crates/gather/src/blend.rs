@@ -144,7 +144,7 @@ impl Update {
             && sums.sum.len() == coefficients
             && sums.sum_of_squares.len() == coefficients;
         let samples = sums.count as f32;
-        let mean: Vec<Vec3> = sums.sum.iter().map(|s| s / samples).collect();
+        let mean: Vec<Vec3> = sums.mean().collect();
         if !usable || !mean.iter().all(|m| m.is_finite()) {
             return None;
         }

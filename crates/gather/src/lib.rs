@@ -130,6 +130,13 @@ pub struct Sums {
     pub distances: Vec<[f32; 2]>,
 }
 
+impl Sums {
+    /// The estimates: coefficients of radiance, or irradiance; not numbers where there is no sample.
+    pub fn mean(&self) -> impl Iterator<Item = Vec3> + '_ {
+        self.sum.iter().map(|sum| sum / self.count as f32)
+    }
+}
+
 /// A submitted job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Ticket(pub u64);

@@ -134,8 +134,8 @@ fn grid(size: Vec3) -> Grid {
 fn field(size: Vec3, sums: &[Sums]) -> Arc<LightField> {
     let mut volume = ProbeVolume::dark(VolumeId(0), grid(size), Order::L2);
     for (i, sums) in sums.iter().enumerate() {
-        for (c, sum) in volume.probe_mut(i).iter_mut().zip(&sums.sum) {
-            *c = sum / sums.count as f32;
+        for (c, mean) in volume.probe_mut(i).iter_mut().zip(sums.mean()) {
+            *c = mean;
         }
     }
     Arc::new(LightField::new(vec![volume]))

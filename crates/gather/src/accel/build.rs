@@ -49,12 +49,8 @@ struct Extent {
 
 impl Extent {
     fn of(items: &[Item]) -> Self {
-        let mut extent = Self { bounds: Aabb::EMPTY, centers: Aabb::EMPTY };
-        for item in items {
-            extent.bounds = extent.bounds.union(item.bounds);
-            extent.centers = extent.centers.with(item.bounds.center());
-        }
-        extent
+        let bounds = items.iter().fold(Aabb::EMPTY, |bounds, item| bounds.union(item.bounds));
+        Self { bounds, centers: centers(items) }
     }
 }
 

@@ -1,7 +1,7 @@
 //! What happens at the vertices of paths: emission, light reached for, scattering.
 
 use glam::{Mat3, Vec3};
-use lumencast_light::OffsetPolicy;
+use lumencast_light::{LightField, OffsetPolicy};
 
 use super::integrator::{Connection, Part, Path, Paths, Segment};
 use crate::accel::Ray;
@@ -45,8 +45,9 @@ impl Shader<'_> {
         }
         let emitted = path.throughput * self.emission(&point, &path.segment);
         path.seen.add(part, self.limited(depth, emitted));
+        let previous = self.limits.previous;
         let is_last = depth == self.limits.bounces;
-        if is_last && self.limits.previous.is_none() {
+        if is_last && previous.is_none() {
             return None;
         }
         let (bsdf, frame) = point.scattering(world.frames(hit.instance), world.model)?;
@@ -54,13 +55,13 @@ impl Shader<'_> {
         let vertex = Vertex { point: &point, bsdf, frame, model: world.model, view };
 
         self.punctual(&vertex, index, path, is_last);
-        if is_last {
-            let light = path.throughput * self.previous(&vertex, &mut path.sampler);
+        if let Some(field) = previous.filter(|_| is_last) {
+            let light = path.throughput * vertex.scatter_field(field, &mut path.sampler);
             path.seen.add(Part::Indirect, self.limited(depth + 1, light));
             return None;
         }
         self.area(&vertex, index, path);
-        let only_sources = depth + 1 == self.limits.bounces && self.limits.previous.is_none();
+        let only_sources = depth + 1 == self.limits.bounces && previous.is_none();
         if only_sources && world.lights.are_points() {
             return None;
         }
@@ -168,19 +169,6 @@ impl Shader<'_> {
         });
     }
 
-    /// What a vertex scatters of the light that was known before. Negative lobes of the field are kept:
-    /// cut off here, light would be added at every bounce.
-    fn previous(&self, vertex: &Vertex<'_>, sampler: &mut Sampler) -> Vec3 {
-        let Some((next, weight)) = vertex.scatter(sampler) else { return Vec3::ZERO };
-        let direction = next.ray.direction;
-        let normal = vertex.frame.z_axis;
-        let side = normal * 1.0f32.copysign(normal.dot(direction));
-        let field = self.limits.previous;
-        let arriving =
-            field.and_then(|f| f.sample(vertex.point.position, side, OffsetPolicy::HalfCell));
-        arriving.map_or(Vec3::ZERO, |light| weight * light.radiance(direction))
-    }
-
     /// Scattered light held to the limit; what the receiver sees itself is left alone. A value that
     /// is not a number would spoil a whole field, so it counts as nothing.
     fn limited(&self, scattered: u32, light: Vec3) -> Vec3 {
@@ -230,6 +218,17 @@ impl Vertex<'_> {
         let ray = Ray { origin: self.point.leave(direction), direction, t_max: f32::INFINITY };
         let from = Some(itself(&self.point.hit));
         Some((Segment { ray, from, pdf: chosen.pdf }, chosen.weight))
+    }
+
+    /// What it scatters of a field's light. Negative lobes of the field are kept: cut off here, light
+    /// would be added at every bounce.
+    fn scatter_field(&self, field: &LightField, sampler: &mut Sampler) -> Vec3 {
+        let Some((next, weight)) = self.scatter(sampler) else { return Vec3::ZERO };
+        let direction = next.ray.direction;
+        let normal = self.frame.z_axis;
+        let side = normal * 1.0f32.copysign(normal.dot(direction));
+        let arriving = field.sample(self.point.position, side, OffsetPolicy::HalfCell);
+        arriving.map_or(Vec3::ZERO, |light| weight * light.radiance(direction))
     }
 
     /// Whether shading normal and triangle agree on which side a direction is; where they do not,
