@@ -52,6 +52,7 @@ impl Server {
             cells_min: IVec3::ZERO,
             regions: encoder.regions().collect(),
             layers: 3,
+            scale_log2: None,
             source: "a test".into(),
             epoch: None,
         };
@@ -379,6 +380,30 @@ fn a_reconnection_to_the_same_server_goes_on() {
     }
     // Layer 0's next frame after the outage lacks its base; keyframes come every 40 updates.
     assert!(near(shown(&mut cache, 2.0), 5.0));
+}
+
+#[test]
+fn another_scale_changes_nothing_but_itself() {
+    let mut server = Server::new(1);
+    let mut cache = Cache::new();
+    take_in(&mut cache, &server.catalog(), 0.0).unwrap();
+    for tick in 0..6 {
+        server.shine(8.0 + tick as f32);
+        let now = f64::from(tick) * TICK;
+        for sent in server.tick(now) {
+            take_in(&mut cache, &sent, now).unwrap();
+        }
+    }
+    let now = 5.5 * TICK;
+    let before = shown(&mut cache, now);
+    server.catalog.fields[0].scale_log2 = Some(4);
+    take_in(&mut cache, &server.catalog(), now).unwrap();
+    assert_eq!(cache.current_catalog().unwrap().fields[0].scale_log2, Some(4));
+    assert_eq!(shown(&mut cache, now), before, "in the midst of a blend");
+    // A delta: its base is still known.
+    for sent in server.tick(6.0 * TICK) {
+        take_in(&mut cache, &sent, 6.0 * TICK).unwrap();
+    }
 }
 
 #[test]

@@ -90,6 +90,7 @@ fn light_report(
                 "probes": field.grid.probe_count(),
                 "regions": field.regions.len(),
                 "layers": field.layers,
+                "scale_log2": field.scale_log2,
                 "c0": volume.map(c0_statistics),
             })
         })

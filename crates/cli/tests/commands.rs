@@ -276,6 +276,9 @@ fn what_was_baked_can_be_inspected() {
     assert!(words.contains("source cpu path tracing, baked, 128 samples"), "{words}");
     let [min, mean, max] = ["min", "mean", "max"].map(|k| field["c0"][k].as_f64().expect(k));
     assert!(0.0 <= min && min < mean && mean < max, "{min} {mean} {max}");
+    // The brightest luminance is at most the brightest channel's, and at least a tenth of it.
+    let scale = field["scale_log2"].as_f64().expect("a scale").exp2();
+    assert!((0.025..2.0).contains(&(max / scale)), "{max} at a scale of {scale}");
 
     let cut = folder.file("cut.light", &bytes[..bytes.len() - 7]);
     run(&["inspect", &cut]).failed_saying(&["cut.light"]);

@@ -88,6 +88,10 @@ pub struct Field {
     pub regions: Vec<Region>,
     /// Temporal layers, 1 to 3.
     pub layers: u8,
+    /// log2 of the field's scale ([`lumencast_light::ScaleRule`]); none before there was any light.
+    /// It follows the light: a server sends the catalog again when it has changed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_log2: Option<i8>,
     /// What computes it, in words: `cpu path tracing`. At most [`limits::SOURCE_BYTES`] bytes, no
     /// control characters; empty where nobody says.
     #[serde(default, skip_serializing_if = "String::is_empty")]
@@ -201,9 +205,14 @@ impl Field {
         self.regions.iter().copied().find(|region| region.id == id)
     }
 
-    /// Whether light of the one fits the other: all but source and epoch are equal.
+    /// Whether light of the one fits the other: all but scale, source and epoch are equal.
     pub fn has_shape_of(&self, other: &Self) -> bool {
-        let shape = |field: &Self| Self { source: String::new(), epoch: None, ..field.clone() };
+        let shape = |field: &Self| Self {
+            scale_log2: None,
+            source: String::new(),
+            epoch: None,
+            ..field.clone()
+        };
         shape(self) == shape(other)
     }
 
@@ -301,6 +310,7 @@ mod tests {
                 cells_min: IVec3::ZERO,
                 regions: crate::regions(grid.resolution),
                 layers: 3,
+                scale_log2: Some(16),
                 source: "cpu path tracing".into(),
                 epoch: Some(Epoch(5)),
             }],
@@ -322,14 +332,16 @@ mod tests {
     }
 
     #[test]
-    fn source_and_epoch_may_be_absent() {
+    fn scale_source_and_epoch_may_be_absent() {
         let mut value: Value = serde_json::from_slice(&catalog().encode()).unwrap();
         let field = value["fields"][0].as_object_mut().unwrap();
+        assert_eq!(field.remove("scale_log2"), Some(json!(16)));
         assert_eq!(field.remove("source"), Some(json!("cpu path tracing")));
         assert_eq!(field.remove("epoch"), Some(json!("0000000000000005")));
         let old = Catalog::decode(value.to_string().as_bytes()).unwrap();
         let field = &old.fields[0];
         assert_eq!((field.source.as_str(), old.epoch_of(field)), ("", old.epoch));
+        assert_eq!(field.scale_log2, None);
         let written: Value = serde_json::from_slice(&old.encode()).unwrap();
         assert_eq!(written, value, "and are then not written");
         let new = catalog();
@@ -340,7 +352,7 @@ mod tests {
 
     #[test]
     fn contradictions_and_excesses_are_refused() {
-        let cases: [(&str, Value, &str); 20] = [
+        let cases: [(&str, Value, &str); 22] = [
             ("/lumencast", json!(2), "version"),
             ("/lumencast", json!("1"), "malformed"),
             ("/epoch", json!(null), "json"),
@@ -348,6 +360,8 @@ mod tests {
             ("/tick_seconds", json!(0), "malformed"),
             ("/fields/0/order", json!(5), "json"),
             ("/fields/0/layers", json!(4), "malformed"),
+            ("/fields/0/scale_log2", json!(128), "json"),
+            ("/fields/0/scale_log2", json!(0.5), "json"),
             ("/fields/0/source", json!("x".repeat(129)), "limit"),
             ("/fields/0/source", json!("\u{1b}[2J"), "malformed"),
             ("/fields/0/source", json!(1), "json"),

@@ -47,6 +47,7 @@ impl LightFile {
         let mut frames = Vec::new();
         for volume in volumes {
             let mut encoder = ProbeEncoder::new(volume.grid.resolution, volume.order);
+            let encoded = encoder.encode(volume, UpdateInfo { update: 0, ..info }, |_| true);
             fields.push(Field {
                 id: volume.id.0,
                 order: volume.order,
@@ -55,10 +56,10 @@ impl LightFile {
                 cells_min: glam::IVec3::ZERO,
                 regions: encoder.regions().collect(),
                 layers: 3,
+                scale_log2: encoder.scale_log2(),
                 source: source.to_owned(),
                 epoch: None,
             });
-            let encoded = encoder.encode(volume, UpdateInfo { update: 0, ..info }, |_| true);
             frames.extend(encoded.into_iter().map(|frame| SavedFrame {
                 field: volume.id.0,
                 region: frame.region,

@@ -31,6 +31,11 @@ impl ScaleRule {
         }
         self.log2.unwrap_or(0)
     }
+
+    /// log2 of the scale; none before there was any light.
+    pub fn log2(&self) -> Option<i8> {
+        self.log2
+    }
 }
 
 #[cfg(test)]
@@ -41,6 +46,7 @@ mod tests {
     fn the_scale_follows_with_hysteresis() {
         let mut rule = ScaleRule::default();
         assert_eq!(rule.update(&[Vec3::ZERO]), 0);
+        assert_eq!(rule.log2(), None);
         assert_eq!(rule.update(&[Vec3::splat(45_000.0)]), 16);
         for (value, log2) in [
             (60_000.0, 16),
@@ -54,5 +60,6 @@ mod tests {
         }
         assert_eq!(rule.update(&[Vec3::NAN, Vec3::splat(1e-3)]), -9);
         assert_eq!(rule.update(&[]), -9);
+        assert_eq!(rule.log2(), Some(-9));
     }
 }

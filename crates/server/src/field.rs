@@ -73,9 +73,15 @@ impl Field {
             cells_min: IVec3::ZERO,
             regions: self.encoder.regions().collect(),
             layers: 3,
+            scale_log2: self.scale_log2(),
             source: source.to_owned(),
             epoch: None,
         }
+    }
+
+    /// log2 of its scale as of the last update; none before there was any light.
+    pub(crate) fn scale_log2(&self) -> Option<i8> {
+        self.encoder.scale_log2()
     }
 
     pub(crate) fn probe_count(&self) -> usize {

@@ -12,6 +12,8 @@ use crate::http::Shared;
 pub trait Outlet {
     /// Whether anyone reads this region of this field: what nobody reads is not encoded.
     fn is_watched(&self, field: u32, region: u32) -> bool;
+    /// Takes a catalog that replaces the one before.
+    fn catalog(&mut self, frame: Vec<u8>);
     /// Takes a state frame; it begins a group where it is a snapshot.
     fn state(&mut self, frame: Vec<u8>, new_group: bool);
     /// Takes a region's light.
@@ -27,7 +29,7 @@ const LAYER_PRIORITY: [u8; 3] = [2, 1, 0];
 pub(crate) struct Publisher {
     /// Ends for its readers when it is dropped.
     _broadcast: Broadcast,
-    _catalog: TrackWriter,
+    catalog: TrackWriter,
     state: TrackWriter,
     /// By field, region and layer.
     probes: Vec<Vec<[TrackWriter; 3]>>,
@@ -60,7 +62,7 @@ impl Publisher {
             probes.push(tracks);
         }
         broadcast.announce()?;
-        Ok(Self { _broadcast: broadcast, _catalog: catalog_track, state, probes, shared })
+        Ok(Self { _broadcast: broadcast, catalog: catalog_track, state, probes, shared })
     }
 
     fn tracks(&self, field: u32, region: u32) -> Option<&[TrackWriter; 3]> {
@@ -71,6 +73,10 @@ impl Publisher {
 impl Outlet for Publisher {
     fn is_watched(&self, field: u32, region: u32) -> bool {
         self.tracks(field, region).is_some_and(|layers| layers.iter().any(TrackWriter::is_used))
+    }
+
+    fn catalog(&mut self, frame: Vec<u8>) {
+        write(&mut self.catalog, frame, true, &self.shared);
     }
 
     fn state(&mut self, frame: Vec<u8>, new_group: bool) {

@@ -74,6 +74,9 @@ impl Default for GatherOptions {
 
 /// A snapshot of the scene goes out at least every so many ticks, for those who join.
 const SNAPSHOT_EVERY: u64 = 64;
+/// Ticks from one catalog to the next at least: light that flickers is not to fill slow links with
+/// catalogs.
+const CATALOG_EVERY: u64 = 25;
 /// Bytes of a snapshot from which on nothing can be added: those who join have to get it in one
 /// frame, and moves need room too.
 const SNAPSHOT_ROOM: usize = limits::FRAME_BYTES / 2;
@@ -89,6 +92,10 @@ pub struct Tick {
     budget: Budget,
     epoch: Epoch,
     number: u64,
+    /// The scales that clients know from the catalog.
+    told_scales: Vec<Option<i8>>,
+    /// The tick from which on the catalog may go out again.
+    next_catalog: u64,
     /// Of the last snapshot, and of what was added since.
     snapshot_bytes: usize,
     last_now: Option<f64>,
@@ -113,6 +120,7 @@ impl Tick {
         let volumes =
             if options.volumes.is_empty() { scene.volumes() } else { options.volumes.clone() };
         let fields = Field::all(&volumes, options.gather.blend)?;
+        let told_scales = fields.iter().map(Field::scale_log2).collect();
         let budget = Budget::new(options.period, options.samples);
         let last = Report::default();
         Ok(Self {
@@ -123,6 +131,8 @@ impl Tick {
             budget,
             epoch,
             number: 0,
+            told_scales,
+            next_catalog: 0,
             snapshot_bytes: 0,
             last_now: None,
             last,
@@ -200,6 +210,9 @@ impl Tick {
         report.seconds[Stage::Encode as usize] = watch.lap();
 
         let watched = !frames.is_empty();
+        if self.scales_are_news() {
+            outlet.catalog(self.catalog().encode());
+        }
         for (field, frame) in frames {
             outlet.probes(field, frame);
         }
@@ -274,6 +287,17 @@ impl Tick {
             frames.extend(encoded.into_iter().map(|frame| (id, frame)));
         }
         frames
+    }
+
+    /// Whether clients are to be told of another scale now; they count as told then.
+    fn scales_are_news(&mut self) -> bool {
+        let scales: Vec<_> = self.fields.iter().map(Field::scale_log2).collect();
+        if scales == self.told_scales || self.number < self.next_catalog {
+            return false;
+        }
+        self.told_scales = scales;
+        self.next_catalog = self.number + CATALOG_EVERY;
+        true
     }
 
     /// The state frame: a snapshot of the scene now and then, what changed otherwise.

@@ -21,6 +21,7 @@ const PERIOD: f64 = 0.04;
 /// Keeps what a tick sends.
 #[derive(Default)]
 struct Kept {
+    catalogs: Vec<Catalog>,
     states: Vec<StateFrame>,
     frames: Vec<(u32, EncodedRegion)>,
     unwatched: bool,
@@ -29,6 +30,10 @@ struct Kept {
 impl Outlet for Kept {
     fn is_watched(&self, _: u32, _: u32) -> bool {
         !self.unwatched
+    }
+
+    fn catalog(&mut self, frame: Vec<u8>) {
+        self.catalogs.push(Catalog::decode(&frame).expect("a catalog"));
     }
 
     fn state(&mut self, frame: Vec<u8>, new_group: bool) {
@@ -420,6 +425,33 @@ fn light_at_both_ends_of_the_scale_is_carried() {
         let (_, frame) = stepped.kept.frames.iter().rfind(|(_, f)| f.layer == 0).expect("light");
         assert!(frame.error < 0.01, "{intensity} cd: {}", frame.error);
     }
+}
+
+#[test]
+fn the_catalog_is_sent_again_when_a_scale_changes() {
+    let scales = |catalogs: &[Catalog]| -> Vec<_> {
+        catalogs.iter().map(|catalog| catalog.fields[0].scale_log2).collect()
+    };
+    let mut stepped = Stepped::new(options());
+    assert_eq!(stepped.tick.catalog().fields[0].scale_log2, None, "before there is light");
+    stepped.steps(30);
+    let told = scales(&stepped.kept.catalogs);
+    assert_eq!(told.len(), 1, "once there is light: {told:?}");
+    let largest = stepped.volume().coefficients.iter().map(|c| c.abs().max_element());
+    let ratio = largest.fold(0.0, f32::max) / f32::from(told[0].expect("a scale")).exp2();
+    assert!((0.25..2.0).contains(&ratio), "the largest coefficient is {ratio} of the scale");
+
+    // A light that flickers changes the scale with every tick; slow links are not to suffer.
+    let lamp = stepped.node("lamp");
+    stepped.kept.catalogs.clear();
+    for seq in 1..=50 {
+        stepped.step(mail(seq, dim(lamp, if seq % 2 == 1 { 1e8 } else { 1e3 })));
+    }
+    assert_eq!(stepped.kept.catalogs.len(), 2, "{:?}", scales(&stepped.kept.catalogs));
+    stepped.steps(100);
+    let last = stepped.kept.catalogs.last().expect("catalogs");
+    assert_eq!(last, &stepped.tick.catalog(), "the last is true in the end");
+    assert!(stepped.kept.catalogs.iter().all(|c| c.fields[0].has_shape_of(&last.fields[0])));
 }
 
 /// The material of the ceiling light.

@@ -7,14 +7,14 @@ import type { Edit, Vec3 } from './edit.js';
  * The arrays belong to the cache and change with the next call of `light`: read them, don't keep them.
  */
 export interface FieldLight {
-  /** What the catalog says of the field: its grid, order and use. */
+  /** What the newest catalog says of the field: its grid, order and use. */
   readonly field: Field;
   /**
    * Coefficients of arriving radiance, cd/m²: `(order+1)²` times r, g, b a probe, probe by probe with
    * x fastest, then y, then z.
    */
   readonly coefficients: Float32Array;
-  /** A power of two near the largest coefficient, by which halves are divided. */
+  /** A power of two near the largest of these coefficients, by which halves are divided. */
   readonly scale: number;
   /** Grows whenever the coefficients changed: equal revisions need no new upload. */
   readonly revision: number;
@@ -82,7 +82,7 @@ export interface RefusedEdit {
 
 /** What a session tells; the values are the listeners' argument. */
 export interface SessionEvents {
-  /** The server's fields are known, or have changed. */
+  /** The server's fields are known, or have changed in more than their scales. */
   catalog: Catalog;
   /**
    * Edits that turn the scene as it stands in its file into the scene as it is now. Comes on joining,

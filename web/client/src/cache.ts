@@ -2,7 +2,7 @@ import type { AcceptedEdit, FieldLight, LightState, RefusedEdit } from './api.js
 import { ServerClock } from './cache/clock.js';
 import { FieldCache } from './cache/field.js';
 import { type PendingEdit, PendingEdits } from './cache/pending.js';
-import { type Catalog, epochOf, parseCatalog } from './codec/catalog.js';
+import { type Catalog, epochOf, offersSame, parseCatalog } from './codec/catalog.js';
 import { readLightFile } from './codec/file.js';
 import type { ProbeHeader } from './codec/probe-header.js';
 import { parseState, type StateFrame } from './codec/state.js';
@@ -69,9 +69,16 @@ export class Cache {
     return events;
   }
 
-  /** Takes in a frame of the catalog track. */
-  addCatalog(bytes: Uint8Array): void {
-    this.setCatalog(parseCatalog(bytes));
+  /** Takes in a frame of the catalog track. Returns whether it tells more than the fields' scales. */
+  addCatalog(bytes: Uint8Array): boolean {
+    const catalog = parseCatalog(bytes);
+    if (this.saved || !this.current || !offersSame(this.current, catalog)) {
+      this.setCatalog(catalog);
+      return true;
+    }
+    for (const field of catalog.fields) this.fields.get(field.id)!.field = field;
+    this.current = catalog;
+    return false;
   }
 
   /** Starts from a saved light field; a server's light takes its place when it comes. */

@@ -108,7 +108,6 @@ class LiveSession implements Session, Sink {
   private link: Link | undefined;
   /** What is read over the link, once it has given a catalog. */
   private reading: Reading | undefined;
-  private catalogBytes: Uint8Array = new Uint8Array();
   private camera: Vec3 | undefined;
   /** Seconds awake since the link was made, or last gave a frame. */
   private silence = 0;
@@ -217,17 +216,15 @@ class LiveSession implements Session, Sink {
 
   private catalogFrame(frame: Uint8Array, link: Link): void {
     const now = this.hear('catalog', frame);
-    // A subscription that had to be made again repeats what is known.
-    if (this.reading && equal(frame, this.catalogBytes)) return;
+    let changed: boolean;
     try {
-      this.cache.addCatalog(frame);
+      changed = this.cache.addCatalog(frame);
     } catch (error) {
       if (error instanceof WireError && error.kind === 'version') return this.end(error.message);
       return this.drop(error);
     }
-    this.catalogBytes = frame;
     this.dispatch();
-    if (!this.cache.catalog) return;
+    if (!this.cache.catalog || (this.reading && !changed)) return;
     // Tracks of a former epoch or set of fields are read no more.
     this.reading?.close();
     this.meter.restart();
@@ -380,10 +377,6 @@ class LiveSession implements Session, Sink {
     this.settleReady?.reject(new Error(reason));
     this.setStatus({ state: 'closed', reason });
   }
-}
-
-function equal(a: Uint8Array, b: Uint8Array): boolean {
-  return a.length === b.length && a.every((byte, i) => byte === b[i]);
 }
 
 /** An error in words; those of several attempts one after the other, each once. */

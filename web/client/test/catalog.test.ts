@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 
-import { epochOf, parseCatalog } from '../src/codec/catalog.js';
+import { epochOf, offersSame, parseCatalog } from '../src/codec/catalog.js';
 import { parseState } from '../src/codec/state.js';
 import { FakeServer, json } from './support/fake-server.js';
 import { random } from './support/random.js';
@@ -30,6 +30,23 @@ describe('a catalog', () => {
     expect(epochOf(read, read.fields[0])).toBe(fieldEpoch);
   });
 
+  it('tells a field’s scale where there is light', () => {
+    expect('scale' in parseCatalog(catalog()).fields[0]).toBe(false);
+    expect(parseCatalog(catalog((_, f) => (f.scale_log2 = -9))).fields[0].scale).toBe(2 ** -9);
+  });
+
+  it('offers the same as another at any scale, and at nothing else', () => {
+    const one = parseCatalog(catalog());
+    const same = (change: (c: Loose, f: Loose) => void) => offersSame(one, parseCatalog(catalog(change)));
+    expect(same((_, f) => (f.scale_log2 = 5))).toBe(true);
+    expect(same((c) => (c.epoch = '00000000000000ab'))).toBe(false);
+    expect(same((_, f) => (f.epoch = '00000000000000ab'))).toBe(false);
+    expect(same((_, f) => (f.source = 'another'))).toBe(false);
+    expect(same((_, f) => (f.layers = 2))).toBe(false);
+    expect(same((_, f) => (f.grid.size = [4, 2, 3]))).toBe(false);
+    expect(same((c) => (c.fields = []))).toBe(false);
+  });
+
   it('has its rotation made a unit quaternion', () => {
     const { fields } = parseCatalog(catalog((_, field) => (field.grid.rotation = [0, 0.6001, 0, 0.8])));
     expect(Math.hypot(...fields[0].grid.rotation)).toBeCloseTo(1, 12);
@@ -45,6 +62,8 @@ describe('a catalog', () => {
     ['order 5', 'malformed', (_, f) => (f.order = 5)],
     ['an unknown use', 'malformed', (_, f) => (f.use = 'some')],
     ['no layers', 'malformed', (_, f) => (f.layers = 0)],
+    ['a scale of 2^128', 'malformed', (_, f) => (f.scale_log2 = 128)],
+    ['half a power as scale', 'malformed', (_, f) => (f.scale_log2 = 0.5)],
     ['a source of 130 bytes', 'limit', (_, f) => (f.source = 'é'.repeat(65))],
     ['an escape sequence as source', 'malformed', (_, f) => (f.source = '\u001b[2J')],
     ['a number as source', 'malformed', (_, f) => (f.source = 1)],

@@ -77,6 +77,34 @@ describe('connecting', () => {
     expect(session.light().fields[0].coefficients[0]).toBeCloseTo(1, 3);
   });
 
+  it('goes on when the catalog tells another scale', async () => {
+    const { net, server, session } = await joined();
+    const told = vi.fn();
+    session.on('catalog', told);
+    await run(net, server, 1);
+    const readers = new Map(net.link.readers);
+    const { updateRate, layers } = session.stats;
+    server.scaleLog2 = 7;
+    net.link.deliver('catalog', server.catalog);
+    expect(session.catalog?.fields[0].scale).toBe(128);
+    expect(session.light().fields[0].field.scale).toBe(128);
+    expect(net.link.readers).toEqual(readers);
+    for (const [track, reader] of readers) expect(net.link.readers.get(track), track).toBe(reader);
+    expect(session.stats).toMatchObject({ updateRate, layers, dropped: 0 });
+    expect(told).not.toHaveBeenCalled();
+    await run(net, server, 0.2);
+    expect(session.stats.dropped).toBe(0);
+  });
+
+  it('reads anew when the catalog offers something else', async () => {
+    const { net, session } = await joined();
+    const told = vi.fn();
+    session.on('catalog', told);
+    net.link.deliver('catalog', new FakeServer({ regions: 2 }).catalog);
+    expect([...net.link.readers.keys()]).toContain('f0/r1/l0');
+    expect(told).toHaveBeenCalledOnce();
+  });
+
   it('tries again, ever more slowly, and says why', async () => {
     const net = new FakeNet();
     net.refuse = 'connection refused';

@@ -122,6 +122,7 @@ impl BenchTick {
             "edits_accepted": reports.iter().map(|r| r.accepted).sum::<u64>(),
             "edits_refused": reports.iter().map(|r| r.refused).sum::<u64>(),
             "state_bytes_a_tick": sent.state as f64 / updates as f64,
+            "catalog_bytes_a_tick": sent.catalog as f64 / updates as f64,
         })
     }
 }
@@ -130,6 +131,7 @@ impl BenchTick {
 #[derive(Debug, Default)]
 struct Sent {
     state: u64,
+    catalog: u64,
     /// By field and layer.
     probes: BTreeMap<(u32, u8), u64>,
     /// Sum over probes of the squared error relative to c0, and how many.
@@ -150,6 +152,10 @@ impl Sent {
 impl Outlet for Sent {
     fn is_watched(&self, _: u32, _: u32) -> bool {
         true
+    }
+
+    fn catalog(&mut self, frame: Vec<u8>) {
+        self.catalog += frame.len() as u64;
     }
 
     fn state(&mut self, frame: Vec<u8>, _: bool) {
@@ -210,9 +216,10 @@ fn print_figures(figures: &Value) {
     }
     println!("codec       RMS error {:.3} % of c0", 100.0 * number("/codec_rms_error_of_c0"));
     println!(
-        "edits       {} accepted, {} refused; state {:.0} bytes a tick",
+        "edits       {} accepted, {} refused; state {:.0} bytes a tick, catalogs {:.0}",
         figures["edits_accepted"],
         figures["edits_refused"],
         number("/state_bytes_a_tick"),
+        number("/catalog_bytes_a_tick"),
     );
 }

@@ -84,6 +84,11 @@ impl ProbeEncoder {
         self.regions.iter().map(|state| state.region)
     }
 
+    /// log2 of the field's scale after the last update; none before there was any light.
+    pub fn scale_log2(&self) -> Option<i8> {
+        self.scale.log2()
+    }
+
     /// Encodes an update for the regions that somebody watches. A region newly watched begins at
     /// the next update of layer 0, with a keyframe. Coefficients that are not finite count as 0.
     ///

@@ -36,6 +36,11 @@ export interface Field {
   readonly regions: readonly Region[];
   /** Temporal layers, 1 to 3. */
   readonly layers: number;
+  /**
+   * A power of two near the field's largest coefficient; absent before there was any light. It follows
+   * the light: the server sends the catalog again when it has changed.
+   */
+  readonly scale?: number;
   /** What computes it, in words: `cpu path tracing`. */
   readonly source?: string;
   /** The run of the server that computes it, where that is not the catalog's; see {@link epochOf}. */
@@ -66,6 +71,13 @@ export interface Region {
 /** The run that numbers a field's updates and ticks: its own, or else the catalog's. */
 export function epochOf(catalog: Catalog, field: Field): string {
   return field.epoch ?? catalog.epoch;
+}
+
+/** Whether two catalogs offer the same fields of the same scene and run, at whatever scales. */
+export function offersSame(a: Catalog, b: Catalog): boolean {
+  const offer = ({ fields, ...rest }: Catalog) =>
+    JSON.stringify({ ...rest, fields: fields.map((field) => ({ ...field, scale: undefined })) });
+  return offer(a) === offer(b);
 }
 
 /** Number of values (coefficients times three channels) of a probe. */
@@ -126,6 +138,7 @@ function parseField(json: Json): Field {
     cellsMin: json.cells_min === undefined ? [0, 0, 0] : vec3(json.cells_min, 'cells_min', anyWhole),
     regions: parseRegions(json.regions, grid.resolution),
     layers: whole(json.layers, 'layers', LIMITS.layers, 1),
+    ...(json.scale_log2 === undefined ? {} : { scale: 2 ** whole(json.scale_log2, 'scale_log2', 127, -128) }),
     ...(json.source === undefined ? {} : { source: parseSource(json.source) }),
     ...(json.epoch === undefined ? {} : { epoch: parseEpoch(json.epoch) }),
   };

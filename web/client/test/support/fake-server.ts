@@ -46,6 +46,8 @@ export class FakeServer {
   private readonly regions: number;
   private readonly clock: number;
   readonly brightness: (update: number) => number;
+  /** log2 of the field's scale, as the catalog tells it. */
+  scaleLog2: number | undefined;
 
   constructor(options: Options = {}) {
     this.epoch = options.epoch ?? '00000000000000aa';
@@ -77,6 +79,7 @@ export class FakeServer {
             size: CELLS,
           })),
           layers: 3,
+          scale_log2: this.scaleLog2,
           ...(this.fieldEpoch === undefined ? {} : { source: 'a test', epoch: this.fieldEpoch }),
         },
         { id: 9, kind: 'something later' },
