@@ -3,7 +3,7 @@
 use anyhow::Result;
 use clap::Args;
 
-use crate::run::{build_release, command, step};
+use crate::run::{build_release, command, hand_over};
 use crate::setup::{self, Purpose};
 
 /// Options of `cargo xtask demo`.
@@ -25,6 +25,6 @@ impl Demo {
         serve.args(&self.serve);
         // Relative paths are meant from where the user stands.
         serve.current_dir(std::env::current_dir()?);
-        step("Lumencast (Ctrl-C stops it)", serve)
+        hand_over("Lumencast (Ctrl-C stops it)", serve)
     }
 }

@@ -55,6 +55,22 @@ pub(crate) fn step(title: &str, mut command: Command) -> Result<()> {
     Ok(())
 }
 
+/// Runs the last step in our place where the system can, so that Ctrl-C reaches it alone and its exit
+/// code is ours.
+pub(crate) fn hand_over(title: &str, command: Command) -> Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::process::CommandExt;
+        let mut command = command;
+        println!("\n── {title}");
+        let error = command.exec();
+        let program = command.get_program().to_string_lossy();
+        Err(error).with_context(|| format!("{title}: could not start `{program}`"))
+    }
+    #[cfg(not(unix))]
+    step(title, command)
+}
+
 /// Builds the page and, with it inside, the release program; returns the program's path.
 pub(crate) fn build_release() -> Result<PathBuf> {
     step("web packages", npm(&["ci", "--no-audit", "--no-fund"]))?;
