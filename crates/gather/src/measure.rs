@@ -11,12 +11,12 @@ use glam::{Affine3A, Vec2, Vec3};
 use lumencast_scene::{Instance, Snapshot};
 use rayon::prelude::*;
 
-use crate::accel::{AccelCache, Hit, Kernel, Ray, Stack};
+use crate::accel::{AccelCache, Hit, Kernel, Ray, Stacks};
 use crate::bsdf::frame;
 use crate::path_trace::MaterialModel;
 use crate::reference::View;
 use crate::sampling::{Sampler, cosine_hemisphere, mix2};
-use crate::world::{World, WorldCache, itself};
+use crate::world::{Passing, World, WorldCache, itself};
 
 /// Rays that a thread takes at a time.
 const CHUNK: usize = 1024;
@@ -42,6 +42,11 @@ pub struct TestHit {
     pub t: f32,
     /// Number of the triangle in [`RayBench::triangles`].
     pub triangle: u32,
+}
+
+fn numbered(rays: &[TestRay]) -> impl Iterator<Item = (Ray, usize)> + '_ {
+    let ray = |r: &TestRay| Ray { origin: r.origin, direction: r.direction, t_max: r.t_max };
+    rays.iter().enumerate().map(move |(n, r)| (ray(r), n))
 }
 
 /// A scene with rays to trace through it. Surfaces with holes count as whole.
@@ -89,18 +94,16 @@ impl RayBench {
     }
 
     fn find_rays(&mut self, view: View, count: usize) {
-        let find = |stack: &mut Stack, i: usize| self.rays_of_path(view, i as u64, stack);
+        let find = |stacks: &mut Stacks, i: usize| self.rays_of_path(view, i as u64, stacks);
         let mut found: Vec<(u64, TestRay, Option<TestRay>)> = Vec::new();
         for round in 0..ROUNDS {
             if found.len() >= count {
                 break;
             }
             let attempts = (round * count..(round + 1) * count).into_par_iter();
-            found.extend(
-                self.pool.install(|| {
-                    attempts.map_init(Stack::default, find).flatten().collect::<Vec<_>>()
-                }),
-            );
+            found.extend(self.pool.install(|| {
+                attempts.map_init(Stacks::default, find).flatten().collect::<Vec<_>>()
+            }));
         }
         found.sort_unstable_by_key(|(key, ..)| *key);
         found.truncate(count);
@@ -114,14 +117,17 @@ impl RayBench {
         &self,
         view: View,
         number: u64,
-        stack: &mut Stack,
+        stacks: &mut Stacks,
     ) -> Option<(u64, TestRay, Option<TestRay>)> {
         let mut sampler = Sampler::new(77, number as u32, 0);
         let (mut origin, mut direction) = view.ray(sampler.square(), 16.0 / 9.0);
         let mut from = None;
         for _ in 0..2 {
             let ray = Ray { origin, direction, t_max: f32::INFINITY };
-            let hit = self.world.closest(&ray, from, 0, stack)?;
+            let mut hit = None;
+            let passing = |_| Passing { ends: [from, None], key: 0 };
+            self.world.closest(std::iter::once((ray, 0)), stacks, passing, |_, found| hit = found);
+            let hit = hit?;
             let point = self.world.point(hit, direction)?;
             direction = frame(point.normal) * cosine_hemisphere(sampler.square());
             origin = point.leave(direction);
@@ -154,10 +160,16 @@ impl RayBench {
     #[must_use]
     pub fn trace_closest(&self, rays: &[TestRay]) -> Vec<Option<TestHit>> {
         let accel = self.world.accel();
-        self.trace(rays, |ray, stack| {
-            let hit = accel.closest(ray, stack, |_| true)?;
-            let triangle = self.number(&hit);
-            Some(TestHit { t: hit.t, triangle })
+        self.trace(rays, None, |rays, stacks, found| {
+            accel.closest(
+                numbered(rays),
+                stacks,
+                |_, _| true,
+                |n, hit| {
+                    let triangle = |hit: Hit| TestHit { t: hit.t, triangle: self.number(&hit) };
+                    found[n] = hit.map(triangle);
+                },
+            );
         })
     }
 
@@ -165,22 +177,25 @@ impl RayBench {
     #[must_use]
     pub fn trace_any(&self, rays: &[TestRay]) -> Vec<bool> {
         let accel = self.world.accel();
-        self.trace(rays, |ray, stack| accel.occluded(ray, stack, |_| true))
+        self.trace(rays, false, |rays, stacks, found| {
+            accel.occluded(numbered(rays), stacks, |_, _| true, |n, occluded| found[n] = occluded);
+        })
     }
 
-    fn trace<T: Send + Clone>(
+    /// What `chunk` finds of each ray, which until then is `nothing`.
+    fn trace<T: Send + Sync + Clone>(
         &self,
         rays: &[TestRay],
-        one: impl Fn(&Ray, &mut Stack) -> T + Sync,
+        nothing: T,
+        chunk: impl Fn(&[TestRay], &mut Stacks, &mut [T]) + Sync,
     ) -> Vec<T> {
-        let chunk = |stack: &mut Stack, rays: &[TestRay]| -> Vec<T> {
-            let ray =
-                |r: &TestRay| Ray { origin: r.origin, direction: r.direction, t_max: r.t_max };
-            rays.iter().map(|r| one(&ray(r), stack)).collect()
-        };
-        let found: Vec<Vec<T>> =
-            self.pool.install(|| rays.par_chunks(CHUNK).map_init(Stack::default, chunk).collect());
-        found.concat()
+        let mut found = vec![nothing; rays.len()];
+        let chunks = rays.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK));
+        self.pool.install(|| {
+            chunks
+                .for_each_init(Stacks::default, |stacks, (rays, found)| chunk(rays, stacks, found));
+        });
+        found
     }
 
     fn number(&self, hit: &Hit) -> u32 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use lumencast_scene::{AlphaMode, Instance, Material, Snapshot};
 
-use crate::accel::{Accel, AccelCache, Hit, Kernel, Ray, Stack};
+use crate::accel::{Accel, AccelCache, Hit, Kernel, Ray, Stacks};
 use crate::bsdf::Scatter;
 use crate::lights::emission::EmissionCache;
 use crate::lights::environment::{Sky, SkyCache};
@@ -47,6 +47,15 @@ struct Part {
 
 /// A triangle that a ray starts at or is aimed at, which therefore does not count.
 pub(crate) type Itself = (u32, u32, u32);
+
+/// What a ray passes by.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Passing {
+    /// The triangles that it starts at and is aimed at.
+    pub(crate) ends: [Option<Itself>; 2],
+    /// Decides about surfaces that cover only in part.
+    pub(crate) key: u64,
+}
 
 impl World {
     pub(crate) fn new(
@@ -167,28 +176,33 @@ impl World {
         &self.frames[instance as usize]
     }
 
-    /// The surface that a ray of unit direction meets first. `key` decides about surfaces that
-    /// cover only in part.
+    /// The surfaces that rays of unit direction meet first. Rays come with a number, by which
+    /// `passing` and `found` know them; they are done in no particular order.
     pub(crate) fn closest(
         &self,
-        ray: &Ray,
-        from: Option<Itself>,
-        key: u64,
-        stack: &mut Stack,
-    ) -> Option<Hit> {
-        self.accel.closest(ray, stack, |hit| Some(itself(hit)) != from && self.covers(hit, key))
+        rays: impl Iterator<Item = (Ray, u32)>,
+        stacks: &mut Stacks,
+        passing: impl Fn(u32) -> Passing,
+        found: impl FnMut(u32, Option<Hit>),
+    ) {
+        self.accel.closest(rays, stacks, |&n, hit| self.stops(hit, &passing(n)), found);
     }
 
-    /// Whether something lies on the ray, its two ends not counted.
+    /// Whether something lies on each of the rays; otherwise like [`Self::closest`].
     pub(crate) fn occluded(
         &self,
-        ray: &Ray,
-        ends: [Option<Itself>; 2],
-        key: u64,
-        stack: &mut Stack,
-    ) -> bool {
-        self.accel
-            .occluded(ray, stack, |hit| !ends.contains(&Some(itself(hit))) && self.covers(hit, key))
+        rays: impl Iterator<Item = (Ray, u32)>,
+        stacks: &mut Stacks,
+        passing: impl Fn(u32) -> Passing,
+        found: impl FnMut(u32, bool),
+    ) {
+        self.accel.occluded(rays, stacks, |&n, hit| self.stops(hit, &passing(n)), found);
+    }
+
+    /// Whether a ray that passes some surfaces by ends at this one.
+    #[inline]
+    fn stops(&self, hit: &Hit, passing: &Passing) -> bool {
+        !passing.ends.contains(&Some(itself(hit))) && self.covers(hit, passing.key)
     }
 
     /// Whether the surface is there at all, for this ray.

@@ -1,6 +1,11 @@
 //! The walk through the hierarchies.
 //!
-//! The walk itself ([`trace_with`]) is written once; what tests eight boxes or eight triangles is
+//! Several rays are in flight at once, one step of each in turn: a step waits for a node from the
+//! caches, then for one instruction after another, and meanwhile the processor works on the next
+//! ray's. That only helps while it knows which instructions come next, so with AVX2 children are
+//! sorted and put on the stack without a branch on which and how many they are.
+//!
+//! The walk itself ([`trace_with`]) is written once; what tests eight boxes or a block of triangles is
 //! passed in, so that it can be compiled for AVX2 or NEON or neither; [`Kernel::detect`] chooses.
 //!
 //! Boxes: the slab test with far distances widened by 1 + 2γ(3), so that rounding errs towards
@@ -20,7 +25,7 @@ use super::{Accel, Hit, Placed, Ray};
 /// Directions' components are kept at least this far from zero, so that no infinities arise.
 pub(super) const TINY: f32 = 1e-18;
 /// 1 + 2γ(3).
-pub(super) const WIDEN: f32 = 1.0 + 2.0 * 3.0 * f32::EPSILON;
+const WIDEN: f32 = 1.0 + 2.0 * 3.0 * f32::EPSILON;
 
 /// Which instructions to use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +40,7 @@ pub(crate) enum Kernel {
     Neon,
 }
 
-/// Proof that the processor has AVX2 and FMA.
+/// Proof that the processor has AVX2, FMA and POPCNT.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Avx2(());
@@ -44,7 +49,10 @@ impl Kernel {
     /// The fastest that this processor has.
     pub(crate) fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        if is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("popcnt")
+        {
             return Self::Avx2(Avx2(()));
         }
         // Never false; asked so that `Portable`, which tests compare with, is no dead code.
@@ -56,14 +64,64 @@ impl Kernel {
     }
 }
 
-/// What is still to be visited; kept by the caller so that rays need not allocate.
-#[derive(Debug, Default)]
-pub(crate) struct Stack(Vec<Entry>);
+/// Rays in flight. Of one to eight, three were fastest over the scenes measured.
+const IN_FLIGHT: usize = 3;
 
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    child: u32,
-    t: f32,
+/// What is still to be visited by the rays in flight; kept by the caller so that rays need not allocate.
+#[derive(Debug, Default)]
+pub(crate) struct Stacks([Stack; IN_FLIGHT]);
+
+/// What is still to be visited by one ray.
+#[derive(Debug, Default)]
+pub(super) struct Stack {
+    child: Vec<u32>,
+    /// Bits of the distance; the last three count for nothing ([`LANE_BITS`]).
+    t: Vec<u32>,
+    len: usize,
+}
+
+/// The bits of a distance that hold the child's lane while children are sorted.
+pub(super) const LANE_BITS: u32 = 7;
+
+impl Stack {
+    fn push(&mut self, child: u32) {
+        let (children, t) = self.room();
+        (children[0], t[0]) = (child, 0);
+        self.len += 1;
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> (u32, f32) {
+        self.len -= 1;
+        (self.child[self.len], f32::from_bits(self.t[self.len] & !LANE_BITS))
+    }
+
+    /// Room for a node's children above what is there, and their distances; twice as much as a node
+    /// has. What counts of it, [`Self::keep`] says.
+    #[inline(always)]
+    pub(super) fn room(&mut self) -> (&mut [u32; 16], &mut [u32; 16]) {
+        if self.child.len() < self.len + 16 {
+            self.grow();
+        }
+        let (child, t) = (&mut self.child[self.len..], &mut self.t[self.len..]);
+        match (child.first_chunk_mut(), t.first_chunk_mut()) {
+            (Some(child), Some(t)) => (child, t),
+            _ => unreachable!("it has grown"),
+        }
+    }
+
+    /// Adds what was written to the room's beginning.
+    #[inline(always)]
+    pub(super) fn keep(&mut self, count: u32) {
+        self.len += count as usize;
+    }
+
+    #[cold]
+    fn grow(&mut self) {
+        let len = (2 * self.child.len()).max(256);
+        self.child.resize(len, 0);
+        self.t.resize(len, 0);
+    }
 }
 
 /// A ray as the box and triangle tests want it.
@@ -71,6 +129,8 @@ struct Entry {
 pub(super) struct Setup {
     pub(super) origin: [f32; 3],
     pub(super) inverse: [f32; 3],
+    /// The same times [`WIDEN`].
+    pub(super) widened: [f32; 3],
     /// Rows of [`Node::planes`] that the ray meets first.
     pub(super) near: [usize; 3],
     /// The axes, the direction's longest last.
@@ -82,16 +142,7 @@ pub(super) struct Setup {
 impl Setup {
     #[inline(always)]
     pub(super) fn new(origin: Vec3A, direction: Vec3A) -> Self {
-        let origin = origin.to_array();
         let direction = direction.to_array();
-        let mut inverse = [0.0; 3];
-        let mut near = [0; 3];
-        for axis in 0..3 {
-            let d = direction[axis];
-            let safe = if d.abs() < TINY { TINY.copysign(d) } else { d };
-            inverse[axis] = 1.0 / safe;
-            near[axis] = if safe < 0.0 { axis + 3 } else { axis };
-        }
         let [x, y, z] = direction.map(f32::abs);
         let axes = match (x > y, x > z, y > z) {
             (true, true, _) => [1, 2, 0],
@@ -100,7 +151,17 @@ impl Setup {
         };
         let scale = 1.0 / direction[axes[2]];
         let shear = [direction[axes[0]] * scale, direction[axes[1]] * scale, scale];
-        Self { origin, inverse, near, axes, shear }
+        let safe = direction.map(|d| if d.abs() < TINY { TINY.copysign(d) } else { d });
+        let inverse = safe.map(|d| 1.0 / d);
+        let near = [0, 1, 2].map(|axis| if safe[axis] < 0.0 { axis + 3 } else { axis });
+        Self {
+            origin: origin.to_array(),
+            inverse,
+            widened: inverse.map(|i| i * WIDEN),
+            near,
+            axes,
+            shear,
+        }
     }
 
     /// The same ray in the space of an instance.
@@ -132,24 +193,32 @@ pub(super) struct TriangleHits {
     pub(super) v: [f32; LANES],
 }
 
-/// The nearest hit, or with `ANY` the first found.
+/// Finds the nearest hit of each ray, or with `ANY` the first found, and tells of each ray as soon as
+/// it is done. What comes with a ray is passed on to `accept` and `found`.
 #[inline]
-pub(super) fn trace<const ANY: bool>(
+pub(super) fn trace<const ANY: bool, T: Copy>(
     accel: &Accel,
-    ray: &Ray,
-    stack: &mut Stack,
-    accept: impl Fn(&Hit) -> bool,
-) -> Option<Hit> {
+    rays: impl Iterator<Item = (Ray, T)>,
+    stacks: &mut Stacks,
+    accept: impl Fn(&T, &Hit) -> bool,
+    found: impl FnMut(T, Option<Hit>),
+) {
     match accel.kernel {
-        Kernel::Portable => {
-            trace_with::<ANY>(accel, ray, stack, accept, boxes_portable, triangles_portable)
-        }
+        Kernel::Portable => trace_with::<ANY, T>(
+            accel,
+            rays,
+            stacks,
+            accept,
+            found,
+            |node, ray, t_max, stack| put::<ANY>(node, &boxes_portable(node, ray, t_max), stack),
+            triangles_portable,
+        ),
         #[cfg(target_arch = "x86_64")]
         Kernel::Avx2(_) => {
             #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
-            // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for AVX2 and FMA.
+            // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for what it needs.
             unsafe {
-                super::kernel_avx2::trace::<ANY>(accel, ray, stack, accept)
+                super::kernel_avx2::trace::<ANY, T>(accel, rays, stacks, accept, found);
             }
         }
         #[cfg(target_arch = "aarch64")]
@@ -157,135 +226,197 @@ pub(super) fn trace<const ANY: bool>(
             #[expect(unsafe_code, reason = "calls code compiled for NEON")]
             // SAFETY: `kernel_neon` refuses to compile for a target without NEON.
             unsafe {
-                super::kernel_neon::trace::<ANY>(accel, ray, stack, accept)
+                super::kernel_neon::trace::<ANY, T>(accel, rays, stacks, accept, found);
             }
         }
     }
 }
 
-/// The walk, both levels.
+/// The walk, both levels. `open` puts the children that a ray meets before `t_max` on the stack, the
+/// one to visit first on top: the nearest, or with `ANY` leaves before nodes.
 #[inline(always)]
-pub(super) fn trace_with<const ANY: bool>(
+pub(super) fn trace_with<const ANY: bool, T: Copy>(
     accel: &Accel,
-    ray: &Ray,
-    stack: &mut Stack,
-    accept: impl Fn(&Hit) -> bool,
-    boxes: impl Fn(&Node, &Setup, f32) -> BoxHits,
+    mut rays: impl Iterator<Item = (Ray, T)>,
+    stacks: &mut Stacks,
+    accept: impl Fn(&T, &Hit) -> bool,
+    mut found: impl FnMut(T, Option<Hit>),
+    open: impl Fn(&Node, &Setup, f32, &mut Stack),
     triangles: impl Fn(&Block, &Setup, f32) -> TriangleHits,
-) -> Option<Hit> {
-    let mut best: Option<Hit> = None;
-    let world = Setup::new(ray.origin.into(), ray.direction.into());
-    stack.0.clear();
-    walk::<ANY>(
-        &accel.nodes,
-        &world,
-        ray.t_max,
-        stack,
-        &boxes,
-        |instance, t_max, stack| {
-            let placed = &accel.placed[instance as usize];
-            let (nodes, blocks): (&[Node], &[Block]) = (&placed.bvh.nodes, &placed.bvh.blocks);
-            let local = world.in_object(ray, placed);
-            let ahead = |child: u32| match child & LEAF {
-                0 => fetch_ahead(&nodes[child as usize]),
-                _ => fetch_ahead(&blocks[(child & !LEAF) as usize]),
-            };
-            walk::<ANY>(
-                nodes,
-                &local,
-                t_max,
-                stack,
-                &boxes,
-                |block, t_max, _| {
-                    let block = &blocks[block as usize];
-                    match nearest(block, placed.instance, triangles(block, &local, t_max), &accept)
-                    {
-                        Some(hit) => {
-                            best = Some(hit);
-                            hit.t
-                        }
-                        None => t_max,
-                    }
-                },
-                ahead,
-            )
-        },
-        |_| {},
-    );
-    best
-}
-
-/// Visits the leaves that the ray meets before `t_max`, near ones first; `leaf` returns the new
-/// `t_max`. Returns the last `t_max`. With `ANY` leaves come before nodes, and it ends as soon as a
-/// leaf lowers `t_max`. `ahead` is told of every child that is going to be visited.
-#[inline(always)]
-fn walk<const ANY: bool>(
-    nodes: &[Node],
-    ray: &Setup,
-    mut t_max: f32,
-    stack: &mut Stack,
-    boxes: &impl Fn(&Node, &Setup, f32) -> BoxHits,
-    mut leaf: impl FnMut(u32, f32, &mut Stack) -> f32,
-    ahead: impl Fn(u32),
-) -> f32 {
-    let base = stack.0.len();
-    let mut current = 0;
-    loop {
-        if current & LEAF != 0 {
-            let shorter = leaf(current & !LEAF, t_max, stack);
-            if ANY && shorter < t_max {
-                stack.0.truncate(base);
-                return shorter;
-            }
-            t_max = shorter;
+) {
+    let mut flights: [Option<Flight<'_, T>>; IN_FLIGHT] = [const { None }; IN_FLIGHT];
+    let mut left = 0;
+    for (flight, stack) in flights.iter_mut().zip(&mut stacks.0) {
+        let Some((ray, with)) = rays.next() else { break };
+        *flight = Some(Flight::new(accel, ray, with, stack));
+        left += 1;
+    }
+    let mut turn = 0;
+    while left > 0 {
+        turn = if turn + 1 < left { turn + 1 } else { 0 };
+        let Some(flight) = &mut flights[turn] else { return };
+        if !flight.step::<ANY>(accel, &accept, &open, &triangles) {
+            continue;
+        }
+        found(flight.with, flight.best);
+        if let Some((ray, with)) = rays.next() {
+            flight.start(accel, ray, with);
         } else {
-            let node = &nodes[current as usize];
-            if let Some(next) = enter::<ANY>(node, boxes(node, ray, t_max), stack, &ahead) {
-                current = next;
-                continue;
-            }
-        }
-        loop {
-            if stack.0.len() == base {
-                return t_max;
-            }
-            let Some(next) = stack.0.pop() else { return t_max };
-            if next.t <= t_max {
-                current = next.child;
-                break;
-            }
+            left -= 1;
+            flights.swap(turn, left);
         }
     }
 }
 
-/// Puts the children that a ray meets on the stack, but for the one to visit next.
+/// A ray on its way.
+struct Flight<'a, T> {
+    with: T,
+    ray: Ray,
+    world: Setup,
+    /// In the space of `nodes`.
+    local: Setup,
+    /// Those of the instance that it is in, or of the top level, which has no blocks.
+    nodes: &'a [Node],
+    blocks: &'a [Block],
+    instance: Option<u32>,
+    t_max: f32,
+    best: Option<Hit>,
+    stack: &'a mut Stack,
+    /// Length of the stack at which the instance is done.
+    floor: usize,
+}
+
+impl<'a, T: Copy> Flight<'a, T> {
+    fn new(accel: &'a Accel, ray: Ray, with: T, stack: &'a mut Stack) -> Self {
+        let world = Setup::new(ray.origin.into(), ray.direction.into());
+        let (nodes, blocks): (&[Node], &[Block]) = (&accel.nodes, &[]);
+        let t_max = ray.t_max;
+        stack.len = 0;
+        stack.push(0);
+        Self {
+            with,
+            ray,
+            world,
+            local: world,
+            nodes,
+            blocks,
+            instance: None,
+            t_max,
+            best: None,
+            stack,
+            floor: 0,
+        }
+    }
+
+    /// Begins anew with another ray.
+    #[inline(always)]
+    fn start(&mut self, accel: &'a Accel, ray: Ray, with: T) {
+        self.with = with;
+        self.ray = ray;
+        self.world = Setup::new(ray.origin.into(), ray.direction.into());
+        self.t_max = ray.t_max;
+        self.best = None;
+        self.back_to_top(accel);
+        self.stack.len = 0;
+        self.stack.push(0);
+    }
+
+    /// Visits what is on top of the stack; whether the ray is done.
+    #[inline(always)]
+    fn step<const ANY: bool>(
+        &mut self,
+        accel: &'a Accel,
+        accept: &impl Fn(&T, &Hit) -> bool,
+        open: &impl Fn(&Node, &Setup, f32, &mut Stack),
+        triangles: &impl Fn(&Block, &Setup, f32) -> TriangleHits,
+    ) -> bool {
+        if self.stack.len == self.floor {
+            if self.stack.len == 0 {
+                return true;
+            }
+            self.back_to_top(accel);
+            return false;
+        }
+        let (child, t) = self.stack.pop();
+        if !ANY && t > self.t_max {
+            return false;
+        }
+        let index = (child & !LEAF) as usize;
+        if child & LEAF == 0 {
+            open(&self.nodes[index], &self.local, self.t_max, self.stack);
+            self.fetch_next();
+            return false;
+        }
+        let Some(instance) = self.instance else {
+            self.enter(&accel.placed[index]);
+            return false;
+        };
+        let block = &self.blocks[index];
+        let hits = triangles(block, &self.local, self.t_max);
+        if hits.mask == 0 {
+            return false;
+        }
+        let Some(hit) = nearest(block, instance, hits, |hit| accept(&self.with, hit)) else {
+            return false;
+        };
+        self.t_max = hit.t;
+        self.best = Some(hit);
+        ANY
+    }
+
+    #[inline(always)]
+    fn enter(&mut self, placed: &'a Placed) {
+        self.local = self.world.in_object(&self.ray, placed);
+        (self.nodes, self.blocks) = (&placed.bvh.nodes, &placed.bvh.blocks);
+        self.instance = Some(placed.instance);
+        self.floor = self.stack.len;
+        self.stack.push(0);
+    }
+
+    #[inline(always)]
+    fn back_to_top(&mut self, accel: &'a Accel) {
+        self.local = self.world;
+        (self.nodes, self.blocks) = (&accel.nodes, &[]);
+        self.instance = None;
+        self.floor = 0;
+    }
+
+    /// Asks for what the next step reads: most comes from the third level of cache.
+    #[inline(always)]
+    fn fetch_next(&self) {
+        let child = self.stack.child[self.stack.len.saturating_sub(1)];
+        let index = (child & !LEAF) as usize;
+        let node = self.nodes.as_ptr().wrapping_add(index).cast::<i8>();
+        let block = self.blocks.as_ptr().wrapping_add(index).cast::<i8>();
+        let at = if child & LEAF == 0 { node } else { block };
+        for line in 0..4 {
+            fetch_line(at.wrapping_add(64 * line));
+        }
+    }
+}
+
+/// Puts the children that a ray meets on the stack.
 #[inline(always)]
-fn enter<const ANY: bool>(
-    node: &Node,
-    mut hits: BoxHits,
-    stack: &mut Stack,
-    ahead: &impl Fn(u32),
-) -> Option<u32> {
-    let mut next = || {
-        let lane = hits.mask.trailing_zeros() as usize & 7;
-        hits.mask &= hits.mask.checked_sub(1)?;
-        let child = node.child[lane];
-        ahead(child);
-        Some(Entry { child, t: hits.t[lane] })
-    };
-    let mut first = next()?;
-    let base = stack.0.len();
-    while let Some(entry) = next() {
-        let is_first = if ANY { entry.child & LEAF != 0 } else { entry.t < first.t };
-        stack.0.push(if is_first { std::mem::replace(&mut first, entry) } else { entry });
+pub(super) fn put<const ANY: bool>(node: &Node, hits: &BoxHits, stack: &mut Stack) {
+    let (child, t) = stack.room();
+    let (mut mask, mut count) = (hits.mask, 0);
+    while mask != 0 {
+        let lane = mask.trailing_zeros() as usize & 7;
+        mask &= mask - 1;
+        let (new, new_t) = (node.child[lane], hits.t[lane].to_bits());
+        // Insertion sort: at most eight, mostly one or two.
+        let mut at = count;
+        while at > 0 && if ANY { child[at - 1] > new } else { t[at - 1] < new_t } {
+            (child[at], t[at]) = (child[at - 1], t[at - 1]);
+            at -= 1;
+        }
+        (child[at], t[at]) = (new, new_t);
+        count += 1;
     }
-    if !ANY {
-        far_first(&mut stack.0[base..]);
-    }
-    Some(first.child)
+    stack.keep(count as u32);
 }
 
-/// Asks for a node or block that will be visited soon: most come from the third level of cache.
+/// Asks for what will be read soon.
 #[inline(always)]
 pub(crate) fn fetch_ahead<T>(value: &T) {
     for line in (0..size_of::<T>()).step_by(64) {
@@ -322,27 +453,13 @@ fn fetch_line(at: *const i8) {
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 fn fetch_line(_: *const i8) {}
 
-/// Insertion sort by falling distance: at most eight entries, mostly one or two.
-#[inline(always)]
-fn far_first(entries: &mut [Entry]) {
-    for i in 1..entries.len() {
-        let entry = entries[i];
-        let mut at = i;
-        while at > 0 && entries[at - 1].t < entry.t {
-            entries[at] = entries[at - 1];
-            at -= 1;
-        }
-        entries[at] = entry;
-    }
-}
-
 /// The nearest of the triangles found that is accepted.
 #[inline(always)]
 fn nearest(
     block: &Block,
     instance: u32,
     mut hits: TriangleHits,
-    accept: &impl Fn(&Hit) -> bool,
+    accept: impl Fn(&Hit) -> bool,
 ) -> Option<Hit> {
     while hits.mask != 0 {
         let mut lane = hits.mask.trailing_zeros() as usize & (LANES - 1);
@@ -379,9 +496,10 @@ pub(super) fn boxes_portable(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
         for axis in 0..3 {
             let near = ray.near[axis];
             let far = if near < 3 { near + 3 } else { near - 3 };
-            let (o, i) = (ray.origin[axis], ray.inverse[axis]);
-            enter = enter.max((node.planes[near][lane] - o) * i);
-            leave = leave.min((node.planes[far][lane] - o) * i * WIDEN);
+            let near = node.planes[near][lane] - ray.origin[axis];
+            let far = node.planes[far][lane] - ray.origin[axis];
+            enter = enter.max(near * ray.inverse[axis]);
+            leave = leave.min(far * ray.widened[axis]);
         }
         hits.t[lane] = enter;
         hits.mask |= u32::from(enter <= leave) << lane;

@@ -1,54 +1,145 @@
 //! Eight boxes, or four triangles, at a time with AVX2 and FMA; see [`super::kernel`].
 
 use std::arch::x86_64::{
-    __m128, __m256, _CMP_LE_OQ, _mm_add_ps, _mm_and_ps, _mm_cmpge_ps, _mm_cmpgt_ps, _mm_cmple_ps,
-    _mm_cmpneq_ps, _mm_div_ps, _mm_fmadd_ps, _mm_fnmadd_ps, _mm_max_ps, _mm_min_ps,
-    _mm_movemask_ps, _mm_mul_ps, _mm_or_ps, _mm_set1_ps, _mm_setzero_ps, _mm_sub_ps, _mm256_cmp_ps,
-    _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_set1_ps,
-    _mm256_setzero_ps, _mm256_sub_ps,
+    __m128, __m256, __m256i, _CMP_LE_OQ, _mm_add_ps, _mm_and_ps, _mm_blend_epi32, _mm_cmpge_ps,
+    _mm_cmpgt_ps, _mm_cmple_ps, _mm_cmpneq_ps, _mm_cvtsi64_si128, _mm_div_ps, _mm_fmadd_ps,
+    _mm_fnmadd_ps, _mm_max_epi32, _mm_max_ps, _mm_min_epi32, _mm_min_ps, _mm_movemask_ps,
+    _mm_mul_ps, _mm_or_ps, _mm_set1_ps, _mm_setzero_ps, _mm_shuffle_epi32, _mm_sub_ps,
+    _mm256_andnot_si256, _mm256_castps_si256, _mm256_castsi128_si256, _mm256_castsi256_ps,
+    _mm256_castsi256_si128, _mm256_cmp_ps, _mm256_cmpgt_epi32, _mm256_cvtepu8_epi32,
+    _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps,
+    _mm256_mul_ps, _mm256_or_si256, _mm256_permutevar8x32_epi32, _mm256_set1_epi32, _mm256_set1_ps,
+    _mm256_setr_epi32, _mm256_setzero_ps, _mm256_sub_ps,
 };
 
-use super::kernel::{BoxHits, Setup, Stack, TriangleHits, WIDEN, trace_with};
+#[cfg(test)]
+use super::kernel::BoxHits;
+use super::kernel::{LANE_BITS, Setup, Stacks, TriangleHits, trace_with};
 use super::mesh_bvh::{Block, LANES};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
 
 /// [`super::kernel::trace`] compiled for AVX2.
-#[target_feature(enable = "avx2,fma")]
-pub(super) fn trace<const ANY: bool>(
+#[target_feature(enable = "avx2,fma,popcnt")]
+pub(super) fn trace<const ANY: bool, T: Copy>(
     accel: &Accel,
-    ray: &Ray,
-    stack: &mut Stack,
-    accept: impl Fn(&Hit) -> bool,
-) -> Option<Hit> {
-    trace_with::<ANY>(
+    rays: impl Iterator<Item = (Ray, T)>,
+    stacks: &mut Stacks,
+    accept: impl Fn(&T, &Hit) -> bool,
+    found: impl FnMut(T, Option<Hit>),
+) {
+    trace_with::<ANY, T>(
         accel,
-        ray,
-        stack,
+        rays,
+        stacks,
         accept,
-        |node, ray, t_max| boxes(node, ray, t_max),
+        found,
+        |node, ray, t_max, stack| {
+            // All in one place: called as a function, it would pass its vectors through memory.
+            let (mask, t) = slabs(node, ray, t_max);
+            let child = load8_bits(&node.child);
+            let count = mask.count_ones();
+            let (to, to_t) = stack.room();
+            if ANY {
+                let is_leaf = _mm256_movemask_ps(_mm256_castsi256_ps(child)) as u32;
+                let (nodes, leaves) = (mask & !is_leaf, mask & is_leaf);
+                let first = _mm256_permutevar8x32_epi32(child, members(nodes));
+                let last = _mm256_permutevar8x32_epi32(child, members(leaves));
+                let at = nodes.count_ones().min(8) as usize;
+                to[..8].copy_from_slice(&lanes_of(first));
+                to[at..at + 8].copy_from_slice(&lanes_of(last));
+            } else {
+                // Distances are not negative, so as whole numbers they have the same order. Their
+                // last bits make room for the lane.
+                let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+                let lane_bits = _mm256_set1_epi32(LANE_BITS as i32);
+                let t = _mm256_andnot_si256(lane_bits, _mm256_castps_si256(t));
+                let met = _mm256_permutevar8x32_epi32(_mm256_or_si256(t, lanes), members(mask));
+                let missing = _mm256_cmpgt_epi32(lanes, _mm256_set1_epi32(count as i32 - 1));
+                let keys = _mm256_or_si256(met, missing);
+                let keys = if count <= 4 { far_first_of_4(keys) } else { far_first_of_8(keys) };
+                // The permutation takes the lane and leaves the rest.
+                to[..8].copy_from_slice(&lanes_of(_mm256_permutevar8x32_epi32(child, keys)));
+                to_t[..8].copy_from_slice(&lanes_of(keys));
+            }
+            stack.keep(count);
+        },
         |block, ray, t_max| triangles(block, ray, t_max),
-    )
+    );
 }
 
+/// [`slabs`] as tests want it.
+#[cfg(test)]
+#[target_feature(enable = "avx2,fma")]
+pub(super) fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
+    let (mask, t) = slabs(node, ray, t_max);
+    BoxHits { mask, t: bytemuck::cast(t) }
+}
+
+/// Which boxes the ray meets before `t_max`, and where.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-pub(super) fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
+fn slabs(node: &Node, ray: &Setup, t_max: f32) -> (u32, __m256) {
     let mut enter = _mm256_setzero_ps();
     let mut leave = _mm256_set1_ps(t_max);
     for axis in 0..3 {
         let near = ray.near[axis];
         let far = if near < 3 { near + 3 } else { near - 3 };
         let origin = _mm256_set1_ps(ray.origin[axis]);
-        let inverse = _mm256_set1_ps(ray.inverse[axis]);
-        let widened = _mm256_set1_ps(ray.inverse[axis] * WIDEN);
-        let t_near = _mm256_mul_ps(_mm256_sub_ps(load8(&node.planes[near]), origin), inverse);
-        let t_far = _mm256_mul_ps(_mm256_sub_ps(load8(&node.planes[far]), origin), widened);
-        enter = _mm256_max_ps(t_near, enter);
-        leave = _mm256_min_ps(t_far, leave);
+        let near = _mm256_sub_ps(load8(&node.planes[near]), origin);
+        let far = _mm256_sub_ps(load8(&node.planes[far]), origin);
+        enter = _mm256_max_ps(_mm256_mul_ps(near, _mm256_set1_ps(ray.inverse[axis])), enter);
+        leave = _mm256_min_ps(_mm256_mul_ps(far, _mm256_set1_ps(ray.widened[axis])), leave);
     }
-    let mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave)) as u32;
-    BoxHits { mask, t: bytemuck::cast(enter) }
+    (_mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave)) as u32, enter)
+}
+
+/// For every set of lanes its members, eight bits each, the lowest first.
+static MEMBERS: [u64; 256] = {
+    let mut table = [0; 256];
+    let mut set = 0;
+    while set < 256 {
+        let (mut lane, mut count) = (0, 0);
+        while lane < 8 {
+            if set >> lane & 1 == 1 {
+                table[set] |= lane << (8 * count);
+                count += 1;
+            }
+            lane += 1;
+        }
+        set += 1;
+    }
+    table
+};
+
+/// The members of a set of lanes, for a permutation that puts them first.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn members(set: u32) -> __m256i {
+    _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(MEMBERS[set as usize & 0xff] as i64))
+}
+
+/// Sorts the first four, the greatest first; the others are lost.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn far_first_of_4(keys: __m256i) -> __m256i {
+    // A network of three stages: neighbours, halves, the middle two.
+    let k = _mm256_castsi256_si128(keys);
+    let other = _mm_shuffle_epi32::<0b10_11_00_01>(k);
+    let k = _mm_blend_epi32::<0b1010>(_mm_max_epi32(k, other), _mm_min_epi32(k, other));
+    let other = _mm_shuffle_epi32::<0b01_00_11_10>(k);
+    let k = _mm_blend_epi32::<0b1100>(_mm_max_epi32(k, other), _mm_min_epi32(k, other));
+    let other = _mm_shuffle_epi32::<0b11_01_10_00>(k);
+    let k = _mm_blend_epi32::<0b1100>(_mm_max_epi32(k, other), _mm_min_epi32(k, other));
+    _mm256_castsi128_si256(k)
+}
+
+/// Sorts, the greatest first.
+#[cold]
+fn far_first_of_8(keys: __m256i) -> __m256i {
+    let mut keys: [i32; 8] = bytemuck::cast(keys);
+    keys.sort_unstable_by(|a, b| b.cmp(a));
+    bytemuck::cast(keys)
 }
 
 #[target_feature(enable = "avx2,fma")]
@@ -112,5 +203,23 @@ fn load4(lanes: &[f32; LANES]) -> __m128 {
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn load8(lanes: &[f32; 8]) -> __m256 {
-    bytemuck::cast(*lanes)
+    #[expect(unsafe_code, reason = "copies by value are spilled to the stack")]
+    // SAFETY: the reference is valid for reads of eight numbers.
+    unsafe {
+        _mm256_loadu_ps(lanes.as_ptr())
+    }
+}
+
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn load8_bits(lanes: &[u32; 8]) -> __m256i {
+    #[expect(unsafe_code, reason = "copies by value are spilled to the stack")]
+    // SAFETY: the reference is valid for reads of eight numbers.
+    unsafe {
+        _mm256_loadu_si256(lanes.as_ptr().cast())
+    }
+}
+
+fn lanes_of(lanes: __m256i) -> [u32; 8] {
+    bytemuck::cast(lanes)
 }

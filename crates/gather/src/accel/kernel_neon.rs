@@ -6,7 +6,7 @@ use std::arch::aarch64::{
     vmvnq_u32, vorrq_u32, vsubq_f32,
 };
 
-use super::kernel::{BoxHits, Setup, Stack, TriangleHits, WIDEN, trace_with};
+use super::kernel::{BoxHits, Setup, Stacks, TriangleHits, put, trace_with};
 use super::mesh_bvh::{Block, LANES};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
@@ -16,20 +16,22 @@ const _: () = assert!(cfg!(target_feature = "neon"), "the target has no NEON");
 
 /// [`super::kernel::trace`] compiled for NEON.
 #[target_feature(enable = "neon")]
-pub(super) fn trace<const ANY: bool>(
+pub(super) fn trace<const ANY: bool, T: Copy>(
     accel: &Accel,
-    ray: &Ray,
-    stack: &mut Stack,
-    accept: impl Fn(&Hit) -> bool,
-) -> Option<Hit> {
-    trace_with::<ANY>(
+    rays: impl Iterator<Item = (Ray, T)>,
+    stacks: &mut Stacks,
+    accept: impl Fn(&T, &Hit) -> bool,
+    found: impl FnMut(T, Option<Hit>),
+) {
+    trace_with::<ANY, T>(
         accel,
-        ray,
-        stack,
+        rays,
+        stacks,
         accept,
-        |node, ray, t_max| boxes(node, ray, t_max),
+        found,
+        |node, ray, t_max, stack| put::<ANY>(node, &boxes(node, ray, t_max), stack),
         |block, ray, t_max| triangles(block, ray, t_max),
-    )
+    );
 }
 
 /// Minima and maxima are those that pass over a NaN, as `f32::min` and `f32::max` do: of a ray that
@@ -40,11 +42,11 @@ pub(super) fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
     let mut enter = [vdupq_n_f32(0.0); 2];
     let mut leave = [vdupq_n_f32(t_max); 2];
     for axis in 0..3 {
-        let near = ray.near[axis];
-        let far = if near < 3 { near + 3 } else { near - 3 };
         let origin = vdupq_n_f32(ray.origin[axis]);
         let inverse = vdupq_n_f32(ray.inverse[axis]);
-        let widened = vdupq_n_f32(ray.inverse[axis] * WIDEN);
+        let widened = vdupq_n_f32(ray.widened[axis]);
+        let near = ray.near[axis];
+        let far = if near < 3 { near + 3 } else { near - 3 };
         let (near, far) = (load8(&node.planes[near]), load8(&node.planes[far]));
         for half in 0..2 {
             let t_near = vmulq_f32(vsubq_f32(near[half], origin), inverse);

@@ -28,7 +28,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
 pub(crate) use cache::AccelCache;
-pub(crate) use kernel::{Kernel, Stack, fetch_ahead};
+pub(crate) use kernel::{Kernel, Stacks, fetch_ahead};
 pub(crate) use mesh_bvh::MeshBvh;
 
 use wide::Node;
@@ -125,26 +125,32 @@ impl Accel {
             + shared.map(|p| p.bvh.bytes()).sum::<usize>()
     }
 
-    /// The nearest surface that `accept` lets count.
+    /// The nearest surface on each ray that `accept` lets count. What comes with a ray tells `accept`
+    /// and `found` which it is; they are done in no particular order.
     #[inline]
-    pub(crate) fn closest(
+    pub(crate) fn closest<T: Copy>(
         &self,
-        ray: &Ray,
-        stack: &mut Stack,
-        accept: impl Fn(&Hit) -> bool,
-    ) -> Option<Hit> {
-        kernel::trace::<false>(self, ray, stack, accept)
+        rays: impl Iterator<Item = (Ray, T)>,
+        stacks: &mut Stacks,
+        accept: impl Fn(&T, &Hit) -> bool,
+        found: impl FnMut(T, Option<Hit>),
+    ) {
+        kernel::trace::<false, T>(self, rays, stacks, accept, found);
     }
 
-    /// Whether any surface that `accept` lets count lies on the ray.
+    /// Whether any surface that `accept` lets count lies on each ray; otherwise like
+    /// [`Self::closest`].
     #[inline]
-    pub(crate) fn occluded(
+    pub(crate) fn occluded<T: Copy>(
         &self,
-        ray: &Ray,
-        stack: &mut Stack,
-        accept: impl Fn(&Hit) -> bool,
-    ) -> bool {
-        kernel::trace::<true>(self, ray, stack, accept).is_some()
+        rays: impl Iterator<Item = (Ray, T)>,
+        stacks: &mut Stacks,
+        accept: impl Fn(&T, &Hit) -> bool,
+        mut found: impl FnMut(T, bool),
+    ) {
+        kernel::trace::<true, T>(self, rays, stacks, accept, |with, hit| {
+            found(with, hit.is_some())
+        });
     }
 }
 

@@ -1,5 +1,6 @@
 mod lanes;
 
+use std::iter::once;
 use std::sync::Arc;
 
 use glam::{Affine3A, DVec3, Quat, Vec3};
@@ -25,6 +26,20 @@ fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Arc<Mesh> {
         Vertices { normals: vec![Vec3::Y; positions.len()], positions, tangents: vec![] };
     let primitive = Primitive { triangles, vertices, ..Primitive::default() };
     Arc::new(Mesh { primitives: vec![primitive], ..Mesh::default() })
+}
+
+fn closest(accel: &Accel, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
+    let mut hit = None;
+    let accept = |(): &(), hit: &Hit| accept(hit);
+    accel.closest(once((*ray, ())), &mut Stacks::default(), accept, |(), found| hit = found);
+    hit
+}
+
+fn occluded(accel: &Accel, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> bool {
+    let mut occluded = false;
+    let accept = |(): &(), hit: &Hit| accept(hit);
+    accel.occluded(once((*ray, ())), &mut Stacks::default(), accept, |(), found| occluded = found);
+    occluded
 }
 
 /// Small triangles strewn through the unit cube.
@@ -118,12 +133,11 @@ fn finds_what_brute_force_finds() {
     let meshes = placed_soups();
     for kernel in kernels() {
         let accel = accel(&meshes, kernel);
-        let mut stack = Stack::default();
         let (mut hits, mut differ) = (0, 0);
         for i in 0..4000 {
             let origin = 3.0 * random(7, i) - 1.0;
             let ray = ray(origin, (0.1 + random(9, i).x) * (random(8, i) - origin));
-            let found = accel.closest(&ray, &mut stack, |_| true);
+            let found = closest(&accel, &ray, |_| true);
             let expected = by_brute_force(&meshes, &ray);
             hits += u32::from(found.is_some());
             // At an edge the two may decide differently, which is rare.
@@ -132,11 +146,11 @@ fn finds_what_brute_force_finds() {
                 (found, expected) => found.is_none() && expected.is_none(),
             };
             differ += u32::from(!same);
-            assert_eq!(accel.occluded(&ray, &mut stack, |_| true), found.is_some());
+            assert_eq!(occluded(&accel, &ray, |_| true), found.is_some());
             if let Some(hit) = found {
                 let before = Ray { t_max: hit.t * 0.9999, ..ray };
                 assert_eq!(
-                    accel.closest(&before, &mut stack, |_| true),
+                    closest(&accel, &before, |_| true),
                     None,
                     "nothing lies before the nearest"
                 );
@@ -146,14 +160,84 @@ fn finds_what_brute_force_finds() {
     }
 }
 
+/// Rays of very different lengths, some of which meet nothing, in turns and one by one.
+#[test]
+fn rays_in_flight_do_not_disturb_each_other() {
+    for kernel in kernels() {
+        let soup = soup(1000, 0.3);
+        let turned = |k: u16| (Affine3A::from_rotation_y(f32::from(k)), soup.clone());
+        let accel = accel(&[0, 1, 2, 3, 4].map(turned), kernel);
+        let mut stacks = Stacks::default();
+        // The second time with stacks that have been used; few, and more than are in flight.
+        for count in [1000, 0, 1, 2, 3, 4, 7] {
+            let rays: Vec<_> = (0..count)
+                .map(|i| {
+                    let origin = 3.0 * random(7, i) - 1.0;
+                    let t_max = [0.1, 1.0, 9.0][i as usize % 3];
+                    Ray { t_max, ..ray(origin, random(8, i) - origin) }
+                })
+                .collect();
+            // Every fifth ray passes the triangles of even number by.
+            let accept = |n: u32, hit: &Hit| !n.is_multiple_of(5) || hit.triangle % 2 == 1;
+            let numbered = || rays.iter().copied().zip(0..);
+            let (mut hits, mut occlusions) = (vec![None; rays.len()], vec![None; rays.len()]);
+            accel.closest(
+                numbered(),
+                &mut stacks,
+                |&n, hit| accept(n, hit),
+                |n, hit| {
+                    assert_eq!(hits[n as usize].replace(hit), None, "told once");
+                },
+            );
+            accel.occluded(
+                numbered(),
+                &mut stacks,
+                |&n, hit| accept(n, hit),
+                |n, found| {
+                    assert_eq!(occlusions[n as usize].replace(found), None, "told once");
+                },
+            );
+            for (ray, n) in numbered() {
+                let alone = closest(&accel, &ray, |hit| accept(n, hit));
+                assert_eq!(hits[n as usize], Some(alone), "{kernel:?}: {n} of {count}");
+                assert_eq!(occlusions[n as usize], Some(alone.is_some()), "{kernel:?}: {n}");
+            }
+            let met = hits.iter().flatten().flatten().count();
+            assert!(count < 1000 || (200..800).contains(&met), "{met} of {count}");
+        }
+    }
+}
+
+/// Were farther children visited first, results would be the same, but later.
+#[test]
+fn near_surfaces_are_met_first() {
+    let mut tried = Vec::new();
+    for kernel in kernels() {
+        let accel = accel(&[(Affine3A::IDENTITY, soup(3000, 0.2))], kernel);
+        let (count, hits) = (std::cell::Cell::new(0), std::cell::Cell::new(0));
+        for i in 0..4000 {
+            let ray = ray(3.0 * random(7, i) - 1.0, 0.5 - (3.0 * random(7, i) - 1.0));
+            let found = closest(&accel, &ray, |_| {
+                count.set(count.get() + 1);
+                true
+            });
+            hits.set(hits.get() + u32::from(found.is_some()));
+        }
+        assert!(hits.get() > 3900, "{kernel:?}: {}", hits.get());
+        tried.push(f64::from(count.get()) / f64::from(hits.get()));
+    }
+    let most = tried.iter().copied().fold(0.0, f64::max);
+    let least = tried.iter().copied().fold(f64::INFINITY, f64::min);
+    assert!(most < 1.6 && most / least < 1.01, "surfaces tried for each one found: {tried:?}");
+}
+
 #[test]
 fn kernels_agree() {
     let meshes = placed_soups();
     let all: Vec<_> = kernels().into_iter().map(|k| accel(&meshes, k)).collect();
-    let mut stack = Stack::default();
     for i in 0..4000 {
         let ray = ray(3.0 * random(7, i) - 1.0, sphere(random(8, i).truncate()));
-        let hits: Vec<_> = all.iter().map(|a| a.closest(&ray, &mut stack, |_| true)).collect();
+        let hits: Vec<_> = all.iter().map(|a| closest(a, &ray, |_| true)).collect();
         for pair in hits.windows(2) {
             match (pair[0], pair[1]) {
                 (Some(a), Some(b)) => {
@@ -176,10 +260,9 @@ fn refused_hits_let_the_next_one_through() {
     let layers = mesh(positions, (0..20).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect());
     for kernel in kernels() {
         let accel = accel(&[(Affine3A::IDENTITY, layers.clone())], kernel);
-        let mut stack = Stack::default();
         for passed in 0..20 {
             let down = ray(Vec3::new(0.0, 20.0, 0.0), Vec3::NEG_Y);
-            let hit = accel.closest(&down, &mut stack, |h| h.triangle < 20 - passed);
+            let hit = closest(&accel, &down, |h| h.triangle < 20 - passed);
             assert_eq!(hit.map(|h| h.triangle), Some(19 - passed));
         }
     }
@@ -199,7 +282,6 @@ fn closed_meshes_leak_nowhere() {
         kernels().into_iter().flat_map(|k| [(Affine3A::IDENTITY, k), (far, k)])
     {
         let accel = accel(&[(to_world, ball.clone())], kernel);
-        let mut stack = Stack::default();
         let p = &ball.primitives[0];
         for (i, t) in (0..).zip(&p.triangles) {
             let [a, b, c] = t.map(|k| to_world.transform_point3(p.vertices.positions[k as usize]));
@@ -208,7 +290,7 @@ fn closed_meshes_leak_nowhere() {
                     for target in [a.lerp(b, w), b.lerp(c, w), c.lerp(a, w)] {
                         let ray = ray(origin, target - origin);
                         assert!(
-                            accel.closest(&ray, &mut stack, |_| true).is_some(),
+                            closest(&accel, &ray, |_| true).is_some(),
                             "{kernel:?} {i} {ray:?}"
                         );
                     }
@@ -218,7 +300,7 @@ fn closed_meshes_leak_nowhere() {
         let center = to_world.transform_point3(Vec3::ZERO);
         for axis in Vec3::AXES {
             for direction in [axis, -axis] {
-                assert!(accel.occluded(&ray(center, direction), &mut stack, |_| true));
+                assert!(occluded(&accel, &ray(center, direction), |_| true));
             }
         }
     }
@@ -240,10 +322,9 @@ fn a_gap_of_a_millionth_is_found() {
         .collect();
     p.triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     let accel = accel(&[(Affine3A::IDENTITY, Arc::new(ball))], Kernel::detect());
-    let mut stack = Stack::default();
     let leaks = corners
         .chunks(3)
-        .filter(|t| !accel.occluded(&ray(Vec3::ZERO, 0.5 * (t[0] + t[1])), &mut stack, |_| true))
+        .filter(|t| !occluded(&accel, &ray(Vec3::ZERO, 0.5 * (t[0] + t[1])), |_| true))
         .count();
     assert!(leaks > 0);
 }
@@ -261,19 +342,18 @@ fn degenerate_input_is_harmless() {
             &[(Affine3A::IDENTITY, same.clone()), (Affine3A::IDENTITY, wild.clone())],
             kernel,
         );
-        let mut stack = Stack::default();
         for i in 0..500 {
             for direction in
                 [sphere(random(2, i).truncate()), Vec3::X, Vec3::ZERO, Vec3::splat(f32::NAN)]
             {
-                let hit = accel.closest(&ray(random(3, i), direction), &mut stack, |_| true);
+                let hit = closest(&accel, &ray(random(3, i), direction), |_| true);
                 assert!(hit.is_none_or(|h| h.instance == 1 && h.t > 0.0));
             }
         }
     }
     let nothing = accel(&[], Kernel::detect());
     assert!(nothing.bounds().is_empty());
-    assert!(!nothing.occluded(&ray(Vec3::ZERO, Vec3::X), &mut Stack::default(), |_| true));
+    assert!(!occluded(&nothing, &ray(Vec3::ZERO, Vec3::X), |_| true));
 }
 
 #[test]
@@ -293,10 +373,9 @@ fn refitted_is_as_good_as_rebuilt() {
         assert_eq!(refitted.bounds(), rebuilt.bounds());
         let accel = |bvh| Accel::new([(0, Affine3A::IDENTITY, Arc::new(bvh))], Kernel::detect());
         let (a, b) = (accel(refitted), accel(rebuilt));
-        let mut stack = Stack::default();
         for i in 0..2000 {
             let ray = ray(random(7, i) * strength.max(1.0), sphere(random(8, i).truncate()));
-            let [a, b] = [&a, &b].map(|x| x.closest(&ray, &mut stack, |_| true));
+            let [a, b] = [&a, &b].map(|x| closest(x, &ray, |_| true));
             assert_eq!(a.map(|h| h.triangle), b.map(|h| h.triangle));
         }
     }
@@ -368,17 +447,16 @@ fn surfaces_do_not_shade_themselves() {
         let world =
             World::new(snapshot, Default::default(), Kernel::detect(), &mut WorldCache::default());
         let center = world_from_object.transform_point3(Vec3::ZERO);
-        let mut stack = Stack::default();
         for i in 0..3000 {
             let direction = sphere(random(8, i).truncate());
             // From outside, where the ball is convex: nothing lies ahead.
             let from_outside = ray(center + direction * 4.0 * scale, -direction);
-            let Some(hit) = world.closest(&from_outside, None, 0, &mut stack) else { continue };
+            let Some(hit) = closest(world.accel(), &from_outside, |_| true) else { continue };
             let Some(point) = world.point(hit, from_outside.direction) else { continue };
             let away = (point.normal + 0.99 * sphere(random(9, i).truncate())).normalize();
             // No identity given: only the offset protects.
             let leaving = ray(point.leave(away), away);
-            assert!(!world.occluded(&leaving, [None, None], 0, &mut stack), "{scale} {place} {i}");
+            assert!(!occluded(world.accel(), &leaving, |_| true), "{scale} {place} {i}");
             let moved = (point.leave(away) - point.position).length();
             assert!(
                 moved < 3e-5 * (scale + place),

@@ -9,9 +9,9 @@ use glam::Vec3;
 use lumencast_light::LightField;
 
 use super::vertex::Shader;
-use crate::accel::{Hit, Ray, Stack};
+use crate::accel::{Hit, Ray, Stacks};
 use crate::sampling::Sampler;
-use crate::world::{Itself, World};
+use crate::world::{Itself, Passing, World};
 
 /// Which paths to follow.
 #[derive(Clone, Copy, Debug)]
@@ -101,8 +101,6 @@ pub(super) struct Path {
     pub(super) sampler: Sampler,
     key: u64,
     pub(super) segment: Segment,
-    /// Where the segment ends.
-    pub(super) hit: Option<Hit>,
     pub(super) throughput: Vec3,
     pub(super) seen: Seen,
 }
@@ -114,9 +112,7 @@ pub(super) struct Connection {
     pub(super) part: Part,
     pub(super) light: Vec3,
     pub(super) ray: Ray,
-    /// The triangles that it starts at and is aimed at.
-    pub(super) ends: [Option<Itself>; 2],
-    pub(super) key: u64,
+    pub(super) passing: Passing,
 }
 
 /// Points whose vertices and texels are asked for before the first of them is shaded: enough to wait
@@ -131,13 +127,17 @@ const AHEAD: usize = 16;
 pub(crate) struct Integrator<'a> {
     world: &'a World,
     limits: Paths<'a>,
-    stack: Stack,
+    stacks: Stacks,
     /// Rays traced so far.
     pub(crate) rays: u64,
     paths: Vec<Path>,
+    /// Where the paths' segments end.
+    hits: Vec<Option<Hit>>,
     /// Indices of the paths that go on.
     alive: Vec<u32>,
     connections: Vec<Connection>,
+    /// Whether something lies on them.
+    occluded: Vec<bool>,
 }
 
 impl<'a> Integrator<'a> {
@@ -145,11 +145,13 @@ impl<'a> Integrator<'a> {
         Self {
             world,
             limits,
-            stack: Stack::default(),
+            stacks: Stacks::default(),
             rays: 0,
             paths: Vec::new(),
+            hits: Vec::new(),
             alive: Vec::new(),
             connections: Vec::new(),
+            occluded: Vec::new(),
         }
     }
 
@@ -186,53 +188,62 @@ impl<'a> Integrator<'a> {
                 from: None,
                 pdf: f32::INFINITY,
             },
-            hit: None,
             throughput: Vec3::ONE,
             seen: Seen::NOTHING,
         }));
+        self.hits.resize(self.paths.len(), None);
         self.alive.clear();
         self.alive.extend(0..self.paths.len() as u32);
     }
 
     /// Traces the rays in hand.
     fn find_surfaces(&mut self, depth: u32) {
-        self.rays += self.alive.len() as u64;
-        for &index in &self.alive {
-            let path = &mut self.paths[index as usize];
-            let Segment { ray, from, .. } = &path.segment;
-            path.hit = self.world.closest(ray, *from, path.key(depth), &mut self.stack);
-            if let Some(hit) = &path.hit {
-                self.world.fetch_triangle(hit);
-            }
-        }
+        let Self { world, alive, paths, hits, stacks, .. } = self;
+        self.rays += alive.len() as u64;
+        let rays = alive.iter().map(|&index| (paths[index as usize].segment.ray, index));
+        let passing = |index: u32| {
+            let path = &paths[index as usize];
+            Passing { ends: [path.segment.from, None], key: path.key(depth) }
+        };
+        world.closest(rays, stacks, passing, |index, hit| {
+            hit.iter().for_each(|hit| world.fetch_triangle(hit));
+            hits[index as usize] = hit;
+        });
     }
 
     /// Traces the shadow rays and adds the light of those that arrive.
     fn connect(&mut self) {
-        self.rays += self.connections.len() as u64;
-        for c in self.connections.drain(..) {
-            if !self.world.occluded(&c.ray, c.ends, c.key, &mut self.stack) {
-                self.paths[c.path as usize].seen.add(c.part, c.light);
+        let Self { world, connections, occluded, paths, stacks, .. } = self;
+        self.rays += connections.len() as u64;
+        occluded.resize(connections.len(), false);
+        let rays = connections.iter().zip(0..).map(|(c, n)| (c.ray, n));
+        let passing = |n: u32| connections[n as usize].passing;
+        world.occluded(rays, stacks, passing, |n, found| occluded[n as usize] = found);
+        // In order, so that sums do not depend on which ray was done first.
+        for (c, occluded) in connections.drain(..).zip(occluded) {
+            if !*occluded {
+                paths[c.path as usize].seen.add(c.part, c.light);
             }
         }
     }
 
     /// Goes one scattering event further on every path.
     fn shade(&mut self, depth: u32) {
-        let Self { world, paths, limits, connections, .. } = self;
+        let Self { world, paths, hits, limits, connections, .. } = self;
         let mut shader = Shader { world, limits, depth, connections };
         let mut kept = 0;
         for first in (0..self.alive.len()).step_by(AHEAD) {
             let group = first..self.alive.len().min(first + AHEAD);
-            let hits = || {
-                let paths = self.alive[group.clone()].iter().map(|&index| &paths[index as usize]);
-                paths.filter_map(|path| path.hit.as_ref())
+            let met = || {
+                let alive = self.alive[group.clone()].iter();
+                alive.filter_map(|&index| hits[index as usize].as_ref())
             };
-            hits().for_each(|hit| world.fetch_vertices(hit));
-            hits().for_each(|hit| world.fetch_texels(hit));
+            met().for_each(|hit| world.fetch_vertices(hit));
+            met().for_each(|hit| world.fetch_texels(hit));
             for at in group {
                 let index = self.alive[at];
-                if shader.vertex(index, &mut paths[index as usize]).is_some() {
+                let (path, hit) = (&mut paths[index as usize], hits[index as usize]);
+                if shader.vertex(index, path, hit).is_some() {
                     self.alive[kept] = index;
                     kept += 1;
                 }

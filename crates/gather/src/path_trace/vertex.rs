@@ -4,12 +4,12 @@ use glam::{Mat3, Vec3};
 use lumencast_light::{LightField, OffsetPolicy};
 
 use super::integrator::{Connection, Part, Path, Paths, Segment};
-use crate::accel::Ray;
+use crate::accel::{Hit, Ray};
 use crate::bsdf::{Bsdf, Scatter};
 use crate::lights::AreaSample;
 use crate::sampling::{Sampler, luminance, power_heuristic};
 use crate::surface::{MaterialModel, Point};
-use crate::world::{World, itself};
+use crate::world::{Passing, World, itself};
 
 /// What happens where a path's ray has arrived.
 pub(super) struct Shader<'a> {
@@ -22,18 +22,18 @@ pub(super) struct Shader<'a> {
 }
 
 impl Shader<'_> {
-    /// Adds what shines, notes which lights to reach for, and turns the ray; `None` where the path
-    /// ends.
-    pub(super) fn vertex(&mut self, index: u32, path: &mut Path) -> Option<()> {
+    /// Adds what shines, notes which lights to reach for, and turns the ray that has met `hit`; `None`
+    /// where the path ends.
+    pub(super) fn vertex(&mut self, index: u32, path: &mut Path, hit: Option<Hit>) -> Option<()> {
         let world = self.world;
         let depth = self.depth;
         let part = Part::after(depth);
         if depth > 0 && world.lights.punctual.have_size() {
-            let end = path.hit.map_or(f32::INFINITY, |hit| hit.t);
+            let end = hit.map_or(f32::INFINITY, |hit| hit.t);
             let discs = path.throughput * self.discs(&path.segment, end);
             path.seen.add(Part::after(depth - 1), self.limited(depth, discs));
         }
-        let Some(hit) = path.hit else {
+        let Some(hit) = hit else {
             let sky = path.throughput * self.sky(&path.segment);
             path.seen.add(part, self.limited(depth, sky));
             return None;
@@ -123,8 +123,10 @@ impl Shader<'_> {
             part: Part::after(self.depth),
             light,
             ray,
-            ends: [Some(itself(&vertex.point.hit)), None],
-            key: path.key(self.depth) + 1,
+            passing: Passing {
+                ends: [Some(itself(&vertex.point.hit)), None],
+                key: path.key(self.depth) + 1,
+            },
         });
     }
 
@@ -164,8 +166,10 @@ impl Shader<'_> {
             part: Part::Indirect,
             light,
             ray,
-            ends: [Some(itself(&vertex.point.hit)), target],
-            key: path.key(self.depth) + 2,
+            passing: Passing {
+                ends: [Some(itself(&vertex.point.hit)), target],
+                key: path.key(self.depth) + 2,
+            },
         });
     }
 
