@@ -79,11 +79,7 @@ fn print_report(report: &Value) {
         "processor   {}, {} cores, rays are traced with {}",
         text("/processor/name"),
         text("/processor/cores"),
-        match ["/processor/avx2", "/processor/fma", "/processor/neon"].map(yes) {
-            [true, true, _] => "AVX2",
-            [.., true] => "NEON",
-            _ => "portable code: it has neither AVX2 and FMA nor NEON",
-        },
+        text("/processor/rays"),
     );
     println!("memory      {} GiB", text("/system/memory_gib"));
     for driver in report["drivers"].as_array().into_iter().flatten() {
@@ -145,8 +141,8 @@ fn processor() -> Value {
     #[cfg(not(target_arch = "x86_64"))]
     let (avx2, fma) = (false, false);
     let cores = thread::available_parallelism().map_or(1, |n| n.get());
-    let neon = cfg!(target_arch = "aarch64");
-    json!({ "name": name, "cores": cores, "avx2": avx2, "fma": fma, "neon": neon })
+    let rays = lumencast_gather::measure::instructions();
+    json!({ "name": name, "cores": cores, "avx2": avx2, "fma": fma, "rays": rays })
 }
 
 /// Driver manifests where the Vulkan loader looks for them.

@@ -18,6 +18,18 @@ use crate::reference::View;
 use crate::sampling::{Sampler, cosine_hemisphere, mix2};
 use crate::world::{Passing, World, WorldCache, itself};
 
+/// The instructions that rays are traced with on this machine, for people.
+#[must_use]
+pub fn instructions() -> &'static str {
+    match Kernel::detect() {
+        Kernel::Portable => "portable code: it has neither AVX2, FMA and POPCNT nor NEON",
+        #[cfg(target_arch = "x86_64")]
+        Kernel::Avx2(_) => "AVX2",
+        #[cfg(target_arch = "aarch64")]
+        Kernel::Neon => "NEON",
+    }
+}
+
 /// Rays that a thread takes at a time.
 const CHUNK: usize = 1024;
 

@@ -32,7 +32,7 @@ const WIDEN: f32 = 1.0 + 2.0 * 3.0 * f32::EPSILON;
 pub(crate) enum Kernel {
     /// Plain Rust.
     Portable,
-    /// AVX2 and FMA.
+    /// AVX2, FMA and POPCNT.
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
     /// NEON, which every aarch64 processor has.
@@ -404,7 +404,7 @@ pub(super) fn put<const ANY: bool>(node: &Node, hits: &BoxHits, stack: &mut Stac
         let lane = mask.trailing_zeros() as usize & 7;
         mask &= mask - 1;
         let (new, new_t) = (node.child[lane], hits.t[lane].to_bits());
-        // Insertion sort: at most eight, mostly one or two.
+        // Insertion sort: at most eight, mostly one or two. Leaves are greater than nodes.
         let mut at = count;
         while at > 0 && if ANY { child[at - 1] > new } else { t[at - 1] < new_t } {
             (child[at], t[at]) = (child[at - 1], t[at - 1]);
