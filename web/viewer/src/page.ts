@@ -84,7 +84,7 @@ function inside(viewer: Viewer): Inside {
     stats: () => viewer.stats(),
     setMode: (shown) => viewer.setMode(shown),
     pixel: (x, y) => viewer.pixel(x, y),
-    pixels: (points) => viewer.pixels(points),
+    pixels: (points, now) => viewer.pixels(points, now),
   };
 }
 

@@ -205,15 +205,18 @@ export class Viewer {
     }
   }
 
-  /** Red, green, blue, 0 to 255, of points of one picture drawn now; from the upper left, in CSS pixels. */
-  pixels(points: readonly (readonly [x: number, y: number])[]): [r: number, g: number, b: number][] {
+  /** Red, green, blue, 0 to 255, of points of a picture drawn for `now`; from the upper left, in CSS pixels. */
+  pixels(
+    points: readonly (readonly [x: number, y: number])[],
+    now: number = performance.now(),
+  ): [r: number, g: number, b: number][] {
     const { canvas } = this.options;
     const copy = document.createElement('canvas');
     copy.width = canvas.width;
     copy.height = canvas.height;
     const context = copy.getContext('2d', { willReadFrequently: true })!;
     // A canvas holds its picture only until the browser has shown it.
-    this.draw();
+    this.draw(now);
     context.drawImage(canvas, 0, 0);
     const { data } = context.getImageData(0, 0, copy.width, copy.height);
     const { width, height } = canvas.getBoundingClientRect();

@@ -11,7 +11,7 @@ import type { Browser, Page } from 'playwright-core';
 import { preview } from 'vite';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { buildPage, difference, draw, look, openPage, type Pixel, shoot } from './browser.js';
+import { buildPage, difference, draw, look, looks, openPage, type Pixel, shoot } from './browser.js';
 import { freePort, lumencastProgram, Server } from './server.js';
 
 const VIEWPORT = { width: 800, height: 600 };
@@ -356,7 +356,7 @@ describe('a page drawn by WebGPU', () => {
       const page = await openPage(browser, server.address, VIEWPORT, query, errors);
       await page.waitForTimeout(1500);
       expect(await page.evaluate(() => 'isWebGPURenderer' in window.lumencast!.renderer)).toBe(true);
-      const [direct, both] = [await look(page, 'direct'), await look(page, 'both')];
+      const [direct, both] = await looks(page, ['direct', 'both']);
       expect(both.filter((pixel) => sum(pixel) > 60).length).toBeGreaterThan(both.length / 4);
       expect(both.some(([r, g]) => r > 1.5 * g && r > 40)).toBe(true);
       expect(both.some(([r, g]) => g > 1.2 * r && g > 40)).toBe(true);
@@ -388,7 +388,7 @@ describe('a scene of two volumes', () => {
       expect(fields.grids).toBe(2);
       for (const mean of fields.means) expect(mean).toBeGreaterThan(0);
       await page.evaluate(() => window.lumencast!.viewer.meter());
-      const [direct, both] = [await look(page, 'direct'), await look(page, 'both')];
+      const [direct, both] = await looks(page, ['direct', 'both']);
       await shoot(page, 'door.png');
       const dark = [...direct.keys()].filter((i) => sum(direct[i]) < 10);
       // Most of the room behind the door.
@@ -423,7 +423,7 @@ describe('a page without a server', () => {
       const query = { ...SCALE, light: 'cornell.light', gltf: 'cornell.glb' };
       const page = await openPage(browser, address, VIEWPORT, query, errors);
       expect(await page.textContent('.notice.standing')).toContain('saved light');
-      const [direct, both] = [await look(page, 'direct'), await look(page, 'both')];
+      const [direct, both] = await looks(page, ['direct', 'both']);
       expect(brightness(both)).toBeGreaterThan(1.1 * brightness(direct));
       await shoot(page, 'saved.png');
       // What is moved goes back, as nobody computes its light.

@@ -10,7 +10,7 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { buildPage, difference, look, openPage, type Pixel, SHOTS, shoot } from './browser.js';
+import { buildPage, difference, look, looks, openPage, type Pixel, SHOTS, shoot } from './browser.js';
 import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
 
 /** Small: every pixel is drawn by the processor. */
@@ -57,9 +57,7 @@ describe('the page', () => {
   }, 60_000);
 
   it('brightens what direct light does not reach', async () => {
-    const direct = await look(page, 'direct');
-    const both = await look(page, 'both');
-    const indirect = await look(page, 'indirect');
+    const [direct, indirect, both] = await looks(page, ['direct', 'indirect', 'both']);
     const sum = ([r, g, b]: Pixel) => r + g + b;
     const shadowed = [...direct.keys()].filter((i) => sum(direct[i]) < 20 && sum(indirect[i]) > 20);
     expect(shadowed.length).toBeGreaterThan(5);

@@ -53,17 +53,27 @@ export async function openPage(
 /** Red, green, blue, 0 to 255. */
 export type Pixel = [r: number, g: number, b: number];
 
+type Shown = 'both' | 'direct' | 'indirect';
+
 /** Points of the picture on a grid, with one part of the light shown. */
-export function look(page: Page, shown: 'both' | 'direct' | 'indirect'): Promise<Pixel[]> {
-  return page.evaluate((shown) => {
+export async function look(page: Page, shown: Shown): Promise<Pixel[]> {
+  return (await looks(page, [shown]))[0];
+}
+
+/** The parts of the light one by one, all at one instant: between two, light goes on changing. */
+export function looks(page: Page, parts: readonly Shown[]): Promise<Pixel[][]> {
+  return page.evaluate((parts) => {
     const { pixels, setMode } = window.lumencast!;
-    setMode(shown);
     const points: [number, number][] = [];
     for (let y = 10; y < innerHeight; y += 15) {
       for (let x = 10; x < innerWidth; x += 15) points.push([x, y]);
     }
-    return pixels(points);
-  }, shown);
+    const now = performance.now();
+    return parts.map((shown) => {
+      setMode(shown);
+      return pixels(points, now);
+    });
+  }, parts);
 }
 
 /** Mean difference of two pictures over their mean brightness. */
