@@ -28,7 +28,7 @@ fn probe(scene: &Arc<Snapshot>, at: Vec3, materials: MaterialModel) -> ProbeEsti
 fn picture(scene: &Arc<Snapshot>, view: View, materials: MaterialModel) -> Vec<Vec3> {
     let settings =
         PictureSettings { size: UVec2::new(24, 16), materials, ..PictureSettings::default() };
-    let mut film = Film::new(settings.size);
+    let mut film = Film::new(settings.size, 4);
     Renderer::new(scene, view, settings).unwrap().pass(&mut film, 4, &|_| true).unwrap();
     film.picture()
 }

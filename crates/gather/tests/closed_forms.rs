@@ -342,7 +342,7 @@ fn floors_in_a_furnace() {
         view.projection =
             Projection::Orthographic { half_width: 0.1, half_height: 0.1, near: 0.0, far: 20.0 };
         let renderer = Renderer::new(&stage.snapshot(), view, settings).unwrap();
-        let mut film = Film::new(settings.size);
+        let mut film = Film::new(settings.size, 64);
         while film.samples() < 64 {
             renderer.pass(&mut film, 64, &|_| true).unwrap();
         }

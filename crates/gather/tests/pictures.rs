@@ -15,7 +15,7 @@ fn settings() -> PictureSettings {
 
 fn render(scene: &Arc<Snapshot>, view: View, settings: PictureSettings, samples: u32) -> Film {
     let renderer = Renderer::new(scene, view, settings).unwrap();
-    let mut film = Film::new(settings.size);
+    let mut film = Film::new(settings.size, samples);
     while film.samples() < samples {
         renderer.pass(&mut film, samples, &|_| true).unwrap();
     }
@@ -53,13 +53,13 @@ fn results_depend_neither_on_threads_nor_on_interruption() {
     assert_eq!(whole, with(3));
 
     let renderer = Renderer::new(&scene, view, settings()).unwrap();
-    let mut film = Film::new(settings().size);
+    let mut film = Film::new(settings().size, 24);
     renderer.pass(&mut film, 24, &|_| true).unwrap();
     let before = film.clone();
     assert_eq!(renderer.pass(&mut film, 24, &|done| done < 0.4), None);
     assert_eq!(film, before, "a pass that was stopped leaves no trace");
     let kept = film.parts().map(|(sums, samples)| (sums.to_vec(), samples));
-    let mut film = Film::from_parts(film.size(), kept).unwrap();
+    let mut film = Film::from_parts(film.size(), film.planned(), kept).unwrap();
     while film.samples() < 24 {
         renderer.pass(&mut film, 24, &|_| true).unwrap();
     }
@@ -121,18 +121,24 @@ fn roulette_is_unbiased() {
 }
 
 #[test]
-fn noise_is_what_more_samples_take_away() {
+fn noise_is_hardly_more_than_what_more_samples_take_away() {
     let (scene, view) = cornell();
-    // Without mirrors, so that no rare bright path decides.
+    // Without mirrors, so that no rare bright path decides, and without the lamp's edge, where what
+    // the halves tell is furthest above the truth.
     let with_seed = |seed, samples| {
-        let materials = MaterialModel::Lambert;
-        render(&scene, view, PictureSettings { materials, seed, ..settings() }, samples)
+        let settings = PictureSettings {
+            materials: MaterialModel::Lambert,
+            parts: Parts::Indirect,
+            seed,
+            ..settings()
+        };
+        render(&scene, view, settings, samples)
     };
     let smooth = with_seed(99, 512);
     let truth = smooth.picture();
     let values = 3.0 * truth.len() as f64;
     let mean = truth.iter().map(|v| f64::from(v.element_sum())).sum::<f64>() / values;
-    // A few pixels at the lamp's edge make most of the noise, so one picture tells little.
+    // One picture tells little.
     let (mut told, mut is) = (0.0, 0.0);
     for seed in 0..16 {
         let rough = with_seed(seed, 16);
@@ -141,9 +147,10 @@ fn noise_is_what_more_samples_take_away() {
         is += errors.map(|e| f64::from(e.length_squared())).sum::<f64>() / values / (mean * mean);
     }
     let ratio = (told / is).sqrt();
-    assert!((0.85..1.15).contains(&ratio), "{ratio}");
+    // Halves of one well-spread sequence differ by more than independent ones.
+    assert!((0.98..1.25).contains(&ratio), "{ratio}");
     assert!(smooth.noise(1.0).unwrap().relative_rms < 0.3 * (told / 16.0).sqrt());
-    assert_eq!(Film::new(UVec2::ONE).noise(1.0), None);
+    assert_eq!(Film::new(UVec2::ONE, 1).noise(1.0), None);
 }
 
 #[test]

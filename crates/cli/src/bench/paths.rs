@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use lumencast_gather::reference::{Film, PictureSettings, Renderer};
+use lumencast_gather::reference::{Film, PASS, PictureSettings, Renderer};
 use serde_json::json;
 
 use super::Spread;
@@ -41,7 +41,7 @@ impl BenchPaths {
         let settings = PictureSettings { roulette_from: u32::MAX, ..self.picture.settings() };
         let renderer = Renderer::new(&scene.snapshot(), view, settings)
             .context("cannot start the threads that trace")?;
-        let mut film = Film::new(self.picture.size);
+        let mut film = Film::new(self.picture.size, PASS * self.rounds);
         let bar = output::bar(self.rounds.into(), "Tracing");
         let (mut paths, mut segments) = (Vec::new(), Vec::new());
         for _ in 0..self.rounds {

@@ -231,7 +231,7 @@ impl Render {
                         partial.display()
                     );
                 }
-                Film::new(self.picture.size)
+                Film::new(self.picture.size, self.spp)
             }
         }
     }

@@ -1,8 +1,8 @@
 //! A picture that is not finished, kept beside it.
 //!
 //! One line that names the format, then little-endian numbers: a key of all that the picture depends
-//! on (u64), width and height (u32), samples of both halves (u32), the sums of both (f32), a hash of
-//! all before (u64).
+//! on (u64), width and height, samples planned and samples of both halves (u32), the sums of both (f32), a
+//! hash of all before (u64).
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -12,7 +12,7 @@ use anyhow::{Context, Result};
 use glam::{UVec2, Vec3};
 use lumencast_gather::reference::Film;
 
-const MAGIC: &[u8] = b"lumencast picture 1\n";
+const MAGIC: &[u8] = b"lumencast picture 2\n";
 
 /// Where the unfinished picture of a file is kept.
 pub(super) fn path_of(output: &Path) -> PathBuf {
@@ -26,7 +26,7 @@ pub(super) fn write(path: &Path, key: u64, film: &Film) -> Result<()> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend(key.to_le_bytes());
     let [a, b] = film.parts();
-    for number in [film.size().x, film.size().y, a.1, b.1] {
+    for number in [film.size().x, film.size().y, film.planned(), a.1, b.1] {
         bytes.extend(number.to_le_bytes());
     }
     for sum in a.0.iter().chain(b.0) {
@@ -45,7 +45,7 @@ pub(super) fn read(path: &Path, key: u64, size: UVec2) -> Option<Film> {
     let (content, end) = bytes.split_last_chunk::<8>()?;
     let rest = content.strip_prefix(MAGIC)?;
     let (found, rest) = rest.split_first_chunk::<8>()?;
-    let (numbers, sums) = rest.split_first_chunk::<16>()?;
+    let (numbers, sums) = rest.split_first_chunk::<20>()?;
     let number = |i: usize| Some(u32::from_le_bytes(*numbers[4 * i..].first_chunk()?));
     let same = u64::from_le_bytes(*found) == key
         && UVec2::new(number(0)?, number(1)?) == size
@@ -57,7 +57,7 @@ pub(super) fn read(path: &Path, key: u64, size: UVec2) -> Option<Film> {
     let values: Vec<f32> = values.iter().map(|v| f32::from_le_bytes(*v)).collect();
     let mut sums: Vec<Vec3> = values.chunks_exact(3).map(Vec3::from_slice).collect();
     let second = sums.split_off(sums.len() / 2);
-    Film::from_parts(size, [(sums, number(2)?), (second, number(3)?)])
+    Film::from_parts(size, number(2)?, [(sums, number(3)?), (second, number(4)?)])
 }
 
 fn hash(bytes: &[u8]) -> u64 {
@@ -75,7 +75,8 @@ mod tests {
         let path = std::env::temp_dir().join(format!("lumencast-{}.part", std::process::id()));
         let size = UVec2::new(3, 2);
         let sums = |f: f32| (0..6).map(|i| Vec3::splat(f * i as f32)).collect::<Vec<_>>();
-        let film = Film::from_parts(size, [(sums(0.5), 8), (sums(2.0), 5)]).expect("six pixels");
+        let halves = [(sums(0.5), 8), (sums(2.0), 5)];
+        let film = Film::from_parts(size, 16, halves).expect("six pixels");
         write(&path, 7, &film).expect("a folder for temporary files");
         assert_eq!(read(&path, 7, size), Some(film));
         assert_eq!(read(&path, 8, size), None, "other settings");

@@ -1,7 +1,9 @@
 //! What a picture has gathered so far.
 //!
-//! Samples go in turn to two halves that share nothing: their difference tells the noise of their
-//! mean, whatever the sampler does to spread its numbers.
+//! Samples go in turn to two halves, whose difference tells the noise of their mean. Each half is a
+//! well-spread part of the pixel's sequence, and both together are one that is spread better still:
+//! 64 samples err by a sixth less (squared) than two times 32 that know nothing of each other. So the
+//! halves are more unlike than two independent ones, and what they tell is an upper bound.
 
 use glam::{DVec3, UVec2, Vec3};
 
@@ -9,6 +11,7 @@ use glam::{DVec3, UVec2, Vec3};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     size: UVec2,
+    planned: u32,
     halves: [Half; 2],
 }
 
@@ -18,7 +21,8 @@ struct Half {
     samples: u32,
 }
 
-/// How far a picture is from the one that endless samples would give, as far as its halves tell.
+/// How far a picture is at most from the one that endless samples would give, as its halves tell:
+/// 1.0 to 1.2 times the distance that it has, on our scenes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Root of the mean squared error, as a share of the picture's mean radiance.
@@ -29,20 +33,22 @@ pub struct Noise {
 }
 
 impl Film {
-    /// Nothing seen yet.
+    /// Nothing seen yet. Samples are spread best when there are `planned` a pixel, or two, four, …
+    /// times as many; any number is sound.
     #[must_use]
-    pub fn new(size: UVec2) -> Self {
+    pub fn new(size: UVec2, planned: u32) -> Self {
         let pixels = size.x as usize * size.y as usize;
         let half = Half { sums: vec![Vec3::ZERO; pixels], samples: 0 };
-        Self { size, halves: [half.clone(), half] }
+        Self { size, planned, halves: [half.clone(), half] }
     }
 
     /// A film as [`Film::parts`] gave it; `None` where lengths do not agree.
     #[must_use]
-    pub fn from_parts(size: UVec2, halves: [(Vec<Vec3>, u32); 2]) -> Option<Self> {
+    pub fn from_parts(size: UVec2, planned: u32, halves: [(Vec<Vec3>, u32); 2]) -> Option<Self> {
         let pixels = size.x as usize * size.y as usize;
         let sound = halves.iter().all(|(sums, _)| sums.len() == pixels);
-        sound.then(|| Self { size, halves: halves.map(|(sums, samples)| Half { sums, samples }) })
+        let halves = halves.map(|(sums, samples)| Half { sums, samples });
+        sound.then_some(Self { size, planned, halves })
     }
 
     /// Sums and numbers of samples of both halves, to be kept and gone on with later.
@@ -57,6 +63,12 @@ impl Film {
         self.size
     }
 
+    /// Samples a pixel that it was made for.
+    #[must_use]
+    pub fn planned(&self) -> u32 {
+        self.planned
+    }
+
     /// Samples a pixel so far.
     #[must_use]
     pub fn samples(&self) -> u32 {
@@ -67,6 +79,19 @@ impl Film {
     pub(super) fn next_half(&self) -> (usize, u32) {
         let behind = usize::from(self.halves[1].samples < self.halves[0].samples);
         (behind, self.halves[behind].samples)
+    }
+
+    /// Where the `n`-th sample of a half stands in its pixel's sequence. The first half takes the lower
+    /// part of what is planned, rounded up to a power of two, and the second the upper part; then each
+    /// takes half of as much again, and so on: aligned parts of the sequence are well spread, each
+    /// by itself and together.
+    pub(super) fn place(&self, half: usize, n: u32) -> u32 {
+        let first = self.planned.div_ceil(2).next_power_of_two();
+        let (stage, begin) = match n / first {
+            0 => (first, 0),
+            times => (first << times.ilog2(), 2 * (first << times.ilog2())),
+        };
+        begin + half as u32 * stage + n % stage
     }
 
     /// Adds sums of `samples` samples a pixel to a half.
@@ -102,11 +127,34 @@ impl Film {
         }
         let pixels = a.sums.len().max(1) as f64;
         let per_channel = |sum: DVec3| sum.element_sum() / (3.0 * pixels);
-        // The mean of two independent halves errs by half of what they differ by.
+        // The mean of two independent halves errs by half of what they differ by; of ours, by less.
         let rms = (0.25 * per_channel(linear)).sqrt();
         Some(Noise {
             relative_rms: if rms > 0.0 { rms / per_channel(mean) } else { 0.0 },
             psnr: -10.0 * (0.25 * per_channel(display)).log10(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_share_the_sequence() {
+        for planned in [0, 1, 2, 6, 64, 100] {
+            let film = Film::new(UVec2::ONE, planned);
+            let whole = planned.div_ceil(2).next_power_of_two();
+            for samples in [whole, 2 * whole, 4 * whole] {
+                let of = |half| (0..samples).map(move |n| (half, n));
+                let places = of(0).chain(of(1)).map(|(half, n)| film.place(half, n));
+                let mut places: Vec<_> = places.collect();
+                places.sort_unstable();
+                assert!(
+                    places.into_iter().eq(0..2 * samples),
+                    "{planned} planned, {samples} a half"
+                );
+            }
+        }
     }
 }

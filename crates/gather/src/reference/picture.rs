@@ -12,7 +12,7 @@ use super::{Film, Filter, View};
 use crate::accel::Kernel;
 use crate::path_trace::MaterialModel;
 use crate::path_trace::integrator::{Integrator, Look, Paths, Seen};
-use crate::sampling::{Sampler, mix2};
+use crate::sampling::Sampler;
 use crate::world::{World, WorldCache};
 
 /// Pixels along the side of what a thread takes at a time.
@@ -94,7 +94,7 @@ pub struct Traced {
 /// let view = View::look_at(Vec3::new(0.0, 1.0, 3.0), Vec3::Y, 0.7).expect("two points");
 /// let settings = PictureSettings { size: UVec2::new(32, 24), ..PictureSettings::default() };
 /// let renderer = Renderer::new(&scene, view, settings)?;
-/// let mut film = Film::new(settings.size);
+/// let mut film = Film::new(settings.size, 16);
 /// while film.samples() < 16 {
 ///     renderer.pass(&mut film, 16, &|_| true);
 /// }
@@ -153,6 +153,7 @@ impl Renderer {
         // The end of each half is fixed by `until`, so that the last passes are whole as well.
         let share = if half == 0 { until.div_ceil(2) } else { until / 2 };
         let samples = share.saturating_sub(first).min(PASS);
+        let places: Vec<u32> = (first..first + samples).map(|n| film.place(half, n)).collect();
         let size = self.settings.size;
         let tiles_across = size.x.div_ceil(TILE);
         let tiles = tiles_across * size.y.div_ceil(TILE);
@@ -170,7 +171,7 @@ impl Renderer {
                 return Vec::new();
             }
             let corner = TILE * UVec2::new(tile % tiles_across, tile / tiles_across);
-            let (sums, traced) = self.tile(corner, half, first..first + samples, integrator);
+            let (sums, traced) = self.tile(corner, &places, integrator);
             rays.fetch_add(traced, Ordering::Relaxed);
             let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f32 / tiles as f32;
             if !going(share) {
@@ -188,32 +189,31 @@ impl Renderer {
         Some(Traced { paths, rays: rays.into_inner() })
     }
 
-    /// Sums over some samples of the pixels of one tile, row by row, and the rays that it took.
+    /// Sums over the pixels of one tile, row by row, of the samples at some places of their sequences,
+    /// and the rays that it took.
     fn tile(
         &self,
         corner: UVec2,
-        half: usize,
-        samples: std::ops::Range<u32>,
+        places: &[u32],
         integrator: &mut Integrator<'_>,
     ) -> (Vec<Vec3>, u64) {
         let s = &self.settings;
         let end = (corner + TILE).min(s.size);
         let aspect = s.size.x as f32 / s.size.y as f32;
-        let seed = mix2(s.seed, half as u64);
         let rays_before = integrator.rays;
         let pixels =
             (corner.y..end.y).flat_map(|y| (corner.x..end.x).map(move |x| UVec2::new(x, y)));
-        let looks = pixels
-            .flat_map(|pixel| samples.clone().map(move |sample| (pixel, sample)))
-            .map(|(pixel, sample)| {
-                let mut sampler = Sampler::new(seed, pixel.y * s.size.x + pixel.x, sample);
+        let looks = pixels.flat_map(|pixel| places.iter().map(move |&sample| (pixel, sample))).map(
+            |(pixel, sample)| {
+                let mut sampler = Sampler::new(s.seed, pixel.y * s.size.x + pixel.x, sample);
                 let place = pixel.as_vec2() + 0.5 + s.filter.place(sampler.square());
                 let (origin, direction) = self.view.ray(place / s.size.as_vec2(), aspect);
                 Look { origin, direction, sampler }
-            });
+            },
+        );
         let found: Vec<Vec3> =
             integrator.radiance(looks).map(|seen| part(&seen, s.parts)).collect();
-        let sums = found.chunks_exact(samples.len().max(1)).map(|c| c.iter().sum()).collect();
+        let sums = found.chunks_exact(places.len().max(1)).map(|c| c.iter().sum()).collect();
         (sums, integrator.rays - rays_before)
     }
 }
