@@ -71,12 +71,14 @@ const IN_FLIGHT: usize = 3;
 #[derive(Debug, Default)]
 pub(crate) struct Stacks([Stack; IN_FLIGHT]);
 
-/// What is still to be visited by one ray.
+/// What is still to be visited by one ray. Rays to the nearest hit keep distances, others do not.
 #[derive(Debug, Default)]
 pub(super) struct Stack {
-    child: Vec<u32>,
-    /// Bits of the distance; the last three count for nothing ([`LANE_BITS`]).
-    t: Vec<u32>,
+    /// Of a ray to the nearest hit: a child, and above it the bits of its distance, of which the last
+    /// three count for nothing ([`LANE_BITS`]).
+    near: Vec<u64>,
+    /// Of a ray to any hit.
+    any: Vec<u32>,
     len: usize,
 }
 
@@ -84,30 +86,42 @@ pub(super) struct Stack {
 pub(super) const LANE_BITS: u32 = 7;
 
 impl Stack {
-    fn push(&mut self, child: u32) {
-        let (children, t) = self.room();
-        (children[0], t[0]) = (child, 0);
+    fn push<const ANY: bool>(&mut self, child: u32) {
+        if ANY {
+            self.any_room()[0] = child;
+        } else {
+            self.near_room()[0] = child.into();
+        }
         self.len += 1;
     }
 
     #[inline(always)]
-    fn pop(&mut self) -> (u32, f32) {
+    fn pop<const ANY: bool>(&mut self) -> (u32, f32) {
         self.len -= 1;
-        (self.child[self.len], f32::from_bits(self.t[self.len] & !LANE_BITS))
+        if ANY {
+            return (self.any[self.len], 0.0);
+        }
+        let entry = self.near[self.len];
+        (entry as u32, f32::from_bits((entry >> 32) as u32 & !LANE_BITS))
     }
 
-    /// Room for a node's children above what is there, and their distances; twice as much as a node
-    /// has. What counts of it, [`Self::keep`] says.
+    /// What [`Self::pop`] would take.
     #[inline(always)]
-    pub(super) fn room(&mut self) -> (&mut [u32; 16], &mut [u32; 16]) {
-        if self.child.len() < self.len + 16 {
-            self.grow();
-        }
-        let (child, t) = (&mut self.child[self.len..], &mut self.t[self.len..]);
-        match (child.first_chunk_mut(), t.first_chunk_mut()) {
-            (Some(child), Some(t)) => (child, t),
-            _ => unreachable!("it has grown"),
-        }
+    fn next<const ANY: bool>(&self) -> Option<u32> {
+        let at = self.len.wrapping_sub(1);
+        if ANY { self.any.get(at).copied() } else { self.near.get(at).map(|&entry| entry as u32) }
+    }
+
+    /// Room for a node's children above what is there. What counts of it, [`Self::keep`] says.
+    #[inline(always)]
+    pub(super) fn near_room(&mut self) -> &mut [u64; 8] {
+        room(&mut self.near, self.len)
+    }
+
+    /// The same; twice as much as a node has.
+    #[inline(always)]
+    pub(super) fn any_room(&mut self) -> &mut [u32; 16] {
+        room(&mut self.any, self.len)
     }
 
     /// Adds what was written to the room's beginning.
@@ -115,13 +129,22 @@ impl Stack {
     pub(super) fn keep(&mut self, count: u32) {
         self.len += count as usize;
     }
+}
 
-    #[cold]
-    fn grow(&mut self) {
-        let len = (2 * self.child.len()).max(256);
-        self.child.resize(len, 0);
-        self.t.resize(len, 0);
+#[inline(always)]
+fn room<T: Copy + Default, const N: usize>(entries: &mut Vec<T>, len: usize) -> &mut [T; N] {
+    if entries.len() < len + N {
+        grow(entries);
     }
+    match entries[len..].first_chunk_mut() {
+        Some(room) => room,
+        None => unreachable!("it has grown"),
+    }
+}
+
+#[cold]
+fn grow<T: Copy + Default>(entries: &mut Vec<T>) {
+    entries.resize((2 * entries.len()).max(256), T::default());
 }
 
 /// A ray as the box and triangle tests want it.
@@ -131,8 +154,8 @@ pub(super) struct Setup {
     pub(super) inverse: [f32; 3],
     /// The same times [`WIDEN`].
     pub(super) widened: [f32; 3],
-    /// Rows of [`Node::planes`] that the ray meets first.
-    pub(super) near: [usize; 3],
+    /// The axes along which it goes down, so that it meets the greatest coordinates first.
+    pub(super) down: [bool; 3],
     /// The axes, the direction's longest last.
     pub(super) axes: [usize; 3],
     /// What to subtract of the last axis to shear the ray upright, and what scales t.
@@ -153,12 +176,11 @@ impl Setup {
         let shear = [direction[axes[0]] * scale, direction[axes[1]] * scale, scale];
         let safe = direction.map(|d| if d.abs() < TINY { TINY.copysign(d) } else { d });
         let inverse = safe.map(|d| 1.0 / d);
-        let near = [0, 1, 2].map(|axis| if safe[axis] < 0.0 { axis + 3 } else { axis });
         Self {
             origin: origin.to_array(),
             inverse,
             widened: inverse.map(|i| i * WIDEN),
-            near,
+            down: safe.map(|d| d < 0.0),
             axes,
             shear,
         }
@@ -248,7 +270,7 @@ pub(super) fn trace_with<const ANY: bool, T: Copy>(
     let mut left = 0;
     for (flight, stack) in flights.iter_mut().zip(&mut stacks.0) {
         let Some((ray, with)) = rays.next() else { break };
-        *flight = Some(Flight::new(accel, ray, with, stack));
+        *flight = Some(Flight::new::<ANY>(accel, ray, with, stack));
         left += 1;
     }
     let mut turn = 0;
@@ -260,7 +282,7 @@ pub(super) fn trace_with<const ANY: bool, T: Copy>(
         }
         found(flight.with, flight.best);
         if let Some((ray, with)) = rays.next() {
-            flight.start(accel, ray, with);
+            flight.start::<ANY>(accel, ray, with);
         } else {
             left -= 1;
             flights.swap(turn, left);
@@ -287,12 +309,12 @@ struct Flight<'a, T> {
 }
 
 impl<'a, T: Copy> Flight<'a, T> {
-    fn new(accel: &'a Accel, ray: Ray, with: T, stack: &'a mut Stack) -> Self {
+    fn new<const ANY: bool>(accel: &'a Accel, ray: Ray, with: T, stack: &'a mut Stack) -> Self {
         let world = Setup::new(ray.origin.into(), ray.direction.into());
         let (nodes, blocks): (&[Node], &[Block]) = (&accel.nodes, &[]);
         let t_max = ray.t_max;
         stack.len = 0;
-        stack.push(0);
+        stack.push::<ANY>(0);
         Self {
             with,
             ray,
@@ -310,7 +332,7 @@ impl<'a, T: Copy> Flight<'a, T> {
 
     /// Begins anew with another ray.
     #[inline(always)]
-    fn start(&mut self, accel: &'a Accel, ray: Ray, with: T) {
+    fn start<const ANY: bool>(&mut self, accel: &'a Accel, ray: Ray, with: T) {
         self.with = with;
         self.ray = ray;
         self.world = Setup::new(ray.origin.into(), ray.direction.into());
@@ -318,7 +340,7 @@ impl<'a, T: Copy> Flight<'a, T> {
         self.best = None;
         self.back_to_top(accel);
         self.stack.len = 0;
-        self.stack.push(0);
+        self.stack.push::<ANY>(0);
     }
 
     /// Visits what is on top of the stack; whether the ray is done.
@@ -337,18 +359,18 @@ impl<'a, T: Copy> Flight<'a, T> {
             self.back_to_top(accel);
             return false;
         }
-        let (child, t) = self.stack.pop();
+        let (child, t) = self.stack.pop::<ANY>();
         if !ANY && t > self.t_max {
             return false;
         }
         let index = (child & !LEAF) as usize;
         if child & LEAF == 0 {
             open(&self.nodes[index], &self.local, self.t_max, self.stack);
-            self.fetch_next();
+            self.fetch_next::<ANY>();
             return false;
         }
         let Some(instance) = self.instance else {
-            self.enter(&accel.placed[index]);
+            self.enter::<ANY>(&accel.placed[index]);
             return false;
         };
         let block = &self.blocks[index];
@@ -365,12 +387,12 @@ impl<'a, T: Copy> Flight<'a, T> {
     }
 
     #[inline(always)]
-    fn enter(&mut self, placed: &'a Placed) {
+    fn enter<const ANY: bool>(&mut self, placed: &'a Placed) {
         self.local = self.world.in_object(&self.ray, placed);
         (self.nodes, self.blocks) = (&placed.bvh.nodes, &placed.bvh.blocks);
         self.instance = Some(placed.instance);
         self.floor = self.stack.len;
-        self.stack.push(0);
+        self.stack.push::<ANY>(0);
     }
 
     #[inline(always)]
@@ -383,8 +405,8 @@ impl<'a, T: Copy> Flight<'a, T> {
 
     /// Asks for what the next step reads: most comes from the third level of cache.
     #[inline(always)]
-    fn fetch_next(&self) {
-        let child = self.stack.child[self.stack.len.saturating_sub(1)];
+    fn fetch_next<const ANY: bool>(&self) {
+        let Some(child) = self.stack.next::<ANY>() else { return };
         let index = (child & !LEAF) as usize;
         let node = self.nodes.as_ptr().wrapping_add(index).cast::<i8>();
         let block = self.blocks.as_ptr().wrapping_add(index).cast::<i8>();
@@ -398,22 +420,32 @@ impl<'a, T: Copy> Flight<'a, T> {
 /// Puts the children that a ray meets on the stack.
 #[inline(always)]
 pub(super) fn put<const ANY: bool>(node: &Node, hits: &BoxHits, stack: &mut Stack) {
-    let (child, t) = stack.room();
     let (mut mask, mut count) = (hits.mask, 0);
     while mask != 0 {
         let lane = mask.trailing_zeros() as usize & 7;
         mask &= mask - 1;
-        let (new, new_t) = (node.child[lane], hits.t[lane].to_bits());
-        // Insertion sort: at most eight, mostly one or two. Leaves are greater than nodes.
-        let mut at = count;
-        while at > 0 && if ANY { child[at - 1] > new } else { t[at - 1] < new_t } {
-            (child[at], t[at]) = (child[at - 1], t[at - 1]);
-            at -= 1;
+        let child = node.child[lane];
+        // Leaves are greater than nodes.
+        if ANY {
+            insert(stack.any_room(), count, child, |a, b| a > b);
+        } else {
+            let entry = u64::from(hits.t[lane].to_bits()) << 32 | u64::from(child);
+            insert(stack.near_room(), count, entry, |a, b| a >> 32 < b >> 32);
         }
-        (child[at], t[at]) = (new, new_t);
         count += 1;
     }
     stack.keep(count as u32);
+}
+
+/// Adds one to those sorted already: at most eight, mostly one or two.
+#[inline(always)]
+fn insert<T: Copy>(sorted: &mut [T], count: usize, new: T, comes_after: impl Fn(T, T) -> bool) {
+    let mut at = count;
+    while at > 0 && comes_after(sorted[at - 1], new) {
+        sorted[at] = sorted[at - 1];
+        at -= 1;
+    }
+    sorted[at] = new;
 }
 
 /// Asks for what will be read soon.
@@ -494,10 +526,9 @@ pub(super) fn boxes_portable(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
         let mut enter = 0.0f32;
         let mut leave = t_max;
         for axis in 0..3 {
-            let near = ray.near[axis];
-            let far = if near < 3 { near + 3 } else { near - 3 };
-            let near = node.planes[near][lane] - ray.origin[axis];
-            let far = node.planes[far][lane] - ray.origin[axis];
+            let (planes, down) = (&node.planes[axis], ray.down[axis]);
+            let near = planes[usize::from(down)][lane] - ray.origin[axis];
+            let far = planes[usize::from(!down)][lane] - ray.origin[axis];
             enter = enter.max(near * ray.inverse[axis]);
             leave = leave.min(far * ray.widened[axis]);
         }

@@ -1,15 +1,15 @@
 //! Eight boxes, or four triangles, at a time with AVX2 and FMA; see [`super::kernel`].
 
 use std::arch::x86_64::{
-    __m128, __m256, __m256i, _CMP_LE_OQ, _mm_add_ps, _mm_and_ps, _mm_blend_epi32, _mm_cmpge_ps,
-    _mm_cmpgt_ps, _mm_cmple_ps, _mm_cmpneq_ps, _mm_cvtsi64_si128, _mm_div_ps, _mm_fmadd_ps,
-    _mm_fnmadd_ps, _mm_max_epi32, _mm_max_ps, _mm_min_epi32, _mm_min_ps, _mm_movemask_ps,
-    _mm_mul_ps, _mm_or_ps, _mm_set1_ps, _mm_setzero_ps, _mm_shuffle_epi32, _mm_sub_ps,
-    _mm256_andnot_si256, _mm256_castps_si256, _mm256_castsi128_si256, _mm256_castsi256_ps,
-    _mm256_castsi256_si128, _mm256_cmp_ps, _mm256_cmpgt_epi32, _mm256_cvtepu8_epi32,
-    _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps,
-    _mm256_mul_ps, _mm256_or_si256, _mm256_permutevar8x32_epi32, _mm256_set1_epi32, _mm256_set1_ps,
-    _mm256_setr_epi32, _mm256_setzero_ps, _mm256_sub_ps,
+    __m128, __m128i, __m256, __m256i, _CMP_LE_OQ, _mm_add_ps, _mm_and_ps, _mm_blend_epi32,
+    _mm_cmpge_ps, _mm_cmpgt_ps, _mm_cmple_ps, _mm_cmpneq_ps, _mm_cvtsi64_si128, _mm_div_ps,
+    _mm_fmadd_ps, _mm_fnmadd_ps, _mm_max_epi32, _mm_max_ps, _mm_min_epi32, _mm_min_ps,
+    _mm_movemask_ps, _mm_mul_ps, _mm_or_ps, _mm_set1_ps, _mm_setzero_ps, _mm_shuffle_epi32,
+    _mm_sub_ps, _mm_unpackhi_epi32, _mm_unpacklo_epi32, _mm256_andnot_si256, _mm256_castps_si256,
+    _mm256_castsi128_si256, _mm256_castsi256_ps, _mm256_castsi256_si128, _mm256_cmp_ps,
+    _mm256_cvtepi8_epi32, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps, _mm256_min_ps,
+    _mm256_movemask_ps, _mm256_mul_ps, _mm256_or_si256, _mm256_permutevar8x32_epi32,
+    _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_sub_ps,
 };
 
 #[cfg(test)]
@@ -39,28 +39,34 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
             let (mask, t) = slabs(node, ray, t_max);
             let child = load8_bits(&node.child);
             let count = mask.count_ones();
-            let (to, to_t) = stack.room();
             if ANY {
+                let room = stack.any_room();
                 let is_leaf = _mm256_movemask_ps(_mm256_castsi256_ps(child)) as u32;
                 let (nodes, leaves) = (mask & !is_leaf, mask & is_leaf);
                 let first = _mm256_permutevar8x32_epi32(child, members(nodes));
                 let last = _mm256_permutevar8x32_epi32(child, members(leaves));
                 let at = nodes.count_ones().min(8) as usize;
-                to[..8].copy_from_slice(&lanes_of(first));
-                to[at..at + 8].copy_from_slice(&lanes_of(last));
+                room[..8].copy_from_slice(&bytemuck::cast::<_, [u32; 8]>(first));
+                room[at..at + 8].copy_from_slice(&bytemuck::cast::<_, [u32; 8]>(last));
             } else {
+                let room = stack.near_room();
                 // Distances are not negative, so as whole numbers they have the same order. Their
-                // last bits make room for the lane.
-                let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+                // last bits make room for the lane; lanes that were not met come last.
                 let lane_bits = _mm256_set1_epi32(LANE_BITS as i32);
                 let t = _mm256_andnot_si256(lane_bits, _mm256_castps_si256(t));
-                let met = _mm256_permutevar8x32_epi32(_mm256_or_si256(t, lanes), members(mask));
-                let missing = _mm256_cmpgt_epi32(lanes, _mm256_set1_epi32(count as i32 - 1));
-                let keys = _mm256_or_si256(met, missing);
-                let keys = if count <= 4 { far_first_of_4(keys) } else { far_first_of_8(keys) };
+                let lanes = members(mask);
+                let keys = _mm256_or_si256(_mm256_permutevar8x32_epi32(t, lanes), lanes);
                 // The permutation takes the lane and leaves the rest.
-                to[..8].copy_from_slice(&lanes_of(_mm256_permutevar8x32_epi32(child, keys)));
-                to_t[..8].copy_from_slice(&lanes_of(keys));
+                if count <= 4 {
+                    let keys = far_first_of_4(_mm256_castsi256_si128(keys));
+                    let child = _mm256_permutevar8x32_epi32(child, _mm256_castsi128_si256(keys));
+                    let child = _mm256_castsi256_si128(child);
+                    let low = _mm_unpacklo_epi32(child, keys);
+                    let high = _mm_unpackhi_epi32(child, keys);
+                    room[..4].copy_from_slice(&bytemuck::cast::<_, [u64; 4]>([low, high]));
+                } else {
+                    *room = far_first_of_8(keys, &node.child);
+                }
             }
             stack.keep(count);
         },
@@ -83,26 +89,25 @@ fn slabs(node: &Node, ray: &Setup, t_max: f32) -> (u32, __m256) {
     let mut enter = _mm256_setzero_ps();
     let mut leave = _mm256_set1_ps(t_max);
     for axis in 0..3 {
-        let near = ray.near[axis];
-        let far = if near < 3 { near + 3 } else { near - 3 };
+        let (planes, down) = (&node.planes[axis], ray.down[axis]);
         let origin = _mm256_set1_ps(ray.origin[axis]);
-        let near = _mm256_sub_ps(load8(&node.planes[near]), origin);
-        let far = _mm256_sub_ps(load8(&node.planes[far]), origin);
+        let near = _mm256_sub_ps(load8(&planes[usize::from(down)]), origin);
+        let far = _mm256_sub_ps(load8(&planes[usize::from(!down)]), origin);
         enter = _mm256_max_ps(_mm256_mul_ps(near, _mm256_set1_ps(ray.inverse[axis])), enter);
         leave = _mm256_min_ps(_mm256_mul_ps(far, _mm256_set1_ps(ray.widened[axis])), leave);
     }
     (_mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave)) as u32, enter)
 }
 
-/// For every set of lanes its members, eight bits each, the lowest first.
+/// For every set of lanes its members, eight bits each, the lowest first; then ones.
 static MEMBERS: [u64; 256] = {
-    let mut table = [0; 256];
+    let mut table = [u64::MAX; 256];
     let mut set = 0;
     while set < 256 {
         let (mut lane, mut count) = (0, 0);
         while lane < 8 {
             if set >> lane & 1 == 1 {
-                table[set] |= lane << (8 * count);
+                table[set] ^= (lane ^ 0xff) << (8 * count);
                 count += 1;
             }
             lane += 1;
@@ -112,34 +117,32 @@ static MEMBERS: [u64; 256] = {
     table
 };
 
-/// The members of a set of lanes, for a permutation that puts them first.
+/// The members of a set of lanes, for a permutation that puts them first, and behind them −1.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn members(set: u32) -> __m256i {
-    _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(MEMBERS[set as usize & 0xff] as i64))
+    _mm256_cvtepi8_epi32(_mm_cvtsi64_si128(MEMBERS[set as usize & 0xff] as i64))
 }
 
-/// Sorts the first four, the greatest first; the others are lost.
+/// The greatest first.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn far_first_of_4(keys: __m256i) -> __m256i {
+fn far_first_of_4(k: __m128i) -> __m128i {
     // A network of three stages: neighbours, halves, the middle two.
-    let k = _mm256_castsi256_si128(keys);
     let other = _mm_shuffle_epi32::<0b10_11_00_01>(k);
     let k = _mm_blend_epi32::<0b1010>(_mm_max_epi32(k, other), _mm_min_epi32(k, other));
     let other = _mm_shuffle_epi32::<0b01_00_11_10>(k);
     let k = _mm_blend_epi32::<0b1100>(_mm_max_epi32(k, other), _mm_min_epi32(k, other));
     let other = _mm_shuffle_epi32::<0b11_01_10_00>(k);
-    let k = _mm_blend_epi32::<0b1100>(_mm_max_epi32(k, other), _mm_min_epi32(k, other));
-    _mm256_castsi128_si256(k)
+    _mm_blend_epi32::<0b1100>(_mm_max_epi32(k, other), _mm_min_epi32(k, other))
 }
 
-/// Sorts, the greatest first.
+/// Entries of the stack for keys whose last bits are lanes, the greatest first.
 #[cold]
-fn far_first_of_8(keys: __m256i) -> __m256i {
+fn far_first_of_8(keys: __m256i, child: &[u32; 8]) -> [u64; 8] {
     let mut keys: [i32; 8] = bytemuck::cast(keys);
     keys.sort_unstable_by(|a, b| b.cmp(a));
-    bytemuck::cast(keys)
+    keys.map(|key| u64::from(key as u32) << 32 | u64::from(child[key as usize & 7]))
 }
 
 #[target_feature(enable = "avx2,fma")]
@@ -218,8 +221,4 @@ fn load8_bits(lanes: &[u32; 8]) -> __m256i {
     unsafe {
         _mm256_loadu_si256(lanes.as_ptr().cast())
     }
-}
-
-fn lanes_of(lanes: __m256i) -> [u32; 8] {
-    bytemuck::cast(lanes)
 }

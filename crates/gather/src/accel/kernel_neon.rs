@@ -45,9 +45,8 @@ pub(super) fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
         let origin = vdupq_n_f32(ray.origin[axis]);
         let inverse = vdupq_n_f32(ray.inverse[axis]);
         let widened = vdupq_n_f32(ray.widened[axis]);
-        let near = ray.near[axis];
-        let far = if near < 3 { near + 3 } else { near - 3 };
-        let (near, far) = (load8(&node.planes[near]), load8(&node.planes[far]));
+        let (planes, down) = (&node.planes[axis], ray.down[axis]);
+        let (near, far) = (load8(&planes[usize::from(down)]), load8(&planes[usize::from(!down)]));
         for half in 0..2 {
             let t_near = vmulq_f32(vsubq_f32(near[half], origin), inverse);
             let t_far = vmulq_f32(vsubq_f32(far[half], origin), widened);

@@ -12,8 +12,8 @@ pub(super) const LEAF: u32 = 1 << 31;
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Node {
-    /// min x, y, z, max x, y, z of the children; (∞, −∞) where there is none.
-    pub(super) planes: [[f32; 8]; 6],
+    /// For each axis the least and the greatest coordinates of the children; (∞, −∞) where there is none.
+    pub(super) planes: [[[f32; 8]; 2]; 3],
     /// Index of a node, or [`LEAF`] and the index of a leaf.
     pub(super) child: [u32; 8],
     unused: [u32; 8],
@@ -21,34 +21,24 @@ pub(super) struct Node {
 
 impl Node {
     pub(super) const EMPTY: Self = Self {
-        planes: [
-            [f32::INFINITY; 8],
-            [f32::INFINITY; 8],
-            [f32::INFINITY; 8],
-            [f32::NEG_INFINITY; 8],
-            [f32::NEG_INFINITY; 8],
-            [f32::NEG_INFINITY; 8],
-        ],
+        planes: [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3],
         child: [LEAF; 8],
         unused: [0; 8],
     };
 
     pub(super) fn set_bounds(&mut self, lane: usize, bounds: Aabb) {
         for axis in 0..3 {
-            self.planes[axis][lane] = bounds.min[axis];
-            self.planes[axis + 3][lane] = bounds.max[axis];
+            self.planes[axis][0][lane] = bounds.min[axis];
+            self.planes[axis][1][lane] = bounds.max[axis];
         }
     }
 
     pub(super) fn lane_bounds(&self, lane: usize) -> Aabb {
-        let at = |first: usize| {
-            glam::Vec3A::new(
-                self.planes[first][lane],
-                self.planes[first + 1][lane],
-                self.planes[first + 2][lane],
-            )
+        let at = |side: usize| {
+            let [x, y, z] = &self.planes;
+            glam::Vec3A::new(x[side][lane], y[side][lane], z[side][lane])
         };
-        Aabb { min: at(0), max: at(3) }
+        Aabb { min: at(0), max: at(1) }
     }
 
     pub(super) fn bounds(&self) -> Aabb {
@@ -60,7 +50,7 @@ impl Node {
             .iter()
             .copied()
             .enumerate()
-            .filter(|&(lane, _)| self.planes[0][lane] <= self.planes[3][lane])
+            .filter(|&(lane, _)| self.planes[0][0][lane] <= self.planes[0][1][lane])
     }
 }
 

@@ -11,11 +11,11 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use glam::{DVec2, IVec2, Vec2, Vec3};
+use glam::{DVec2, Vec2, Vec3};
 use lumencast_scene::{Filter, Image, Mesh, TextureRef, Wrap};
 
 use crate::sampling::luminance;
-use crate::surface::texture::{Coding, fetch, interpolate_uv, sample, wrapped};
+use crate::surface::texture::{Coding, color, interpolate_uv, sample, wrapped};
 
 /// Footprints of fewer texels are taken at points.
 const FEW_TEXELS: f64 = 8.0;
@@ -141,18 +141,17 @@ struct RowSums {
 
 impl RowSums {
     fn new(image: &Image) -> Self {
-        let (width, height) = (image.width as i32, image.height as i32);
-        let mut sums = Vec::with_capacity((width as usize + 1) * height as usize);
+        let (width, height) = (image.width as usize, image.height as usize);
+        let mut sums = Vec::with_capacity((width + 1) * height);
         for y in 0..height {
             let mut sum = 0.0;
             sums.push(sum);
             sums.extend((0..width).map(|x| {
-                let texel = fetch(image, IVec2::new(x, y), [Wrap::Clamp; 2], Coding::Srgb);
-                sum += luminance(texel.truncate());
+                sum += luminance(color(image, x, y));
                 sum
             }));
         }
-        Self { width: width as usize, sums }
+        Self { width, sums }
     }
 
     /// ∫ dx along the line at y from one x to another, as the texture is filtered.

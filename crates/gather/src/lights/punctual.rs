@@ -218,6 +218,9 @@ impl Punctual {
             let light = value * incident.irradiance * (share * copies);
             let weight = luminance(light);
             if weight > 0.0 {
+                if count == 1 {
+                    return Some((incident, light));
+                }
                 total += weight;
                 *candidate = Some((incident, light, weight));
             }
@@ -230,8 +233,8 @@ impl Punctual {
         };
         rest *= total;
         let mut last = None;
-        for (incident, light, weight) in candidates.into_iter().flatten() {
-            last = Some((incident, light * (total / weight)));
+        for (incident, light, weight) in candidates.iter().flatten() {
+            last = Some((*incident, *light * (total / weight)));
             rest -= weight;
             if rest < 0.0 {
                 break;

@@ -112,17 +112,19 @@ impl<'a> Triangle<'a> {
 
     /// Asks for the texels.
     pub(crate) fn fetch_texels(&self, material: &Material, weights: Vec3, model: MaterialModel) {
-        let full = [
-            &material.emissive_texture,
-            &material.normal_texture,
-            &material.metallic_roughness_texture,
-            &material.specular_texture,
-            &material.specular_color_texture,
-            &material.transmission_texture,
-        ];
-        let others = full.into_iter().filter(|_| model == MaterialModel::Full);
-        for map in [&material.base_color_texture].into_iter().chain(others).flatten() {
-            texture::fetch_texels(map, self.uv(map.tex_coord, weights));
+        let fetch = |map: &Option<TextureRef>| {
+            if let Some(map) = map {
+                texture::fetch_texels(map, self.uv(map.tex_coord, weights));
+            }
+        };
+        fetch(&material.base_color_texture);
+        if model == MaterialModel::Full {
+            fetch(&material.emissive_texture);
+            fetch(&material.normal_texture);
+            fetch(&material.metallic_roughness_texture);
+            fetch(&material.specular_texture);
+            fetch(&material.specular_color_texture);
+            fetch(&material.transmission_texture);
         }
     }
 

@@ -3,18 +3,32 @@
 
 use std::sync::LazyLock;
 
-use glam::{IVec2, Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 use lumencast_scene::{Filter, Image, TextureRef, Vertices, Wrap};
 
 use crate::accel::fetch_ahead;
 
+/// What each code of eight bits stands for.
+type Decoded = [f32; 256];
+
 /// sRGB codes to linear, IEC 61966-2-1.
-static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
+static LINEAR_FROM_SRGB: LazyLock<Decoded> = LazyLock::new(|| {
     std::array::from_fn(|code| {
         let c = code as f32 / 255.0;
         if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
     })
 });
+
+/// Codes as fractions of the greatest.
+static FRACTIONS: Decoded = {
+    let mut fractions = [0.0; 256];
+    let mut code = 0;
+    while code < 256 {
+        fractions[code] = code as f32 / 255.0;
+        code += 1;
+    }
+    fractions
+};
 
 /// How the RGB of a texture is coded; alpha is always linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +39,15 @@ pub(crate) enum Coding {
     Linear,
 }
 
+impl Coding {
+    fn rgb(self) -> &'static Decoded {
+        match self {
+            Self::Srgb => &LINEAR_FROM_SRGB,
+            Self::Linear => &FRACTIONS,
+        }
+    }
+}
+
 /// The texture at mesh coordinates `uv` (before KHR_texture_transform).
 pub(crate) fn sample(texture: &TextureRef, uv: Vec2, coding: Coding) -> Vec4 {
     let image = &*texture.image;
@@ -32,18 +55,22 @@ pub(crate) fn sample(texture: &TextureRef, uv: Vec2, coding: Coding) -> Vec4 {
     if !at.is_finite() {
         return Vec4::ONE;
     }
-    let fetch = |p: IVec2| fetch(image, p, texture.wrap, coding);
+    let rgb = coding.rgb();
+    let column = |x| wrapped(x, image.width, texture.wrap[0]);
+    let row = |y| wrapped(y, image.height, texture.wrap[1]);
     match texture.filter {
-        Filter::Nearest => fetch(at.floor().as_ivec2()),
+        Filter::Nearest => {
+            let p = at.floor().as_ivec2();
+            texel(image, column(p.x), row(p.y), rgb)
+        }
         Filter::Linear => {
             let at = at - 0.5;
             let corner = at.floor();
             let f = at - corner;
             let p = corner.as_ivec2();
-            let top = fetch(p).lerp(fetch(p.wrapping_add(IVec2::X)), f.x);
-            let bottom =
-                fetch(p.wrapping_add(IVec2::Y)).lerp(fetch(p.wrapping_add(IVec2::ONE)), f.x);
-            top.lerp(bottom, f.y)
+            let [left, right] = [column(p.x), column(p.x.wrapping_add(1))];
+            let along = |y| texel(image, left, y, rgb).lerp(texel(image, right, y, rgb), f.x);
+            along(row(p.y)).lerp(along(row(p.y.wrapping_add(1))), f.y)
         }
     }
 }
@@ -65,20 +92,18 @@ pub(crate) fn fetch_texels(texture: &TextureRef, uv: Vec2) {
     }
 }
 
-pub(crate) fn fetch(image: &Image, p: IVec2, wrap: [Wrap; 2], coding: Coding) -> Vec4 {
-    let x = wrapped(p.x, image.width, wrap[0]);
-    let y = wrapped(p.y, image.height, wrap[1]);
-    let Some(&[r, g, b, a]) = image.texels.get(y * image.width as usize + x) else {
+/// White beyond the image's end.
+fn texel(image: &Image, column: usize, row: usize, rgb: &Decoded) -> Vec4 {
+    let Some(&[r, g, b, a]) = image.texels.get(row * image.width as usize + column) else {
         return Vec4::ONE;
     };
-    let rgb = match coding {
-        Coding::Srgb => {
-            let table = &*LINEAR_FROM_SRGB;
-            Vec3::new(table[r as usize], table[g as usize], table[b as usize])
-        }
-        Coding::Linear => Vec3::new(r.into(), g.into(), b.into()) / 255.0,
-    };
-    rgb.extend(f32::from(a) / 255.0)
+    let [r, g, b] = [r, g, b].map(|code| rgb[usize::from(code)]);
+    Vec4::new(r, g, b, FRACTIONS[usize::from(a)])
+}
+
+/// A texel's colour as coded in sRGB, white beyond the image's end.
+pub(crate) fn color(image: &Image, column: usize, row: usize) -> Vec3 {
+    texel(image, column, row, Coding::Srgb.rgb()).truncate()
 }
 
 pub(crate) fn wrapped(i: i32, size: u32, wrap: Wrap) -> usize {
