@@ -6,8 +6,8 @@ use std::str::FromStr;
 use anyhow::{Result, bail};
 use clap::Args;
 use glam::{EulerRot, Quat, UVec2, Vec3};
-use lumencast_gather::reference::{PictureSettings, View};
-use lumencast_scene::Scene;
+use lumencast_gather::reference::PictureSettings;
+use lumencast_scene::{Scene, View};
 
 use crate::arguments::Materials;
 
@@ -109,7 +109,7 @@ pub(crate) fn view(scene: &Scene, camera: Option<&CameraArgument>) -> Result<Vie
             }
         }
     };
-    Ok(View { world_from_camera: found.world_from_camera, projection: found.camera.projection })
+    Ok(found.view())
 }
 
 /// All of the scene, from above one of its corners.

@@ -4,16 +4,18 @@
 //! SCENE [RAYS] [THREADS]`
 //!
 //! Embree runs with its default (medium) build quality, once in its watertight mode, as ours always
-//! is, and once without. Ratios above 1 mean that ours is faster.
+//! is, and once without; over all triangles in one level, and in two levels as ours, which is what a
+//! scene whose parts move needs. Ratios above 1 mean that ours is faster.
 #![expect(clippy::print_stdout, reason = "a program for the terminal")]
 
+use std::collections::HashMap;
 use std::error::Error;
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
+use glam::{Affine3A, Vec3};
 use lumencast_gather::measure::{RayBench, TestRay, build_seconds, scattered, top_level_seconds};
-use lumencast_gather::reference::View;
-use lumencast_scene::Scene;
+use lumencast_scene::{Scene, Snapshot};
 use lumencast_testkit::embree::{Embree, EmbreeInstances, Quality};
 use rayon::prelude::*;
 
@@ -31,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let mut scene = Scene::open(&name)?;
     let view = match scene.cameras().first() {
-        Some(c) => View { world_from_camera: c.world_from_camera, projection: c.camera.projection },
+        Some(camera) => camera.view(),
         None => return Err("the scene has no camera".into()),
     };
     let snapshot = scene.snapshot();
@@ -44,17 +46,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut builds = Vec::new();
     for _ in 0..ROUNDS {
         let ours = bench.install(|| build_seconds(&snapshot));
-        let theirs = seconds(|| build(true).map(drop))?;
+        let theirs = seconds(|| build(true).map(drop));
         builds.push(theirs / ours);
     }
     println!("build: {:.2} of Embree's speed", median(builds));
 
     let first = &snapshot.instances[0];
-    let mesh = &triangles[..first.mesh.triangle_count()];
-    let mut instances = EmbreeInstances::new(library.as_ref(), mesh, INSTANCES as usize, pool)?;
+    let mesh = triangles[..first.mesh.triangle_count()].to_vec();
     let object_from_world = first.world_from_object.inverse();
     let places: Vec<_> =
         scattered(&snapshot, INSTANCES).into_iter().map(|to| to * object_from_world).collect();
+    let placed: Vec<_> = places.iter().map(|&to| (0, to)).collect();
+    let mut instances = EmbreeInstances::new(library.as_ref(), &[mesh], &placed, true, pool)?;
     let (mut tops, mut fastest) = (Vec::new(), [f64::INFINITY; 2]);
     for _ in 0..10 * ROUNDS {
         let ours = bench.install(|| top_level_seconds(&snapshot, INSTANCES));
@@ -71,44 +74,84 @@ fn main() -> Result<(), Box<dyn Error>> {
         1e3 * fastest[1],
     );
 
+    let (meshes, placed) = levels(&snapshot, &triangles);
     for robust in [true, false] {
-        let embree = build(robust)?;
-        let (mut closest, mut any) = (Vec::new(), Vec::new());
-        let mut rates = [0.0f64; 4];
-        for _ in 0..ROUNDS {
-            let times = [
-                seconds(|| Ok(bench.trace_closest(&bench.closest)))?,
-                seconds(|| Ok(run(&bench, &bench.closest, |r| embree_closest(&embree, r))))?,
-                seconds(|| Ok(bench.trace_any(&bench.any)))?,
-                seconds(|| Ok(run(&bench, &bench.any, |r| embree_any(&embree, r))))?,
-            ];
-            closest.push(times[1] / times[0]);
-            any.push(times[3] / times[2]);
-            let counts = [&bench.closest, &bench.closest, &bench.any, &bench.any].map(Vec::len);
-            for (rate, (time, count)) in rates.iter_mut().zip(times.into_iter().zip(counts)) {
-                *rate = rate.max(1e-6 * count as f64 / time);
-            }
-        }
-        println!(
-            "{}: closest {:.2} of Embree's speed (best {:.2} and {:.2} M/s), any {:.2} (best {:.2} and {:.2} M/s)",
-            if robust { "watertight" } else { "fast" },
-            median(closest),
-            rates[0],
-            rates[1],
-            median(any),
-            rates[2],
-            rates[3],
+        let mode = if robust { "watertight" } else { "fast" };
+        let one = build(robust)?;
+        against(
+            &bench,
+            &format!("{mode}, one level"),
+            |r| one.closest(r.origin, r.direction, r.t_max).is_some(),
+            |r| one.occluded(r.origin, r.direction, r.t_max),
+        );
+        let two = EmbreeInstances::new(library.as_ref(), &meshes, &placed, robust, pool)?;
+        against(
+            &bench,
+            &format!("{mode}, two levels"),
+            |r| two.closest(r.origin, r.direction, r.t_max).is_some(),
+            |r| two.occluded(r.origin, r.direction, r.t_max),
         );
     }
     Ok(())
 }
 
-fn embree_closest(embree: &Embree, ray: &TestRay) -> bool {
-    embree.closest(ray.origin, ray.direction, ray.t_max).is_some()
+/// The scene's meshes, once each (deformed ones once an instance), and where they stand.
+fn levels(
+    snapshot: &Snapshot,
+    triangles: &[[Vec3; 3]],
+) -> (Vec<Vec<[Vec3; 3]>>, Vec<(usize, Affine3A)>) {
+    let (mut meshes, mut known, mut placed) = (Vec::new(), HashMap::new(), Vec::new());
+    let mut rest = triangles;
+    for instance in &snapshot.instances {
+        let (own, after) = rest.split_at(instance.mesh.triangle_count());
+        rest = after;
+        let object_from_world = instance.world_from_object.inverse();
+        let mut add = || {
+            let place = |c: Vec3| object_from_world.transform_point3(c);
+            meshes.push(own.iter().map(|corners| corners.map(place)).collect());
+            meshes.len() - 1
+        };
+        let mesh = match instance.deformed {
+            Some(_) => add(),
+            None => *known.entry(instance.mesh_id).or_insert_with(add),
+        };
+        placed.push((mesh, instance.world_from_object));
+    }
+    (meshes, placed)
 }
 
-fn embree_any(embree: &Embree, ray: &TestRay) -> bool {
-    embree.occluded(ray.origin, ray.direction, ray.t_max)
+/// Traces ours and theirs in turns, and prints the medians of the ratios.
+fn against(
+    bench: &RayBench,
+    what: &str,
+    closest_of: impl Fn(&TestRay) -> bool + Sync,
+    any_of: impl Fn(&TestRay) -> bool + Sync,
+) {
+    let (mut closest, mut any) = (Vec::new(), Vec::new());
+    let mut rates = [0.0f64; 4];
+    for _ in 0..ROUNDS {
+        let times = [
+            seconds(|| bench.trace_closest(&bench.closest)),
+            seconds(|| run(bench, &bench.closest, &closest_of)),
+            seconds(|| bench.trace_any(&bench.any)),
+            seconds(|| run(bench, &bench.any, &any_of)),
+        ];
+        closest.push(times[1] / times[0]);
+        any.push(times[3] / times[2]);
+        let counts = [&bench.closest, &bench.closest, &bench.any, &bench.any].map(Vec::len);
+        for (rate, (time, count)) in rates.iter_mut().zip(times.into_iter().zip(counts)) {
+            *rate = rate.max(1e-6 * count as f64 / time);
+        }
+    }
+    println!(
+        "{what}: closest {:.2} of Embree's speed (best {:.2} and {:.2} M/s), any {:.2} (best {:.2} and {:.2} M/s)",
+        median(closest),
+        rates[0],
+        rates[1],
+        median(any),
+        rates[2],
+        rates[3],
+    );
 }
 
 /// Traces on the same threads, in pieces of the same size.
@@ -116,14 +159,12 @@ fn run(bench: &RayBench, rays: &[TestRay], one: impl Fn(&TestRay) -> bool + Sync
     bench.install(|| rays.par_chunks(1024).flat_map_iter(|rays| rays.iter().map(&one)).collect())
 }
 
-fn seconds<T>(
-    run: impl FnOnce() -> Result<T, libloading::Error>,
-) -> Result<f64, libloading::Error> {
+fn seconds<T>(run: impl FnOnce() -> T) -> f64 {
     let start = Instant::now();
-    let result = run()?;
+    let result = run();
     let time = start.elapsed().as_secs_f64();
     drop(result);
-    Ok(time)
+    time
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

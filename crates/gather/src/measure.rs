@@ -8,13 +8,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{Affine3A, Vec2, Vec3};
-use lumencast_scene::{Instance, Snapshot};
+use lumencast_scene::{Instance, Snapshot, View};
 use rayon::prelude::*;
 
 use crate::accel::{AccelCache, Hit, Kernel, Ray, Stacks};
 use crate::bsdf::frame;
 use crate::path_trace::MaterialModel;
-use crate::reference::View;
 use crate::sampling::{Sampler, cosine_hemisphere, mix2};
 use crate::world::{Passing, World, WorldCache, itself};
 

@@ -7,11 +7,11 @@ use std::sync::Arc;
 use glam::{Affine2, Affine3A, Quat, UVec2, Vec2, Vec3};
 use lumencast_gather::path_trace::MaterialModel;
 use lumencast_gather::reference::{
-    Film, PictureSettings, ProbeEstimate, ProbeSettings, Renderer, View, probe_sh,
+    Film, PictureSettings, ProbeEstimate, ProbeSettings, Renderer, probe_sh,
 };
 use lumencast_scene::{
     AlphaMode, Environment, Filter, Image, Light, LightKind, Material, MaterialId, Mesh, MeshId,
-    Primitive, Projection, Snapshot, TextureRef, Vertices, Wrap,
+    Primitive, Projection, Snapshot, TextureRef, Vertices, View, Wrap,
 };
 use lumencast_testkit::scenes::{Stage, lambert};
 

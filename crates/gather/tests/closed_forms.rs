@@ -6,10 +6,12 @@ use std::sync::Arc;
 
 use glam::{UVec2, Vec3};
 use lumencast_gather::reference::{
-    Film, PictureSettings, ProbeEstimate, ProbeSettings, Renderer, View, probe_sh,
+    Film, PictureSettings, ProbeEstimate, ProbeSettings, Renderer, probe_sh,
 };
 use lumencast_light::{Order, sh};
-use lumencast_scene::{AlphaMode, Environment, Light, LightKind, Material, Projection, Snapshot};
+use lumencast_scene::{
+    AlphaMode, Environment, Light, LightKind, Material, Projection, Snapshot, View,
+};
 use lumencast_testkit::scenes::{Stage, lambert};
 use lumencast_testkit::vectors::GgxAlbedo;
 

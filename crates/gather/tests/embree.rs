@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 use lumencast_gather::measure::{RayBench, TestRay};
-use lumencast_gather::reference::View;
-use lumencast_scene::Scene;
+use lumencast_scene::{Scene, View};
 use lumencast_testkit::embree::{Embree, Quality};
 
 const RAYS: u32 = 1_000_000;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use glam::{UVec2, Vec3};
 use lumencast_gather::path_trace::MaterialModel;
-use lumencast_gather::reference::{Film, Filter, Parts, PictureSettings, Renderer, View};
-use lumencast_scene::{Environment, Light, LightKind, Scene, Snapshot};
+use lumencast_gather::reference::{Film, Filter, Parts, PictureSettings, Renderer};
+use lumencast_scene::{Environment, Light, LightKind, Scene, Snapshot, View};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 fn settings() -> PictureSettings {
@@ -24,9 +24,7 @@ fn render(scene: &Arc<Snapshot>, view: View, settings: PictureSettings, samples:
 
 fn cornell() -> (Arc<Snapshot>, View) {
     let mut scene = Scene::open("cornell").unwrap();
-    let camera = &scene.cameras()[0];
-    let view =
-        View { world_from_camera: camera.world_from_camera, projection: camera.camera.projection };
+    let view = scene.cameras()[0].view();
     (scene.snapshot(), view)
 }
 

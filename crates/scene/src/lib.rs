@@ -45,6 +45,7 @@ mod snapshot;
 #[cfg(test)]
 mod tests;
 mod trs;
+mod view;
 mod volume;
 
 pub use aabb::Aabb;
@@ -59,6 +60,7 @@ pub use mesh::{Mesh, MorphTarget, Primitive, Vertices};
 pub use scene::{AnimationInfo, EditError, NodeInfo, PlacedCamera, Scene};
 pub use script::{Script, ScriptError};
 pub use snapshot::{Instance, Snapshot};
+pub use view::View;
 pub use volume::VolumeSpec;
 
 macro_rules! id {

@@ -53,6 +53,27 @@ struct RayHit {
     instances: [u32; 9],
 }
 
+impl RayHit {
+    fn new(origin: Vec3, direction: Vec3, t_max: f32) -> Self {
+        Self {
+            origin: origin.to_array(),
+            t_near: 0.0,
+            direction: direction.to_array(),
+            time: 0.0,
+            t_far: t_max,
+            mask: NONE,
+            id: 0,
+            flags: 0,
+            normal: [0.0; 3],
+            u: 0.0,
+            v: 0.0,
+            primitive: NONE,
+            geometry: NONE,
+            instances: [NONE; 9],
+        }
+    }
+}
+
 /// A hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmbreeHit {
@@ -111,6 +132,23 @@ impl Api {
         let options = format!("threads={threads}\0");
         // SAFETY: the string ends with a zero.
         unsafe { (self.new_device)(options.as_ptr().cast()) }
+    }
+
+    /// The nearest triangle on a ray through a committed scene.
+    #[inline]
+    fn closest(&self, scene: Handle, mut ray: RayHit) -> Option<EmbreeHit> {
+        // SAFETY: the scene is committed; the ray is aligned and as large as Embree wants it. No
+        // arguments means the default ones.
+        unsafe { (self.intersect)(scene, &raw mut ray, std::ptr::null()) };
+        (ray.geometry != NONE).then_some(EmbreeHit { t: ray.t_far, triangle: ray.primitive })
+    }
+
+    /// Whether any triangle of a committed scene lies on a ray.
+    #[inline]
+    fn occluded(&self, scene: Handle, mut ray: RayHit) -> bool {
+        // SAFETY: as in `closest`; only the ray's part is used.
+        unsafe { (self.occluded)(scene, &raw mut ray, std::ptr::null()) };
+        ray.t_far < 0.0
     }
 
     /// A committed scene of triangles, made by `device`.
@@ -179,44 +217,18 @@ impl Embree {
         Ok(Self { scene, device, api })
     }
 
-    fn ray(origin: Vec3, direction: Vec3, t_max: f32) -> RayHit {
-        RayHit {
-            origin: origin.to_array(),
-            t_near: 0.0,
-            direction: direction.to_array(),
-            time: 0.0,
-            t_far: t_max,
-            mask: NONE,
-            id: 0,
-            flags: 0,
-            normal: [0.0; 3],
-            u: 0.0,
-            v: 0.0,
-            primitive: NONE,
-            geometry: NONE,
-            instances: [NONE; 9],
-        }
-    }
-
     /// The nearest triangle on a ray.
     #[inline]
     #[must_use]
     pub fn closest(&self, origin: Vec3, direction: Vec3, t_max: f32) -> Option<EmbreeHit> {
-        let mut ray = Self::ray(origin, direction, t_max);
-        // SAFETY: the scene is committed; the ray is aligned and as large as Embree wants it. No
-        // arguments means the default ones.
-        unsafe { (self.api.intersect)(self.scene, &raw mut ray, std::ptr::null()) };
-        (ray.geometry != NONE).then_some(EmbreeHit { t: ray.t_far, triangle: ray.primitive })
+        self.api.closest(self.scene, RayHit::new(origin, direction, t_max))
     }
 
     /// Whether any triangle lies on a ray.
     #[inline]
     #[must_use]
     pub fn occluded(&self, origin: Vec3, direction: Vec3, t_max: f32) -> bool {
-        let mut ray = Self::ray(origin, direction, t_max);
-        // SAFETY: as in `closest`; only the ray's part is used.
-        unsafe { (self.api.occluded)(self.scene, &raw mut ray, std::ptr::null()) };
-        ray.t_far < 0.0
+        self.api.occluded(self.scene, RayHit::new(origin, direction, t_max))
     }
 }
 
@@ -230,44 +242,57 @@ impl Drop for Embree {
     }
 }
 
-/// Many instances of one mesh in Embree, its default quality.
+/// Meshes and their instances in Embree, as two levels.
 pub struct EmbreeInstances {
-    mesh: Handle,
+    meshes: Vec<Handle>,
     top: Handle,
     instances: Vec<Handle>,
     device: Handle,
     api: Api,
 }
 
+// SAFETY: as for `Embree`; the top level is built anew through `&mut` alone.
+unsafe impl Send for EmbreeInstances {}
+// SAFETY: as above.
+unsafe impl Sync for EmbreeInstances {}
+
 impl EmbreeInstances {
-    /// Loads the library and builds `count` instances of a mesh, all at its own place.
+    /// Loads the library and builds instances, each a mesh (its index) and its place, with Embree's
+    /// default quality.
     ///
     /// # Errors
     /// Where the file is no Embree 4.
     pub fn new(
         library: &Path,
-        mesh: &[[Vec3; 3]],
-        count: usize,
+        meshes: &[Vec<[Vec3; 3]>],
+        instances: &[(usize, Affine3A)],
+        robust: bool,
         threads: usize,
     ) -> Result<Self, libloading::Error> {
         let api = Api::load(library)?;
         let device = api.device(threads);
-        let mesh = api.triangles(device, mesh, Quality::Medium, true);
+        let meshes: Vec<Handle> =
+            meshes.iter().map(|m| api.triangles(device, m, Quality::Medium, robust)).collect();
         // SAFETY: all handles are of this device.
-        let (top, instances) = unsafe {
+        let top = unsafe {
             let top = (api.new_scene)(device);
             (api.set_quality)(top, Quality::Medium as c_uint);
-            (api.set_flags)(top, SCENE_ROBUST);
-            let instance = || {
+            (api.set_flags)(top, if robust { SCENE_ROBUST } else { 0 });
+            top
+        };
+        let place = |&(mesh, _): &(usize, Affine3A)| {
+            let mesh = meshes[mesh];
+            // SAFETY: as above.
+            unsafe {
                 let instance = (api.new_geometry)(device, GEOMETRY_INSTANCE);
                 (api.set_instanced)(instance, mesh);
                 (api.attach)(top, instance);
                 instance
-            };
-            (top, (0..count).map(|_| instance()).collect())
+            }
         };
-        let mut all = Self { mesh, top, instances, device, api };
-        all.place(std::iter::repeat_n(Affine3A::IDENTITY, count));
+        let handles = instances.iter().map(place).collect();
+        let mut all = Self { meshes, top, instances: handles, device, api };
+        all.place(instances.iter().map(|(_, world_from_object)| *world_from_object));
         Ok(all)
     }
 
@@ -284,6 +309,20 @@ impl EmbreeInstances {
             (self.api.commit_scene)(self.top);
         }
     }
+
+    /// The nearest triangle on a ray, numbered within its mesh.
+    #[inline]
+    #[must_use]
+    pub fn closest(&self, origin: Vec3, direction: Vec3, t_max: f32) -> Option<EmbreeHit> {
+        self.api.closest(self.top, RayHit::new(origin, direction, t_max))
+    }
+
+    /// Whether any triangle lies on a ray.
+    #[inline]
+    #[must_use]
+    pub fn occluded(&self, origin: Vec3, direction: Vec3, t_max: f32) -> bool {
+        self.api.occluded(self.top, RayHit::new(origin, direction, t_max))
+    }
 }
 
 impl Drop for EmbreeInstances {
@@ -294,7 +333,9 @@ impl Drop for EmbreeInstances {
                 (self.api.release_geometry)(instance);
             }
             (self.api.release_scene)(self.top);
-            (self.api.release_scene)(self.mesh);
+            for &mesh in &self.meshes {
+                (self.api.release_scene)(mesh);
+            }
             (self.api.release_device)(self.device);
         }
     }

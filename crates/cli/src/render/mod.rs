@@ -12,10 +12,10 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use glam::UVec2;
 use lumencast_gather::reference::{
-    Film, Filter, Noise, PASS, Parts, PictureSettings, Renderer, View,
+    Film, Filter, Noise, PASS, Parts, PictureSettings, Renderer,
 };
 use lumencast_picture::{Picture, ToneMap, exposure};
-use lumencast_scene::{FileContents, Scene};
+use lumencast_scene::{FileContents, Scene, View};
 use serde_json::{Value, json};
 
 use crate::arguments::{Exposure, SceneSource, parse_positive};

@@ -3,11 +3,11 @@
 //! fields are compared with.
 
 mod film;
+mod filter;
 mod picture;
 mod probe;
-mod view;
 
 pub use film::{Film, Noise};
+pub use filter::Filter;
 pub use picture::{PASS, Parts, PictureSettings, Renderer, Traced};
 pub use probe::{ProbeEstimate, ProbeSettings, probe_sh};
-pub use view::{Filter, View};

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use glam::{UVec2, Vec3};
-use lumencast_scene::Snapshot;
+use lumencast_scene::{Snapshot, View};
 use rayon::prelude::*;
 
-use super::{Film, Filter, View};
+use super::{Film, Filter};
 use crate::accel::Kernel;
 use crate::path_trace::MaterialModel;
 use crate::path_trace::integrator::{Integrator, Look, Paths, Seen};
@@ -87,8 +87,8 @@ pub struct Traced {
 ///
 /// ```
 /// use glam::{UVec2, Vec3};
-/// use lumencast_gather::reference::{Film, PictureSettings, Renderer, View};
-/// use lumencast_scene::Scene;
+/// use lumencast_gather::reference::{Film, PictureSettings, Renderer};
+/// use lumencast_scene::{Scene, View};
 ///
 /// let scene = Scene::open("cornell")?.snapshot();
 /// let view = View::look_at(Vec3::new(0.0, 1.0, 3.0), Vec3::Y, 0.7).expect("two points");

@@ -24,7 +24,7 @@ use crate::limits::Budget;
 use crate::trs::Trs;
 use crate::{
     Aabb, AnimationId, Environment, FileContents, HdrImage, Instance, Light, Material, Mesh,
-    MeshId, NodeId, Snapshot, Transform, VolumeSpec,
+    MeshId, NodeId, Snapshot, Transform, View, VolumeSpec,
 };
 
 /// A scene: what its file says, what edits have made of it, and its time.
@@ -116,6 +116,13 @@ pub struct PlacedCamera<'a> {
     pub camera: &'a Camera,
     /// It looks along −Z with +Y up.
     pub world_from_camera: Affine3A,
+}
+
+impl PlacedCamera<'_> {
+    /// What it sees.
+    pub fn view(&self) -> View {
+        View { world_from_camera: self.world_from_camera, projection: self.camera.projection }
+    }
 }
 
 impl Scene {
