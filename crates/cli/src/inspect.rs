@@ -10,7 +10,7 @@ use lumencast_light::ProbeVolume;
 use lumencast_scene::Scene;
 use serde_json::{Map, Value, json};
 
-use crate::{output, remote};
+use crate::{light_source, output, remote};
 
 /// Says what is in a file (.light, .gltf, .glb), a built-in scene, or a running server.
 #[derive(Debug, Args)]
@@ -30,7 +30,7 @@ pub(crate) struct Inspect {
 
 impl Inspect {
     pub(crate) fn run(self) -> Result<()> {
-        let report = if self.what.starts_with("http://") || self.what.starts_with("https://") {
+        let report = if light_source::is_address(&self.what) {
             let seen = remote::look(&self.what)?;
             light_report(&seen.catalog, &seen.volumes, seen.bytes, seen.state.as_ref())
         } else if let Some(bytes) = light_file(Path::new(&self.what))? {

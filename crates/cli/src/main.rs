@@ -11,6 +11,7 @@ mod doctor;
 mod environment;
 mod inspect;
 mod interrupt;
+mod light_source;
 mod output;
 mod probe;
 mod remote;

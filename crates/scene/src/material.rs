@@ -107,7 +107,7 @@ pub struct TextureRef {
 }
 
 /// Texture wrapping.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Wrap {
     /// Tiles.
     #[default]
@@ -119,7 +119,7 @@ pub enum Wrap {
 }
 
 /// Texture filtering of the finest level.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Filter {
     /// Nearest texel.
     Nearest,

@@ -1,0 +1,236 @@
+//! Pictures by path tracing every pixel.
+
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::Path;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use glam::UVec2;
+use lumencast_gather::reference::{Film, Filter, Noise, PASS, Parts, PictureSettings, Renderer};
+use lumencast_picture::{Picture, exposure};
+use lumencast_scene::{FileContents, Scene, View};
+use serde_json::{Value, json};
+
+use super::{FilterArgument, PartsArgument, Render, partial};
+use crate::{interrupt, output};
+
+/// The unfinished picture is kept at least so often.
+const KEEP_EVERY: Duration = Duration::from_secs(60);
+/// Samples a pixel unless told otherwise.
+const SAMPLES: u32 = 64;
+
+impl Render {
+    pub(super) fn trace_picture(&self, scene: &mut Scene, view: View) -> Result<()> {
+        let settings = self.settings();
+        let key = self.key(scene, view, settings);
+        let partial = partial::path_of(&self.output[0]);
+        let mut film = self.begun(&partial, key);
+        let before = film.samples();
+        let spinner = output::spinner("Building".into());
+        let renderer = Renderer::new(&scene.snapshot(), view, settings)
+            .context("cannot start the threads that trace")?;
+        spinner.finish_and_clear();
+
+        let start = Instant::now();
+        let rays = match self.trace(&renderer, &mut film, &partial, key)? {
+            Some(rays) => rays,
+            None => {
+                if film.samples() > before {
+                    partial::write(&partial, key, &film)?;
+                }
+                match film.samples() {
+                    0 => eprintln!("Stopped before the first samples were done."),
+                    samples => eprintln!(
+                        "Stopped at {samples} of {} samples; the same command goes on from {}.",
+                        self.reference_samples(),
+                        partial.display()
+                    ),
+                }
+                std::process::exit(interrupt::EXIT_CODE);
+            }
+        };
+        let seconds = start.elapsed().as_secs_f64();
+        let picture = Picture::new(self.picture.size.x, self.picture.size.y, film.picture())?;
+        let exposure = self.exposure.0.unwrap_or_else(|| exposure(&picture));
+        self.write(&picture, exposure)?;
+        if partial.exists() {
+            fs::remove_file(&partial)
+                .with_context(|| format!("cannot remove {}", partial.display()))?;
+        }
+        let done = Done { film, before, rays, seconds, exposure };
+        if self.json {
+            return output::json(&self.report(&done));
+        }
+        self.print(&done);
+        Ok(())
+    }
+
+    fn reference_samples(&self) -> u32 {
+        self.spp.unwrap_or(SAMPLES)
+    }
+
+    fn settings(&self) -> PictureSettings {
+        PictureSettings {
+            clamp: self.clamp,
+            roulette_from: self.roulette_from,
+            parts: match self.parts {
+                PartsArgument::All => Parts::All,
+                PartsArgument::Direct => Parts::Direct,
+                PartsArgument::Indirect => Parts::Indirect,
+            },
+            filter: match self.filter {
+                FilterArgument::Box => Filter::Box,
+                FilterArgument::Tent => Filter::Tent,
+                FilterArgument::Gaussian => Filter::Gaussian,
+            },
+            seed: self.seed,
+            ..self.picture.settings()
+        }
+    }
+
+    /// A hash of all that a sample depends on: scene files by length and time of change.
+    fn key(&self, scene: &Scene, view: View, settings: PictureSettings) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        let settings = PictureSettings { threads: None, ..settings };
+        let said =
+            format!("{} {view:?} {settings:?} {:?}", env!("CARGO_PKG_VERSION"), self.scene.source);
+        (said, self.time.to_bits()).hash(&mut hasher);
+        for file in scene.files() {
+            file.name.hash(&mut hasher);
+            match &file.contents {
+                FileContents::Bytes(bytes) => bytes.hash(&mut hasher),
+                FileContents::Path(path) => {
+                    if let Ok(metadata) = fs::metadata(path) {
+                        (metadata.len(), metadata.modified().ok()).hash(&mut hasher);
+                    }
+                }
+            }
+        }
+        hasher.finish()
+    }
+
+    /// The film to go on with.
+    fn begun(&self, partial: &Path, key: u64) -> Film {
+        let kept =
+            (!self.restart).then(|| partial::read(partial, key, self.picture.size)).flatten();
+        match kept {
+            Some(film) => {
+                eprintln!("Going on from {} samples in {}.", film.samples(), partial.display());
+                film
+            }
+            None => {
+                if partial.exists() && !self.restart {
+                    eprintln!(
+                        "{} belongs to another picture or is damaged: beginning anew.",
+                        partial.display()
+                    );
+                }
+                Film::new(self.picture.size, self.reference_samples())
+            }
+        }
+    }
+
+    /// Traces until all samples are there and returns the number of rays; `None` when interrupted.
+    fn trace(
+        &self,
+        renderer: &Renderer,
+        film: &mut Film,
+        partial: &Path,
+        key: u64,
+    ) -> Result<Option<u64>> {
+        let interrupted = interrupt::flag()?;
+        let bar = output::share_bar("Rendering");
+        let share = |samples: f64| samples / f64::from(self.reference_samples());
+        bar.set_position((share(film.samples().into()) * output::SHARE_BAR_LENGTH) as u64);
+        bar.reset_eta();
+        let mut kept = Instant::now();
+        let mut rays = 0;
+        while film.samples() < self.reference_samples() {
+            let samples = film.samples();
+            let going = |done: f32| {
+                let pass = PASS.min(self.reference_samples() - samples);
+                let at = share(f64::from(samples) + f64::from(done) * f64::from(pass));
+                bar.set_position((at * output::SHARE_BAR_LENGTH) as u64);
+                !interrupted.load(Ordering::Relaxed)
+            };
+            match renderer.pass(film, self.reference_samples(), &going) {
+                Some(traced) => rays += traced.rays,
+                None => {
+                    bar.abandon();
+                    return Ok(None);
+                }
+            }
+            if kept.elapsed() > KEEP_EVERY && film.samples() < self.reference_samples() {
+                partial::write(partial, key, film)?;
+                kept = Instant::now();
+            }
+        }
+        bar.finish_and_clear();
+        Ok(Some(rays))
+    }
+
+    fn print(&self, done: &Done) {
+        let files: Vec<_> = self.output.iter().map(|path| path.display().to_string()).collect();
+        println!("{}", files.join(", "));
+        println!(
+            "{} × {}, {} samples a pixel, {} bounces, {:.1} s",
+            self.picture.size.x,
+            self.picture.size.y,
+            done.film.samples(),
+            self.picture.bounces,
+            done.seconds
+        );
+        if done.paths(self.picture.size) > 0.0 {
+            println!(
+                "{:.3} M paths, {:.3} M rays a second",
+                1e-6 * done.paths(self.picture.size) / done.seconds,
+                1e-6 * done.rays as f64 / done.seconds
+            );
+        }
+        if let Some(Noise { relative_rms, psnr }) = done.film.noise(done.exposure) {
+            println!(
+                "noise {:.2} % of the mean, {psnr:.1} dB at exposure {}",
+                100.0 * relative_rms,
+                done.exposure
+            );
+        }
+    }
+
+    fn report(&self, done: &Done) -> Value {
+        let noise = done.film.noise(done.exposure);
+        json!({
+            "files": self.output,
+            "width": self.picture.size.x,
+            "height": self.picture.size.y,
+            "samples": done.film.samples(),
+            "bounces": self.picture.bounces,
+            "materials": self.picture.materials.to_string(),
+            "seconds": done.seconds,
+            "samples_taken_before": done.before,
+            "paths_a_second": done.paths(self.picture.size) / done.seconds,
+            "rays_a_second": done.rays as f64 / done.seconds,
+            "exposure": done.exposure,
+            "noise_relative_rms": noise.map(|n| n.relative_rms),
+            "noise_psnr": noise.map(|n| n.psnr),
+        })
+    }
+}
+
+/// A finished picture, and what it took.
+struct Done {
+    film: Film,
+    /// Samples a pixel that were there at the start.
+    before: u32,
+    rays: u64,
+    seconds: f64,
+    exposure: f32,
+}
+
+impl Done {
+    /// Paths traced this time.
+    fn paths(&self, size: UVec2) -> f64 {
+        f64::from(size.x) * f64::from(size.y) * f64::from(self.film.samples() - self.before)
+    }
+}

@@ -1,0 +1,232 @@
+//! The light field on the device: all volumes in one 3D texture.
+//!
+//! A volume's atlas (`light::Atlas`) is deep and narrow, so volumes are stacked along z, and where the
+//! adapter's textures are not deep enough, in columns side by side. Reading clamps to the outermost
+//! probes, so that filtering never reaches a neighbour.
+
+use glam::{Affine3A, Mat3, UVec3};
+use lumencast_light::{
+    Atlas, LightField, OffsetPolicy, ProbeVolume, ScaleRule, atlas_size, texels,
+};
+use lumencast_shaders::layout;
+
+use crate::ShadeError;
+use crate::gpu::Gpu;
+
+/// Group 2 of the shaders.
+#[derive(Debug)]
+pub(crate) struct GpuField {
+    layout: wgpu::BindGroupLayout,
+    sampler: wgpu::Sampler,
+    pub(crate) group: wgpu::BindGroup,
+    /// What the texture was made for.
+    sizes: Vec<UVec3>,
+    origins: Vec<UVec3>,
+    atlas: wgpu::Texture,
+    scales: Vec<ScaleRule>,
+}
+
+/// The bindings of group 2.
+pub(crate) fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::FRAGMENT,
+        ty,
+        count: None,
+    };
+    let buffer =
+        |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("field"),
+        entries: &[
+            entry(0, buffer(wgpu::BufferBindingType::Uniform)),
+            entry(1, buffer(wgpu::BufferBindingType::Storage { read_only: true })),
+            entry(
+                2,
+                wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Float { filterable: true },
+                    view_dimension: wgpu::TextureViewDimension::D3,
+                    multisampled: false,
+                },
+            ),
+            entry(3, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+        ],
+    })
+}
+
+impl GpuField {
+    /// No light.
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        let layout = group_layout(&gpu.device);
+        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("field"),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
+        });
+        let atlas = texture(gpu, UVec3::ONE);
+        let group = group(gpu, &layout, &sampler, &atlas, &[], OffsetPolicy::None);
+        Self { layout, sampler, group, sizes: vec![], origins: vec![], atlas, scales: vec![] }
+    }
+
+    /// Takes in other light. Where the volumes are as large as before, the texture stays.
+    pub(crate) fn update(
+        &mut self,
+        gpu: &Gpu,
+        light: &LightField,
+        offset: OffsetPolicy,
+    ) -> Result<(), ShadeError> {
+        let volumes = light.volumes();
+        let sizes: Vec<UVec3> =
+            volumes.iter().map(|v| atlas_size(v.grid.resolution, v.order)).collect();
+        if sizes != self.sizes {
+            let limit = gpu.device.limits().max_texture_dimension_3d;
+            let (size, origins) = arrange(&sizes, limit)
+                .ok_or(ShadeError::Field { volumes: volumes.len(), limit })?;
+            self.atlas = texture(gpu, size);
+            self.scales = vec![ScaleRule::default(); sizes.len()];
+            (self.sizes, self.origins) = (sizes, origins);
+        }
+        let mut placed = Vec::with_capacity(volumes.len());
+        for ((volume, &origin), rule) in volumes.iter().zip(&self.origins).zip(&mut self.scales) {
+            let packed = Atlas::pack(volume, rule.update(&volume.coefficients));
+            write(gpu, &self.atlas, origin, &packed);
+            placed.push(of_volume(volume, origin, packed.scale_log2));
+        }
+        self.group = group(gpu, &self.layout, &self.sampler, &self.atlas, &placed, offset);
+        Ok(())
+    }
+}
+
+/// Where each of the boxes lies in a texture of at most `limit` texels a side, and how large that is.
+fn arrange(sizes: &[UVec3], limit: u32) -> Option<(UVec3, Vec<UVec3>)> {
+    let (mut size, mut next, mut column) = (UVec3::ONE, UVec3::ZERO, 0);
+    let mut origins = Vec::with_capacity(sizes.len());
+    for &own in sizes {
+        if next.z + own.z > limit {
+            next = UVec3::new(next.x + column, 0, 0);
+            column = 0;
+        }
+        origins.push(next);
+        size = size.max(next + own);
+        column = column.max(own.x);
+        next.z += own.z;
+    }
+    (size.max_element() <= limit).then_some((size, origins))
+}
+
+fn of_volume(volume: &ProbeVolume, origin: UVec3, scale_log2: i8) -> layout::Volume {
+    let grid = &volume.grid;
+    let resolution = grid.resolution.as_vec3();
+    // cell = (R⁻¹ (p − centre) / size + ½) · resolution − ½
+    let linear =
+        Mat3::from_diagonal(resolution / grid.size) * Mat3::from_quat(grid.rotation.inverse());
+    let translation = 0.5 * resolution - 0.5 - linear * grid.center;
+    layout::Volume {
+        cell_from_world: layout::rows(&Affine3A::from_mat3_translation(linear, translation)),
+        spacing: grid.spacing(),
+        scale: f32::from(scale_log2).exp2(),
+        resolution,
+        texels: texels(volume.order) as u32,
+        origin: origin.as_vec3(),
+        _pad: 0.0,
+    }
+}
+
+fn extent(size: UVec3) -> wgpu::Extent3d {
+    wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: size.z }
+}
+
+fn texture(gpu: &Gpu, size: UVec3) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("field"),
+        size: extent(size),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D3,
+        format: wgpu::TextureFormat::Rgba16Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    })
+}
+
+fn write(gpu: &Gpu, atlas: &wgpu::Texture, origin: UVec3, packed: &Atlas) {
+    let UVec3 { x, y, z } = origin;
+    gpu.queue.write_texture(
+        wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x, y, z }, ..atlas.as_image_copy() },
+        bytemuck::cast_slice(&packed.halves),
+        wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(8 * packed.size.x),
+            rows_per_image: Some(packed.size.y),
+        },
+        extent(packed.size),
+    );
+}
+
+fn group(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    sampler: &wgpu::Sampler,
+    atlas: &wgpu::Texture,
+    volumes: &[layout::Volume],
+    offset: OffsetPolicy,
+) -> wgpu::BindGroup {
+    let (offset_policy, offset_metres) = match offset {
+        OffsetPolicy::None => (0, 0.0),
+        OffsetPolicy::HalfCell => (1, 0.0),
+        OffsetPolicy::Metres(metres) => (2, metres),
+    };
+    let field =
+        layout::Field { count: volumes.len() as u32, offset_policy, offset_metres, _pad: 0 };
+    let uniform = gpu.buffer("field", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&field), 0);
+    let least = size_of::<layout::Volume>() as u64;
+    let storage = wgpu::BufferUsages::STORAGE;
+    let list = gpu.buffer("volumes", storage, bytemuck::cast_slice(volumes), least);
+    let view = atlas.create_view(&wgpu::TextureViewDescriptor::default());
+    let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("field"),
+        layout,
+        entries: &[
+            entry(0, uniform.as_entire_binding()),
+            entry(1, list.as_entire_binding()),
+            entry(2, wgpu::BindingResource::TextureView(&view)),
+            entry(3, wgpu::BindingResource::Sampler(sampler)),
+        ],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Quat, Vec3, Vec4};
+    use lumencast_light::{Grid, Order, VolumeId};
+
+    #[test]
+    fn volumes_do_not_overlap() {
+        let sizes = [UVec3::new(8, 8, 70), UVec3::new(4, 9, 70), UVec3::new(5, 2, 180)];
+        let (size, origins) = arrange(&sizes, 256).unwrap();
+        assert_eq!(origins, [UVec3::ZERO, UVec3::new(0, 0, 70), UVec3::new(8, 0, 0)]);
+        assert_eq!(size, UVec3::new(13, 9, 180));
+        assert_eq!(arrange(&[UVec3::new(1, 1, 300)], 256), None);
+        assert_eq!(arrange(&[UVec3::new(200, 1, 200); 2], 256), None);
+    }
+
+    #[test]
+    fn cells_are_those_of_the_grid() {
+        let grid = Grid {
+            center: Vec3::new(1.0, -2.0, 0.5),
+            rotation: Quat::from_rotation_y(0.7),
+            size: Vec3::new(4.0, 2.0, 6.0),
+            resolution: UVec3::new(4, 3, 5),
+        };
+        let volume = of_volume(&ProbeVolume::dark(VolumeId(0), grid, Order::L3), UVec3::X, -3);
+        for p in [Vec3::ZERO, Vec3::new(2.0, -1.5, 3.0)] {
+            let h: Vec4 = p.extend(1.0);
+            let cell = Vec3::from(volume.cell_from_world.map(|row| row.dot(h)));
+            assert!((cell - grid.cell_from_world(p)).length() < 1e-5);
+        }
+        assert_eq!((volume.texels, volume.scale), (12, 0.125));
+    }
+}

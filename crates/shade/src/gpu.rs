@@ -1,0 +1,156 @@
+//! The graphics device.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::UVec2;
+
+use crate::ShadeError;
+
+/// What colours are drawn in before they are shown: linear, pre-exposed.
+pub(crate) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+/// Depth, of pictures and shadow maps alike.
+pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// A device, and what is known of its adapter.
+#[derive(Debug)]
+pub struct Gpu {
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    info: wgpu::AdapterInfo,
+    /// Sample counts that pictures can be multisampled with.
+    sample_counts: Vec<u32>,
+    /// What went wrong since it was last asked for.
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+impl Gpu {
+    /// Of the adapter that the platform thinks fastest; `VK_DRIVER_FILES` and the like choose
+    /// otherwise.
+    ///
+    /// # Errors
+    /// Where there is none, or it gives no device.
+    pub fn new() -> Result<Self, ShadeError> {
+        pollster::block_on(Self::open())
+    }
+
+    async fn open() -> Result<Self, ShadeError> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+        let options = wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            ..Default::default()
+        };
+        let adapter = instance.request_adapter(&options).await.map_err(|error| {
+            tracing::debug!(%error, "no adapter");
+            ShadeError::NoAdapter
+        })?;
+        Self::of_adapter(&adapter).await
+    }
+
+    async fn of_adapter(adapter: &wgpu::Adapter) -> Result<Self, ShadeError> {
+        let info = adapter.get_info();
+        // With this feature, sample counts are those of the adapter instead of WebGPU's 1 and 4.
+        let specific = wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES;
+        let wanted = specific | wgpu::Features::TIMESTAMP_QUERY;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("lumencast"),
+            required_features: adapter.features() & wanted,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        };
+        let (device, queue) = adapter.request_device(&descriptor).await.map_err(|error| {
+            ShadeError::Device { adapter: info.name.clone(), reason: error.to_string() }
+        })?;
+        let supported = |format: wgpu::TextureFormat, count| {
+            let flags = adapter.get_texture_format_features(format).flags;
+            flags.sample_count_supported(count)
+        };
+        let is_specific = device.features().contains(specific);
+        let sample_counts = [1, 2, 4, 8]
+            .into_iter()
+            .filter(|&count| match is_specific {
+                true => supported(COLOR, count) && supported(DEPTH, count),
+                false => count == 1 || count == 4,
+            })
+            .collect();
+        let fault = Arc::new(Mutex::new(None));
+        let keep = |reason: String, fault: &Mutex<Option<String>>| {
+            tracing::error!(reason, "the graphics device failed");
+            let mut fault = fault.lock().unwrap_or_else(PoisonError::into_inner);
+            fault.get_or_insert(reason);
+        };
+        let (of_errors, of_loss) = (fault.clone(), fault.clone());
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            keep(error.to_string(), &of_errors);
+        }));
+        device.set_device_lost_callback(move |reason, message| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                keep(format!("device lost: {message}"), &of_loss);
+            }
+        });
+        Ok(Self { device, queue, info, sample_counts, fault })
+    }
+
+    /// Name of the adapter, and of its driver.
+    pub fn name(&self) -> String {
+        let driver = [self.info.driver.as_str(), self.info.driver_info.as_str()].join(" ");
+        format!("{} ({}, {})", self.info.name, self.info.backend.to_str(), driver.trim())
+    }
+
+    /// Whether it computes on the processor.
+    pub fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// The most samples of at most `wanted` that a pixel can have at once.
+    pub fn samples_at_once(&self, wanted: u32) -> u32 {
+        let fitting = self.sample_counts.iter().copied().filter(|&count| count <= wanted);
+        fitting.max().unwrap_or(1)
+    }
+
+    /// Whether a picture of this size can be drawn.
+    pub(crate) fn check_size(&self, size: UVec2) -> Result<(), ShadeError> {
+        let limit = self.device.limits().max_texture_dimension_2d;
+        if size.min_element() == 0 || size.max_element() > limit {
+            return Err(ShadeError::Size { width: size.x, height: size.y, limit });
+        }
+        Ok(())
+    }
+
+    /// What the device has complained about since it was last asked.
+    pub(crate) fn check(&self, during: &'static str) -> Result<(), ShadeError> {
+        let fault = self.fault.lock().unwrap_or_else(PoisonError::into_inner).take();
+        match fault {
+            Some(reason) => Err(ShadeError::Failed { during, reason }),
+            None => Ok(()),
+        }
+    }
+
+    /// Waits until everything submitted is done.
+    pub(crate) fn finish(&self, during: &'static str) -> Result<(), ShadeError> {
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|error| ShadeError::Failed { during, reason: error.to_string() })?;
+        self.check(during)
+    }
+
+    /// A buffer with contents; of at least `least` bytes, since bindings may not be empty.
+    pub(crate) fn buffer(
+        &self,
+        label: &str,
+        usage: wgpu::BufferUsages,
+        contents: &[u8],
+        least: u64,
+    ) -> wgpu::Buffer {
+        let size = (contents.len() as u64).max(least).next_multiple_of(4);
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        if !contents.is_empty() {
+            self.queue.write_buffer(&buffer, 0, contents);
+        }
+        buffer
+    }
+}

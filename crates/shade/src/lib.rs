@@ -1,0 +1,37 @@
+//! The reference client: a forward renderer that draws direct light itself and takes indirect light
+//! from a light field (chapter 4.2 of the second paper). It is what one copies from to bring
+//! Lumencast to another engine, and the instrument that measures its quality.
+//!
+//! A [`Renderer`] is given a scene's [`Snapshot`](lumencast_scene::Snapshot) and a
+//! [`LightField`](lumencast_light::LightField) and draws [`View`](lumencast_scene::View)s of them, on
+//! any adapter that wgpu knows, also without a window. Radiance is cd/m² throughout; before it is
+//! stored in half floats it is multiplied by one pre-exposure.
+//!
+//! Direct light has the materials of the path tracer (the shaders are twins of `gather::bsdf`),
+//! shadows come from shadow maps. Indirect light is the field's, trilinearly filtered: diffuse by
+//! convolution with the clamped cosine, specular by the split sum with the fitted lobe of the second
+//! paper's appendix A. The shaders are in `lumencast-shaders`.
+
+#![forbid(unsafe_code)]
+
+mod camera;
+mod environment_brdf;
+mod error;
+mod field;
+mod geometry;
+mod gpu;
+mod lights;
+mod materials;
+mod pipelines;
+mod renderer;
+mod scene;
+mod settings;
+mod shadows;
+mod target;
+mod textures;
+
+pub use environment_brdf::{environment_brdf, reflected};
+pub use error::ShadeError;
+pub use gpu::Gpu;
+pub use renderer::{Drawn, Renderer};
+pub use settings::{Lighting, Materials, Settings, Shading, Shadows, Transparency};

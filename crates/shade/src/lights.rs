@@ -1,0 +1,263 @@
+//! Punctual lights, shadow maps and the environment on the device: group 1 of the shaders.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use half::f16;
+use lumencast_scene::{Environment, HdrImage, Light, LightKind, PlacedLight, Snapshot};
+use lumencast_shaders::layout;
+
+use crate::environment_brdf::environment_brdf;
+use crate::gpu::{DEPTH, Gpu};
+use crate::shadows::ShadowPlan;
+
+/// Entries a side of the environment BRDF's table.
+const TABLE: usize = 32;
+
+/// What lights a frame.
+#[derive(Debug)]
+pub(crate) struct GpuLights {
+    layout: wgpu::BindGroupLayout,
+    comparison: wgpu::Sampler,
+    linear: wgpu::Sampler,
+    table: wgpu::TextureView,
+    picture: (Option<Arc<HdrImage>>, wgpu::TextureView),
+    maps: wgpu::Texture,
+}
+
+/// The bindings of group 1.
+pub(crate) fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::FRAGMENT,
+        ty,
+        count: None,
+    };
+    let buffer =
+        |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let texture = |sample_type, view_dimension| wgpu::BindingType::Texture {
+        sample_type,
+        view_dimension,
+        multisampled: false,
+    };
+    let plane = wgpu::TextureViewDimension::D2;
+    let uniform = wgpu::BufferBindingType::Uniform;
+    let storage = wgpu::BufferBindingType::Storage { read_only: true };
+    let float = |filterable| wgpu::TextureSampleType::Float { filterable };
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("light"),
+        entries: &[
+            entry(0, buffer(uniform)),
+            entry(1, buffer(uniform)),
+            entry(2, texture(float(false), plane)),
+            entry(3, buffer(storage)),
+            entry(4, buffer(storage)),
+            entry(5, texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2Array)),
+            entry(6, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison)),
+            entry(7, texture(float(true), plane)),
+            entry(8, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+        ],
+    })
+}
+
+impl GpuLights {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        let sampler = |label, compare| {
+            gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some(label),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                compare,
+                ..Default::default()
+            })
+        };
+        // Depth is reversed: lit is what is as near to the light as the map or nearer.
+        let comparison = sampler("shadows", Some(wgpu::CompareFunction::GreaterEqual));
+        Self {
+            layout: group_layout(&gpu.device),
+            comparison,
+            linear: sampler("table", None),
+            table: table(gpu),
+            picture: (None, picture(gpu, 1, 1, &[Vec3::ZERO])),
+            maps: maps(gpu, 1, 1),
+        }
+    }
+
+    /// Makes room for a plan's shadow maps, and returns a view of each.
+    pub(crate) fn shadow_maps(&mut self, gpu: &Gpu, plan: &ShadowPlan) -> Vec<wgpu::TextureView> {
+        let (side, layers) = (plan.resolution.max(1), plan.views.len().max(1) as u32);
+        if (self.maps.width(), self.maps.depth_or_array_layers()) != (side, layers) {
+            self.maps = maps(gpu, side, layers);
+        }
+        let layer = |base_array_layer| {
+            self.maps.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2),
+                base_array_layer,
+                array_layer_count: Some(1),
+                ..Default::default()
+            })
+        };
+        (0..plan.views.len() as u32).map(layer).collect()
+    }
+
+    /// The group to bind.
+    pub(crate) fn group(
+        &mut self,
+        gpu: &Gpu,
+        snapshot: &Snapshot,
+        plan: &ShadowPlan,
+        frame: layout::Frame,
+    ) -> wgpu::BindGroup {
+        let environment = self.environment(gpu, &snapshot.environment);
+        let lights: Vec<layout::Light> = snapshot
+            .lights
+            .iter()
+            .zip(&plan.lights)
+            .map(|(light, &(first, count))| of_light(light, first, count))
+            .collect();
+        let frame = layout::Frame { light_count: lights.len() as u32, ..frame };
+        let uniform =
+            |label, contents: &[u8]| gpu.buffer(label, wgpu::BufferUsages::UNIFORM, contents, 0);
+        let storage = |label, contents: &[u8], least: usize| {
+            gpu.buffer(label, wgpu::BufferUsages::STORAGE, contents, least as u64)
+        };
+        let frame = uniform("frame", bytemuck::bytes_of(&frame));
+        let environment = uniform("environment", bytemuck::bytes_of(&environment));
+        let lights = storage("lights", bytemuck::cast_slice(&lights), size_of::<layout::Light>());
+        let least = size_of::<layout::ShadowView>();
+        let views = storage("shadow views", bytemuck::cast_slice(&plan.views), least);
+        let maps = self.maps.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        });
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let texture = wgpu::BindingResource::TextureView;
+        let sampler = wgpu::BindingResource::Sampler;
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("light"),
+            layout: &self.layout,
+            entries: &[
+                entry(0, frame.as_entire_binding()),
+                entry(1, environment.as_entire_binding()),
+                entry(2, texture(&self.picture.1)),
+                entry(3, lights.as_entire_binding()),
+                entry(4, views.as_entire_binding()),
+                entry(5, texture(&maps)),
+                entry(6, sampler(&self.comparison)),
+                entry(7, texture(&self.table)),
+                entry(8, sampler(&self.linear)),
+            ],
+        })
+    }
+
+    fn environment(&mut self, gpu: &Gpu, environment: &Environment) -> layout::Environment {
+        match environment {
+            Environment::Constant { radiance } => elevation(*radiance, *radiance, *radiance),
+            Environment::Sky { zenith, horizon, ground } => elevation(*zenith, *horizon, *ground),
+            Environment::Image { image: None, .. } => elevation(Vec3::ZERO, Vec3::ZERO, Vec3::ZERO),
+            Environment::Image { image: Some(image), intensity, rotation, .. } => {
+                if !self.picture.0.as_ref().is_some_and(|known| Arc::ptr_eq(known, image)) {
+                    let view = picture(gpu, image.width, image.height, &image.texels);
+                    self.picture = (Some(image.clone()), view);
+                }
+                layout::Environment {
+                    zenith: Vec3::splat(*intensity),
+                    kind: 1,
+                    turn: rotation / std::f32::consts::TAU,
+                    ..layout::Environment::default()
+                }
+            }
+        }
+    }
+}
+
+fn elevation(zenith: Vec3, horizon: Vec3, ground: Vec3) -> layout::Environment {
+    layout::Environment { zenith, horizon, ground, ..layout::Environment::default() }
+}
+
+fn of_light(placed: &PlacedLight, first_shadow: u32, shadow_count: u32) -> layout::Light {
+    let Light { kind, color, intensity, range } = placed.light;
+    let (cone_scale, cone_offset) = match kind {
+        LightKind::Spot { inner, outer, .. } => {
+            let scale = 1.0 / (inner.cos() - outer.cos()).max(0.001);
+            (scale, -outer.cos() * scale)
+        }
+        _ => (0.0, 1.0),
+    };
+    let (kind, size) = match kind {
+        LightKind::Point { radius } => (0, radius),
+        LightKind::Spot { radius, .. } => (1, radius),
+        LightKind::Directional { angle } => (2, (0.5 * angle).tan()),
+    };
+    layout::Light {
+        position: placed.position,
+        kind,
+        direction: placed.direction,
+        size,
+        intensity: color * intensity,
+        window: range.map_or(0.0, |range| range.powi(-4)),
+        cone_scale,
+        cone_offset,
+        first_shadow,
+        shadow_count,
+    }
+}
+
+fn maps(gpu: &Gpu, side: u32, layers: u32) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("shadow maps"),
+        size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: layers },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: DEPTH,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    })
+}
+
+/// The environment BRDF, as halves.
+fn table(gpu: &Gpu) -> wgpu::TextureView {
+    let halves: Vec<[u16; 2]> = environment_brdf(TABLE)
+        .into_iter()
+        .map(|pair| pair.to_array().map(|v| f16::from_f32(v).to_bits()))
+        .collect();
+    let format = wgpu::TextureFormat::Rg16Float;
+    let side = TABLE as u32;
+    plane(gpu, "environment BRDF", format, side, side, bytemuck::cast_slice(&halves))
+}
+
+/// The environment's picture in f32: suns do not fit halves.
+fn picture(gpu: &Gpu, width: u32, height: u32, texels: &[Vec3]) -> wgpu::TextureView {
+    let texels: Vec<[f32; 4]> = texels.iter().map(|t| t.extend(1.0).to_array()).collect();
+    let format = wgpu::TextureFormat::Rgba32Float;
+    plane(gpu, "environment", format, width, height, bytemuck::cast_slice(&texels))
+}
+
+fn plane(
+    gpu: &Gpu,
+    label: &str,
+    format: wgpu::TextureFormat,
+    width: u32,
+    height: u32,
+    texels: &[u8],
+) -> wgpu::TextureView {
+    let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size,
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(texels.len() as u32 / height),
+        rows_per_image: None,
+    };
+    gpu.queue.write_texture(texture.as_image_copy(), texels, layout, size);
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}

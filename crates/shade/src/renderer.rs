@@ -1,0 +1,408 @@
+//! The renderer: scene and light in, pictures out.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use lumencast_light::LightField;
+use lumencast_scene::{Snapshot, View};
+use lumencast_shaders::layout;
+
+use crate::ShadeError;
+use crate::camera::{Camera, Frustum, jitter};
+use crate::field::GpuField;
+use crate::gpu::Gpu;
+use crate::lights::GpuLights;
+use crate::materials::Surface;
+use crate::pipelines::{Layouts, Pipelines, Variant};
+use crate::scene::{Call, GpuScene};
+use crate::settings::{Lighting, Materials, Settings, Transparency};
+use crate::shadows::ShadowPlan;
+use crate::target::{Target, depth_attachment};
+
+/// How far patterns turn from one frame of a picture to the next: the golden section fills the circle
+/// evenly for any number.
+const GOLDEN: f32 = 0.618_034;
+
+/// Draws pictures of a scene under the light of a field.
+///
+/// ```no_run
+/// use lumencast_light::LightField;
+/// use lumencast_scene::Scene;
+/// use lumencast_shade::{Gpu, Renderer, Settings};
+///
+/// let mut scene = Scene::open("cornell")?;
+/// let settings = Settings::default();
+/// let mut renderer = Renderer::new(Gpu::new()?, &settings);
+/// renderer.set_scene(&scene.snapshot());
+/// renderer.set_light(&LightField::default(), settings.offset)?;
+/// let view = scene.cameras()[0].view();
+/// let pictures = renderer.pictures(&[view], &settings)?;
+/// assert_eq!(pictures[0].len(), 1280 * 720);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Renderer {
+    gpu: Gpu,
+    layouts: Layouts,
+    pipelines: Option<Pipelines>,
+    target: Option<Target>,
+    scene: GpuScene,
+    /// What is on the device, and with which materials.
+    shown: Option<(Arc<Snapshot>, Materials)>,
+    wanted: Option<Arc<Snapshot>>,
+    lights: GpuLights,
+    field: GpuField,
+    /// The shadow maps that are on the device.
+    drawn: Option<ShadowPlan>,
+}
+
+/// What drawing took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Drawn {
+    /// Frames that were averaged.
+    pub frames: u32,
+    /// Samples a pixel of each.
+    pub samples: u32,
+    /// Shadow maps.
+    pub shadow_maps: usize,
+    /// Texels along the side of a shadow map.
+    pub shadow_resolution: u32,
+    /// Lights that cast no shadow, because there is no room for their maps.
+    pub lights_without_shadow: usize,
+}
+
+impl Renderer {
+    /// With an empty scene and no light; of the settings only what holds for textures counts.
+    pub fn new(gpu: Gpu, settings: &Settings) -> Self {
+        let layouts = Layouts::new(&gpu.device);
+        Self {
+            scene: GpuScene::new(&gpu, settings.anisotropy),
+            lights: GpuLights::new(&gpu),
+            field: GpuField::new(&gpu),
+            layouts,
+            gpu,
+            pipelines: None,
+            target: None,
+            shown: None,
+            wanted: None,
+            drawn: None,
+        }
+    }
+
+    /// What it draws with.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Draws this moment of a scene from now on. What it shares with the one before stays on the
+    /// device.
+    pub fn set_scene(&mut self, snapshot: &Arc<Snapshot>) {
+        self.wanted = Some(snapshot.clone());
+    }
+
+    /// Takes indirect light from this field from now on.
+    ///
+    /// # Errors
+    /// Where it does not fit the device's textures.
+    pub fn set_light(
+        &mut self,
+        light: &LightField,
+        offset: lumencast_light::OffsetPolicy,
+    ) -> Result<(), ShadeError> {
+        self.field.update(&self.gpu, light, offset)
+    }
+
+    /// One picture a view, all under the same light: radiance (cd/m²), row by row from the top left.
+    /// What does not depend on the view, shadow maps and the field, is drawn once for all.
+    ///
+    /// # Errors
+    /// Where the device fails or the size is none that it draws.
+    pub fn pictures(
+        &mut self,
+        views: &[View],
+        settings: &Settings,
+    ) -> Result<Vec<Vec<Vec3>>, ShadeError> {
+        self.pictures_with(views, settings).map(|(pictures, _)| pictures)
+    }
+
+    /// As [`Renderer::pictures`], with what it took.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn pictures_with(
+        &mut self,
+        views: &[View],
+        settings: &Settings,
+    ) -> Result<(Vec<Vec<Vec3>>, Drawn), ShadeError> {
+        self.gpu.check_size(settings.size)?;
+        let samples = self.gpu.samples_at_once(settings.samples.max(1));
+        let frames = settings.samples.max(1).div_ceil(samples);
+        self.prepare(settings, samples);
+        let pixels = settings.size.as_usizevec2().element_product();
+        let mut pictures = vec![vec![Vec3::ZERO; pixels]; views.len()];
+        let weight = 1.0 / (settings.pre_exposure * frames as f32);
+        let mut drawn = Drawn { frames, samples, ..Drawn::default() };
+        for number in 0..frames {
+            // Samples of a pixel are spread over strata along both axes; frames move them within.
+            let moved = jitter(number, frames) / samples as f32;
+            let cameras: Vec<Camera> =
+                views.iter().map(|view| Camera::new(view, settings.size, moved)).collect();
+            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+            let copies = self.frame(&mut encoder, &cameras, settings, number);
+            self.gpu.queue.submit([encoder.finish()]);
+            for (picture, copy) in pictures.iter_mut().zip(copies) {
+                copy.add_to(&self.gpu, picture, weight)?;
+            }
+        }
+        if let Some(plan) = &self.drawn {
+            drawn.shadow_maps = plan.views.len();
+            drawn.shadow_resolution = plan.resolution;
+            drawn.lights_without_shadow = plan.left_out;
+        }
+        Ok((pictures, drawn))
+    }
+
+    /// Makes ready what the settings ask for.
+    fn prepare(&mut self, settings: &Settings, samples: u32) {
+        let variant = Variant {
+            samples,
+            // A pixel of one sample is shaded once either way.
+            shading: if samples > 1 { settings.shading } else { Default::default() },
+            transparency: settings.transparency,
+        };
+        if self.pipelines.as_ref().is_none_or(|p| p.variant != variant) {
+            self.pipelines = Some(Pipelines::new(&self.gpu.device, &self.layouts, variant));
+        }
+        if self.target.as_ref().is_none_or(|target| !target.fits(settings.size, samples)) {
+            self.target = Some(Target::new(&self.gpu, settings.size, samples));
+        }
+        let Some(wanted) = &self.wanted else { return };
+        let is_shown = |(shown, model): &(Arc<Snapshot>, Materials)| {
+            Arc::ptr_eq(shown, wanted) && *model == settings.materials
+        };
+        if !self.shown.as_ref().is_some_and(is_shown) {
+            self.scene.update(&self.gpu, &self.layouts.material, wanted, settings.materials);
+            self.shown = Some((wanted.clone(), settings.materials));
+            self.drawn = None;
+        }
+    }
+
+    /// Draws one frame of each camera: shadow maps, then surfaces, then what lies behind them.
+    fn frame(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        cameras: &[Camera],
+        settings: &Settings,
+        number: u32,
+    ) -> Vec<crate::target::Copied> {
+        let Some((snapshot, _)) = self.shown.clone() else { return Vec::new() };
+        let plan = self.shadow_plan(&snapshot, cameras, settings);
+        let redraws = self.drawn.as_ref() != Some(&plan);
+
+        let mut visible = Vec::new();
+        let shadow_calls: Vec<Vec<Call>> = match redraws {
+            true => plan.views.iter().map(|view| self.casters(view, &mut visible)).collect(),
+            false => Vec::new(),
+        };
+        let camera_calls: Vec<Vec<Call>> =
+            cameras.iter().map(|c| self.seen(c, settings.transparency, &mut visible)).collect();
+        let turn = GOLDEN * number as f32;
+        let shadows = if redraws { plan.views.as_slice() } else { &[] };
+        let views: Vec<layout::View> = shadows
+            .iter()
+            .map(|view| layout::View {
+                clip_from_world: view.clip_from_world,
+                ..Default::default()
+            })
+            .chain(cameras.iter().map(|camera| camera.layout(turn)))
+            .collect();
+        let pass = self.pass_group(&views, &visible);
+
+        if redraws {
+            let layers = self.lights.shadow_maps(&self.gpu, &plan);
+            for ((layer, calls), view) in layers.iter().zip(&shadow_calls).zip(0..) {
+                self.draw_shadow_map(encoder, layer, calls, &pass, view);
+            }
+            self.drawn = Some(plan.clone());
+        }
+        let frame = frame_layout(settings, self.pipelines.as_ref(), number);
+        let light = self.lights.group(&self.gpu, &snapshot, &plan, frame);
+        let mut copies = Vec::with_capacity(cameras.len());
+        for (calls, view) in camera_calls.iter().zip(shadows.len() as u32..) {
+            self.draw_picture(encoder, calls, &pass, view, &light, settings.lighting);
+            copies.extend(self.target.as_ref().map(|target| target.copy(&self.gpu, encoder)));
+        }
+        copies
+    }
+
+    fn shadow_plan(
+        &self,
+        snapshot: &Snapshot,
+        cameras: &[Camera],
+        settings: &Settings,
+    ) -> ShadowPlan {
+        let limits = self.gpu.device.limits();
+        let mut shadows = settings.shadows;
+        shadows.resolution = shadows.resolution.min(limits.max_texture_dimension_2d);
+        if !settings.lighting.direct {
+            shadows.resolution = 0;
+        }
+        let layers = limits.max_texture_array_layers;
+        ShadowPlan::new(&snapshot.lights, cameras, &self.scene.bounds, &shadows, layers)
+    }
+
+    /// What a shadow map shows.
+    fn casters(&self, view: &layout::ShadowView, visible: &mut Vec<u32>) -> Vec<Call> {
+        let frustum = Frustum::new(&view.clip_from_world);
+        self.scene.calls(&frustum, visible, |_| true)
+    }
+
+    /// What a camera shows, in the order in which it is drawn.
+    fn seen(
+        &self,
+        camera: &Camera,
+        transparency: Transparency,
+        visible: &mut Vec<u32>,
+    ) -> Vec<Call> {
+        let frustum = Frustum::new(&camera.clip_from_world);
+        match transparency {
+            Transparency::Coverage => self.scene.calls(&frustum, visible, |_| true),
+            Transparency::Sorted => {
+                let solid = |surface| surface != Surface::Blended;
+                let mut calls = self.scene.calls(&frustum, visible, solid);
+                calls.extend(self.scene.sorted_calls(&frustum, camera.eye, visible));
+                calls
+            }
+        }
+    }
+
+    /// Group 0, and the distance in bytes from one view to the next.
+    fn pass_group(&self, views: &[layout::View], visible: &[u32]) -> (wgpu::BindGroup, u32) {
+        let alignment = self.gpu.device.limits().min_uniform_buffer_offset_alignment;
+        let size = size_of::<layout::View>();
+        let stride = (size as u32).next_multiple_of(alignment);
+        let mut bytes = vec![0; stride as usize * views.len().max(1)];
+        for (slot, view) in bytes.chunks_exact_mut(stride as usize).zip(views) {
+            slot[..size].copy_from_slice(bytemuck::bytes_of(view));
+        }
+        let uniform = wgpu::BufferUsages::UNIFORM;
+        let storage = wgpu::BufferUsages::STORAGE;
+        let views = self.gpu.buffer("views", uniform, &bytes, 0);
+        let visible = self.gpu.buffer("visible", storage, bytemuck::cast_slice(visible), 4);
+        let view = wgpu::BufferBinding {
+            buffer: &views,
+            offset: 0,
+            size: std::num::NonZeroU64::new(size as u64),
+        };
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let group = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("pass"),
+            layout: &self.layouts.pass,
+            entries: &[
+                entry(0, wgpu::BindingResource::Buffer(view)),
+                entry(1, self.scene.instances.as_entire_binding()),
+                entry(2, visible.as_entire_binding()),
+            ],
+        });
+        (group, stride)
+    }
+
+    fn draw_shadow_map(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        layer: &wgpu::TextureView,
+        calls: &[Call],
+        (group, stride): &(wgpu::BindGroup, u32),
+        view: u32,
+    ) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("shadow map"),
+            depth_stencil_attachment: Some(depth_attachment(layer, wgpu::StoreOp::Store)),
+            ..Default::default()
+        });
+        let mut last = None;
+        for call in calls {
+            let (draw, material) = self.scene.draw(call);
+            if last != Some(draw.surface) {
+                pass.set_pipeline(self.layouts.depth(draw.surface));
+                pass.set_bind_group(0, group, &[view * stride]);
+                last = Some(draw.surface);
+            }
+            if draw.surface != Surface::Solid {
+                pass.set_bind_group(3, &material.group, &[]);
+            }
+            draw_call(&mut pass, &draw.part, call);
+        }
+    }
+
+    fn draw_picture(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        calls: &[Call],
+        (group, stride): &(wgpu::BindGroup, u32),
+        view: u32,
+        light: &wgpu::BindGroup,
+        lighting: Lighting,
+    ) {
+        let (Some(target), Some(pipelines)) = (&self.target, &self.pipelines) else { return };
+        let mut pass = target.pass(encoder);
+        pass.set_bind_group(0, group, &[view * stride]);
+        pass.set_bind_group(1, light, &[]);
+        // What is mixed with the background comes after it.
+        let is_mixed = |call: &Call| {
+            pipelines.variant.transparency == Transparency::Sorted
+                && self.scene.draw(call).0.surface == Surface::Blended
+        };
+        let (drawn, mixed) = calls.split_at(calls.partition_point(|call| !is_mixed(call)));
+        self.draw_surfaces(&mut pass, pipelines, drawn);
+        if lighting.emission {
+            pass.set_pipeline(&pipelines.background);
+            pass.draw(0..3, 0..1);
+        }
+        self.draw_surfaces(&mut pass, pipelines, mixed);
+    }
+
+    fn draw_surfaces(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipelines: &Pipelines,
+        calls: &[Call],
+    ) {
+        let mut last = None;
+        for call in calls {
+            let (draw, material) = self.scene.draw(call);
+            if last != Some((draw.surface, draw.material)) {
+                pass.set_pipeline(pipelines.forward(draw.surface));
+                pass.set_bind_group(2, &self.field.group, &[]);
+                pass.set_bind_group(3, &material.group, &[]);
+                last = Some((draw.surface, draw.material));
+            }
+            draw_call(pass, &draw.part, call);
+        }
+    }
+}
+
+fn draw_call(pass: &mut wgpu::RenderPass<'_>, part: &crate::geometry::Part, call: &Call) {
+    pass.set_vertex_buffer(0, part.shape.slice(..));
+    pass.set_vertex_buffer(1, part.attributes.slice(..));
+    pass.set_index_buffer(part.indices.slice(..), wgpu::IndexFormat::Uint32);
+    pass.draw_indexed(0..part.index_count, 0, call.instances.clone());
+}
+
+fn frame_layout(settings: &Settings, pipelines: Option<&Pipelines>, number: u32) -> layout::Frame {
+    let part = |is: bool, bit: u32| if is { bit } else { 0 };
+    let Lighting { emission, direct, indirect } = settings.lighting;
+    layout::Frame {
+        // Counted where the lights are.
+        light_count: 0,
+        parts: part(emission, layout::parts::EMISSION)
+            | part(direct, layout::parts::DIRECT)
+            | part(indirect, layout::parts::INDIRECT),
+        filter_samples: settings.shadows.filter_samples.max(1),
+        search_samples: settings.shadows.search_samples,
+        pre_exposure: settings.pre_exposure,
+        sample_count: pipelines.map_or(1, |p| p.variant.samples),
+        filter_radius: settings.shadows.filter_radius,
+        frame: number,
+    }
+}

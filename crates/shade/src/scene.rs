@@ -1,0 +1,228 @@
+//! A snapshot on the device: instances, and what has to be drawn for them.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::{Affine3A, Vec3};
+use lumencast_scene::{Aabb, Instance, Material, NodeId, Snapshot, Vertices};
+use lumencast_shaders::layout;
+
+use crate::camera::Frustum;
+use crate::geometry::{Geometry, Part};
+use crate::gpu::Gpu;
+use crate::materials::{GpuMaterial, Surface};
+use crate::settings::Materials;
+use crate::textures::Textures;
+
+/// A primitive with all instances that it is drawn for.
+#[derive(Debug)]
+pub(crate) struct Draw {
+    pub(crate) part: Part,
+    pub(crate) material: usize,
+    pub(crate) surface: Surface,
+    /// Indices of the instances, and the worlds' bounds of the primitive there.
+    placed: Vec<(u32, Aabb)>,
+}
+
+/// A draw call of a pass: which draw, and where its instances are listed.
+#[derive(Clone, Debug)]
+pub(crate) struct Call {
+    pub(crate) draw: usize,
+    pub(crate) instances: Range<u32>,
+}
+
+/// Vertices of a deforming instance, as long as they stay the same.
+type Deformed = (Arc<Vec<Vertices>>, Vec<Part>);
+
+/// A snapshot on the device.
+#[derive(Debug)]
+pub(crate) struct GpuScene {
+    geometry: Geometry,
+    textures: Textures,
+    deformed: HashMap<NodeId, Deformed>,
+    materials: Vec<GpuMaterial>,
+    /// Of which `materials` were made.
+    source: Option<(Arc<[Material]>, Materials)>,
+    pub(crate) instances: wgpu::Buffer,
+    draws: Vec<Draw>,
+    pub(crate) bounds: Aabb,
+}
+
+impl GpuScene {
+    pub(crate) fn new(gpu: &Gpu, anisotropy: u16) -> Self {
+        Self {
+            geometry: Geometry::default(),
+            textures: Textures::new(gpu, anisotropy),
+            deformed: HashMap::new(),
+            materials: Vec::new(),
+            source: None,
+            instances: instance_buffer(gpu, &[]),
+            draws: Vec::new(),
+            bounds: Aabb::EMPTY,
+        }
+    }
+
+    /// Takes in another moment of the scene; what has not changed stays where it is.
+    pub(crate) fn update(
+        &mut self,
+        gpu: &Gpu,
+        material_layout: &wgpu::BindGroupLayout,
+        snapshot: &Snapshot,
+        model: Materials,
+    ) {
+        self.update_materials(gpu, material_layout, &snapshot.materials, model);
+        let placed: Vec<layout::Instance> =
+            snapshot.instances.iter().zip(0..).map(|(i, number)| placed(i, number)).collect();
+        self.instances = instance_buffer(gpu, &placed);
+        self.draws.clear();
+        let mut rigid: HashMap<(usize, usize), usize> = HashMap::new();
+        let mut deformed = std::mem::take(&mut self.deformed);
+        for (instance, number) in snapshot.instances.iter().zip(0..) {
+            let own = instance.deformed.as_ref().map(|vertices| {
+                let parts = self.geometry.parts(gpu, &instance.mesh);
+                let entry = match deformed.remove(&instance.node) {
+                    Some(kept) if Arc::ptr_eq(&kept.0, vertices) => kept,
+                    _ => (vertices.clone(), deform(gpu, parts, vertices)),
+                };
+                &self.deformed.entry(instance.node).or_insert(entry).1
+            });
+            for primitive in 0..instance.mesh.primitives.len() {
+                let part = match own {
+                    Some(parts) => &parts[primitive],
+                    None => &self.geometry.parts(gpu, &instance.mesh)[primitive],
+                };
+                if part.index_count == 0 {
+                    continue;
+                }
+                let bounds = in_world(&part.bounds, &instance.world_from_object);
+                let key = (Arc::as_ptr(&instance.mesh).addr(), primitive);
+                let known = if own.is_none() { rigid.get(&key).copied() } else { None };
+                let draw = known.unwrap_or_else(|| {
+                    let material = instance.mesh.primitives[primitive].material.0 as usize;
+                    // Past the last one lies glTF's default material.
+                    let material = material.min(self.materials.len() - 1);
+                    let surface = self.materials[material].surface;
+                    let part = part.clone();
+                    self.draws.push(Draw { part, material, surface, placed: Vec::new() });
+                    self.draws.len() - 1
+                });
+                if own.is_none() {
+                    rigid.insert(key, draw);
+                }
+                self.draws[draw].placed.push((number, bounds));
+            }
+        }
+        // So that few things change from one draw call to the next.
+        self.draws.sort_by_key(|draw| (draw.surface, draw.material));
+        self.bounds = Aabb::EMPTY;
+        for (_, bounds) in self.draws.iter().flat_map(|draw| &draw.placed) {
+            self.bounds.grow(bounds.min);
+            self.bounds.grow(bounds.max);
+        }
+        self.geometry.forget_unused();
+    }
+
+    fn update_materials(
+        &mut self,
+        gpu: &Gpu,
+        layout: &wgpu::BindGroupLayout,
+        materials: &Arc<[Material]>,
+        model: Materials,
+    ) {
+        if let Some((known, of)) = &self.source
+            && Arc::ptr_eq(known, materials)
+            && *of == model
+        {
+            return;
+        }
+        let fallback = Material::default();
+        let all = materials.iter().chain(std::iter::once(&fallback));
+        self.materials =
+            all.map(|m| GpuMaterial::new(gpu, layout, &mut self.textures, m, model)).collect();
+        self.source = Some((materials.clone(), model));
+        self.textures.forget_unused();
+    }
+
+    pub(crate) fn draw(&self, call: &Call) -> (&Draw, &GpuMaterial) {
+        let draw = &self.draws[call.draw];
+        (draw, &self.materials[draw.material])
+    }
+
+    /// The calls that draw what a frustum meets; their instances are appended to `visible`.
+    pub(crate) fn calls(
+        &self,
+        frustum: &Frustum,
+        visible: &mut Vec<u32>,
+        wanted: impl Fn(Surface) -> bool,
+    ) -> Vec<Call> {
+        let mut calls = Vec::new();
+        for (index, draw) in self.draws.iter().enumerate().filter(|(_, d)| wanted(d.surface)) {
+            let first = visible.len() as u32;
+            let met = draw.placed.iter().filter(|(_, bounds)| frustum.meets(bounds));
+            visible.extend(met.map(|(instance, _)| *instance));
+            let instances = first..visible.len() as u32;
+            if !instances.is_empty() {
+                calls.push(Call { draw: index, instances });
+            }
+        }
+        calls
+    }
+
+    /// The calls that draw blended surfaces, an instance each, the farthest from `eye` first.
+    pub(crate) fn sorted_calls(
+        &self,
+        frustum: &Frustum,
+        eye: Vec3,
+        visible: &mut Vec<u32>,
+    ) -> Vec<Call> {
+        let mut met: Vec<(f32, usize, u32)> = Vec::new();
+        let blended = self.draws.iter().enumerate().filter(|(_, d)| d.surface == Surface::Blended);
+        for (index, draw) in blended {
+            for (instance, bounds) in draw.placed.iter().filter(|(_, b)| frustum.meets(b)) {
+                let middle = 0.5 * (bounds.min + bounds.max);
+                met.push((middle.distance(eye), index, *instance));
+            }
+        }
+        met.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let call = |(_, draw, instance): (f32, usize, u32)| {
+            visible.push(instance);
+            let last = visible.len() as u32;
+            Call { draw, instances: last - 1..last }
+        };
+        met.into_iter().map(call).collect()
+    }
+}
+
+fn instance_buffer(gpu: &Gpu, placed: &[layout::Instance]) -> wgpu::Buffer {
+    let least = size_of::<layout::Instance>() as u64;
+    gpu.buffer("instances", wgpu::BufferUsages::STORAGE, bytemuck::cast_slice(placed), least)
+}
+
+fn placed(instance: &Instance, number: u32) -> layout::Instance {
+    let to = &instance.world_from_object;
+    let normal = Affine3A::from_mat3(to.inverse().matrix3.transpose().into());
+    layout::Instance {
+        world_from_object: layout::rows(to),
+        normal_from_object: layout::rows(&normal),
+        mirrors: u32::from(to.matrix3.determinant() < 0.0),
+        number,
+        _pad: [0; 2],
+    }
+}
+
+fn deform(gpu: &Gpu, parts: &[Part], vertices: &[Vertices]) -> Vec<Part> {
+    parts.iter().zip(vertices).map(|(part, vertices)| part.deformed(gpu, vertices)).collect()
+}
+
+fn in_world(bounds: &Aabb, to: &Affine3A) -> Aabb {
+    let mut result = Aabb::EMPTY;
+    if bounds.is_empty() {
+        return result;
+    }
+    for i in 0..8 {
+        let side = glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0);
+        result.grow(to.transform_point3(Vec3::select(side, bounds.max, bounds.min)));
+    }
+    result
+}

@@ -1,0 +1,127 @@
+//! How a picture is drawn.
+
+use glam::UVec2;
+use lumencast_light::OffsetPolicy;
+pub use lumencast_shaders::Shading;
+
+/// Which light is drawn. Direct, indirect and emission add up to the whole picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Lighting {
+    /// Emissive surfaces, unlit ones and the environment, as the camera sees them.
+    pub emission: bool,
+    /// Light of punctual lights, scattered once.
+    pub direct: bool,
+    /// Light of the field.
+    pub indirect: bool,
+}
+
+impl Lighting {
+    /// All light.
+    pub const FIELD: Self = Self { emission: true, direct: true, indirect: true };
+    /// What a client draws by itself (`Parts::Direct` of the reference).
+    pub const DIRECT: Self = Self { indirect: false, ..Self::FIELD };
+    /// What the field brings (`Parts::Indirect` of the reference).
+    pub const INDIRECT: Self = Self { emission: false, direct: false, indirect: true };
+    /// What shines by itself.
+    pub const NONE: Self = Self { direct: false, ..Self::DIRECT };
+}
+
+/// Which materials to believe.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Materials {
+    /// As glTF describes them.
+    #[default]
+    Full,
+    /// Every surface an opaque two-sided Lambert one with its base colour, without normal maps,
+    /// emitting from its front only: for comparisons with other renderers.
+    Lambert,
+}
+
+/// How surfaces that cover in part are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Transparency {
+    /// They cover as large a part of a pixel's samples, chosen at random. Right on average in any
+    /// order, as far as there are samples: with one a pixel it is noise.
+    #[default]
+    Coverage,
+    /// They are mixed with what was drawn before, the farthest instance first: smooth, but wrong
+    /// where instances interpenetrate.
+    Sorted,
+}
+
+/// How shadows are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shadows {
+    /// Texels along the side of a shadow map; fewer where all of them would take more than
+    /// `memory`. 0 draws no shadows.
+    pub resolution: u32,
+    /// Bytes for all maps.
+    pub memory: u64,
+    /// Maps of a directional light, for nearer and farther parts of the view, 1 to 4.
+    pub cascades: u32,
+    /// Samples of a shadow's edge (percentage-closer filtering).
+    pub filter_samples: u32,
+    /// Samples of the search for what casts it, which tells how wide the edge of a light with a size
+    /// is (percentage-closer soft shadows); 0 gives every light sharp edges.
+    pub search_samples: u32,
+    /// How far edges are softened at least, texels.
+    pub filter_radius: f32,
+}
+
+impl Default for Shadows {
+    fn default() -> Self {
+        Self {
+            resolution: 2048,
+            memory: 512 << 20,
+            cascades: 4,
+            filter_samples: 16,
+            search_samples: 16,
+            filter_radius: 1.0,
+        }
+    }
+}
+
+/// How pictures are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Pixels in width and height.
+    pub size: UVec2,
+    /// Samples a pixel. As many as the adapter multisamples at once, 1, 2, 4 or 8, cost one frame;
+    /// for more, frames are averaged whose pixels lie between each other.
+    pub samples: u32,
+    /// How often surfaces are shaded.
+    pub shading: Shading,
+    /// Which light.
+    pub lighting: Lighting,
+    /// Which materials.
+    pub materials: Materials,
+    /// Shadows of punctual lights.
+    pub shadows: Shadows,
+    /// Blended surfaces.
+    pub transparency: Transparency,
+    /// Where in front of a surface the field is read.
+    pub offset: OffsetPolicy,
+    /// Multiplies all light before it is stored in half floats; pictures come back divided by it.
+    /// Best where it makes the brightest that matters about 1.
+    pub pre_exposure: f32,
+    /// Texels across a pixel that textures are averaged over where surfaces are seen at an angle; 1
+    /// for none.
+    pub anisotropy: u16,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            size: UVec2::new(1280, 720),
+            samples: 4,
+            shading: Shading::Pixels,
+            lighting: Lighting::FIELD,
+            materials: Materials::Full,
+            shadows: Shadows::default(),
+            transparency: Transparency::Coverage,
+            offset: OffsetPolicy::HalfCell,
+            pre_exposure: 1.0,
+            anisotropy: 8,
+        }
+    }
+}

@@ -1,0 +1,340 @@
+//! Where shadow maps look from.
+//!
+//! Spots have one map, or six where their cone is too wide for one; points six, the faces of a cube;
+//! directional lights a cascade of maps (Engel 2006) over parts of the view, each twice to four times
+//! as deep as the one before. A cascade's map covers the sphere around its part and moves by whole
+//! texels, so that edges stand still when the camera moves. It ends before its border by the widest
+//! edge that is filtered there (the second paper's guard band, chapter 4.2.3).
+
+use std::f32::consts::FRAC_PI_2;
+
+use glam::{Mat4, Vec3, Vec4};
+use lumencast_scene::{Aabb, LightKind, PlacedLight};
+use lumencast_shaders::layout;
+
+use crate::camera::Camera;
+use crate::settings::Shadows;
+
+/// Lights draw shadows of what is so far away, metres.
+const NEAR: f32 = 0.005;
+/// Spots whose half-angle is larger have six maps.
+const WIDEST_SPOT: f32 = 1.2;
+/// Maps have no fewer texels a side where there is not enough memory: rather no shadow.
+const LEAST_RESOLUTION: u32 = 128;
+/// Part of the depth of a view that is divided logarithmically, the rest evenly (Zhang et al. 2006).
+const LOGARITHMIC: f32 = 0.85;
+/// Texels that the filter reaches beyond its radius.
+const MARGIN: f32 = 3.0;
+/// The widest edge that is looked for in parallel light, texels.
+const WIDEST_SEARCH: f32 = 96.0;
+
+/// All shadow maps of a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct ShadowPlan {
+    /// Texels along the side of every map.
+    pub(crate) resolution: u32,
+    pub(crate) views: Vec<layout::ShadowView>,
+    /// First view and number of views of each light.
+    pub(crate) lights: Vec<(u32, u32)>,
+    /// Lights that cast no shadow, because there is no room for their maps.
+    pub(crate) left_out: usize,
+}
+
+impl ShadowPlan {
+    /// `bounds`: of everything that casts shadows.
+    pub(crate) fn new(
+        lights: &[PlacedLight],
+        cameras: &[Camera],
+        bounds: &Aabb,
+        settings: &Shadows,
+        most_layers: u32,
+    ) -> Self {
+        if settings.resolution == 0 || bounds.is_empty() {
+            return Self { lights: vec![(0, 0); lights.len()], ..Self::default() };
+        }
+        let cascades = settings.cascades.clamp(1, 4);
+        let wanted: Vec<u32> =
+            lights.iter().map(|light| maps(&light.light.kind, cascades)).collect();
+        let (resolution, chosen) = room(lights, &wanted, settings, most_layers);
+        let mut plan = Self { resolution, ..Self::default() };
+        for ((light, &count), chosen) in lights.iter().zip(&wanted).zip(chosen) {
+            let first = plan.views.len() as u32;
+            if !chosen {
+                plan.left_out += 1;
+                plan.lights.push((0, 0));
+                continue;
+            }
+            match light.light.kind {
+                LightKind::Directional { angle } => {
+                    let size = (0.5 * angle).tan();
+                    plan.directional(light.direction, size, cameras, bounds, settings, cascades);
+                }
+                LightKind::Spot { outer, radius, .. } if count == 1 => {
+                    let up = up_for(light.direction);
+                    plan.perspective(light.position, light.direction, up, outer, radius);
+                }
+                LightKind::Point { radius } | LightKind::Spot { radius, .. } => {
+                    for (forward, up) in FACES {
+                        plan.perspective(light.position, forward, up, 0.5 * FRAC_PI_2, radius);
+                    }
+                }
+            }
+            plan.lights.push((first, plan.views.len() as u32 - first));
+        }
+        plan
+    }
+
+    fn perspective(&mut self, eye: Vec3, forward: Vec3, up: Vec3, half_angle: f32, radius: f32) {
+        let tan = half_angle.tan();
+        let clip_from_view =
+            Mat4::from_cols(Vec4::X / tan, Vec4::Y / tan, Vec4::NEG_W, Vec4::Z * NEAR);
+        self.views.push(layout::ShadowView {
+            clip_from_world: clip_from_view * Mat4::look_to_rh(eye, forward, up),
+            texel: 2.0 * tan / self.resolution as f32,
+            near: NEAR,
+            reach: 1.0,
+            // Of what stands a quarter of the way from the light.
+            search: 3.0 * radius,
+            ..layout::ShadowView::default()
+        });
+    }
+
+    fn directional(
+        &mut self,
+        direction: Vec3,
+        size: f32,
+        cameras: &[Camera],
+        bounds: &Aabb,
+        settings: &Shadows,
+        cascades: u32,
+    ) {
+        let light_from_world = Mat4::look_to_rh(Vec3::ZERO, direction, up_for(direction));
+        let all = bounds_in(&light_from_world, bounds);
+        let depth_range = (all.max.z - all.min.z).max(1e-3) * 1.001;
+        let whole = 0.5 * (all.max - all.min).truncate().max_element().max(1e-3);
+        let farthest = cameras.iter().map(|c| farthest(c, bounds)).fold(1e-2, f32::max);
+        let nearest = 0.005 * farthest;
+        for cascade in 0..cascades {
+            let from = if cascade == 0 { 0.0 } else { split(nearest, farthest, cascade, cascades) };
+            let to = split(nearest, farthest, cascade + 1, cascades);
+            let (center, radius) = sphere(cameras, from, to);
+            // The map of the whole scene is the largest there has to be.
+            let (center, radius) = if radius < whole {
+                (light_from_world.transform_point3(center), radius)
+            } else {
+                (0.5 * (all.min + all.max), whole)
+            };
+            let texels = self.resolution as f32;
+            let search = (size * depth_range).min(WIDEST_SEARCH * 2.0 * radius / texels);
+            // Wider by what edges at the border reach beyond it.
+            let margin = search + (settings.filter_radius + MARGIN) * 2.0 * radius / texels;
+            let half = radius + margin;
+            let texel = 2.0 * half / texels;
+            let snapped = (center.truncate() / texel).floor() * texel;
+            // Depth 1 is nearest to the light, which looks along −z.
+            let clip_from_light = Mat4::from_cols(
+                Vec4::X / half,
+                Vec4::Y / half,
+                Vec4::Z / depth_range,
+                Vec4::new(-snapped.x / half, -snapped.y / half, 1.0 - all.max.z / depth_range, 1.0),
+            );
+            self.views.push(layout::ShadowView {
+                clip_from_world: clip_from_light * light_from_world,
+                texel,
+                depth_range,
+                reach: if cascade + 1 == cascades { 1.0 } else { 1.0 - margin / half },
+                search,
+                ..layout::ShadowView::default()
+            });
+        }
+    }
+}
+
+/// Directions and ups of a cube's faces, in the order in which the shader numbers them.
+const FACES: [(Vec3, Vec3); 6] = [
+    (Vec3::X, Vec3::Y),
+    (Vec3::NEG_X, Vec3::Y),
+    (Vec3::Y, Vec3::Z),
+    (Vec3::NEG_Y, Vec3::Z),
+    (Vec3::Z, Vec3::Y),
+    (Vec3::NEG_Z, Vec3::Y),
+];
+
+/// How many maps a light wants.
+fn maps(kind: &LightKind, cascades: u32) -> u32 {
+    match kind {
+        LightKind::Directional { .. } => cascades,
+        LightKind::Spot { outer, .. } if *outer <= WIDEST_SPOT => 1,
+        LightKind::Spot { .. } | LightKind::Point { .. } => 6,
+    }
+}
+
+/// How large all maps can be, and which lights get some: the most intense first.
+fn room(
+    lights: &[PlacedLight],
+    wanted: &[u32],
+    settings: &Shadows,
+    most_layers: u32,
+) -> (u32, Vec<bool>) {
+    let layers_of = |resolution: u32| {
+        let layer = 4 * u64::from(resolution) * u64::from(resolution);
+        ((settings.memory / layer).min(u64::from(most_layers))) as u32
+    };
+    let total: u32 = wanted.iter().sum();
+    let mut resolution = settings.resolution;
+    while layers_of(resolution) < total.min(most_layers) && resolution / 2 >= LEAST_RESOLUTION {
+        resolution /= 2;
+    }
+    let mut left = layers_of(resolution);
+    let power = |light: &PlacedLight| (light.light.color * light.light.intensity).max_element();
+    let mut order: Vec<usize> = (0..lights.len()).collect();
+    order.sort_by(|&a, &b| power(&lights[b]).total_cmp(&power(&lights[a])));
+    let mut chosen = vec![false; lights.len()];
+    for i in order {
+        if wanted[i] <= left {
+            chosen[i] = true;
+            left -= wanted[i];
+        }
+    }
+    (resolution, chosen)
+}
+
+/// Any direction that is not the given one.
+fn up_for(direction: Vec3) -> Vec3 {
+    if direction.y.abs() > 0.99 { Vec3::Z } else { Vec3::Y }
+}
+
+fn corners(bounds: &Aabb) -> impl Iterator<Item = Vec3> + '_ {
+    (0..8).map(|i| {
+        let side = |bit: u32| i & bit != 0;
+        Vec3::select(glam::BVec3::new(side(1), side(2), side(4)), bounds.max, bounds.min)
+    })
+}
+
+fn bounds_in(to: &Mat4, bounds: &Aabb) -> Aabb {
+    let mut result = Aabb::EMPTY;
+    corners(bounds).for_each(|corner| result.grow(to.transform_point3(corner)));
+    result
+}
+
+/// How far along its axis a camera sees anything.
+fn farthest(camera: &Camera, bounds: &Aabb) -> f32 {
+    corners(bounds).map(|c| (c - camera.eye).dot(camera.forward)).fold(0.0, f32::max)
+}
+
+/// Where part `i` of `n` of the view begins, metres.
+fn split(nearest: f32, farthest: f32, i: u32, n: u32) -> f32 {
+    let t = i as f32 / n as f32;
+    let even = nearest + (farthest - nearest) * t;
+    let logarithmic = nearest * (farthest / nearest).powf(t);
+    even + (logarithmic - even) * LOGARITHMIC
+}
+
+/// A sphere around what cameras see between two distances.
+fn sphere(cameras: &[Camera], from: f32, to: f32) -> (Vec3, f32) {
+    let points: Vec<Vec3> = cameras.iter().flat_map(|c| c.slice(from, to)).collect();
+    let center = points.iter().sum::<Vec3>() / points.len().max(1) as f32;
+    let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f32::max);
+    // Rounded, so that it stays the same while the camera turns.
+    (center, (radius * 16.0).ceil() / 16.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{UVec2, Vec2};
+    use lumencast_scene::{Light, NodeId, View};
+
+    fn placed(kind: LightKind, intensity: f32) -> PlacedLight {
+        PlacedLight {
+            node: NodeId(0),
+            light: Light { kind, color: Vec3::ONE, intensity, range: None },
+            position: Vec3::new(0.0, 3.0, 0.0),
+            direction: Vec3::new(0.3, -1.0, 0.2).normalize(),
+        }
+    }
+
+    const BOUNDS: Aabb = Aabb { min: Vec3::splat(-10.0), max: Vec3::splat(10.0) };
+
+    fn plan(lights: &[PlacedLight], settings: &Shadows) -> ShadowPlan {
+        let view = View::look_at(Vec3::new(0.0, 1.0, 8.0), Vec3::ZERO, 0.9).unwrap();
+        let camera = Camera::new(&view, UVec2::new(160, 90), Vec2::ZERO);
+        ShadowPlan::new(lights, &[camera], &BOUNDS, settings, 256)
+    }
+
+    fn in_clip(view: &layout::ShadowView, point: Vec3) -> Vec3 {
+        let clip = view.clip_from_world * point.extend(1.0);
+        clip.truncate() / clip.w
+    }
+
+    #[test]
+    fn cascades_see_what_the_camera_sees() {
+        let angle = 0.01;
+        let plan = plan(&[placed(LightKind::Directional { angle }, 1.0)], &Shadows::default());
+        assert_eq!(plan.lights, [(0, 4)]);
+        let view = View::look_at(Vec3::new(0.0, 1.0, 8.0), Vec3::ZERO, 0.9).unwrap();
+        let camera = Camera::new(&view, UVec2::new(160, 90), Vec2::ZERO);
+        let mut used = [false; 4];
+        for distance in [0.05, 0.5, 2.0, 5.0, 9.0, 17.0] {
+            for corner in &camera.slice(distance, distance)[..4] {
+                let point = corner.clamp(BOUNDS.min, BOUNDS.max);
+                let seen = |view: &layout::ShadowView| {
+                    in_clip(view, point).truncate().abs().max_element() < view.reach
+                };
+                let first = plan.views.iter().position(seen);
+                let Some(first) = first else { panic!("{point} at {distance}") };
+                used[first] = true;
+                let depth = in_clip(&plan.views[first], point).z;
+                assert!((0.0..=1.0).contains(&depth), "{depth}");
+                // Metres towards the light, by which depth grows.
+                let nearer = point - 0.5 * placed(LightKind::Point { radius: 0.0 }, 1.0).direction;
+                let gain = in_clip(&plan.views[first], nearer).z - depth;
+                assert!((gain * plan.views[first].depth_range - 0.5).abs() < 1e-3, "{gain}");
+            }
+        }
+        assert!(used.iter().filter(|used| **used).count() >= 3, "{used:?}");
+        assert!(plan.views.windows(2).all(|pair| pair[0].texel <= pair[1].texel));
+    }
+
+    #[test]
+    fn faces_are_those_that_the_shader_chooses() {
+        let plan = plan(&[placed(LightKind::Point { radius: 0.1 }, 1.0)], &Shadows::default());
+        assert_eq!(plan.lights, [(0, 6)]);
+        for d in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
+            let face = FACES.iter().position(|(forward, _)| *forward == d).unwrap();
+            let point = Vec3::new(0.0, 3.0, 0.0) + 2.0 * d + 0.4 * d.any_orthonormal_vector();
+            let at = in_clip(&plan.views[face], point);
+            assert!(at.truncate().abs().max_element() < 0.5, "{d}: {at}");
+            // Depth is near over distance.
+            assert!((at.z - NEAR / 2.0).abs() < 1e-5, "{at}");
+        }
+    }
+
+    #[test]
+    fn memory_is_kept_to() {
+        let spot = LightKind::Spot { inner: 0.1, outer: 0.6, radius: 0.0 };
+        let many: Vec<_> = (0..500).map(|i| placed(spot, i as f32)).collect();
+        let settings = Shadows { memory: 64 << 20, ..Shadows::default() };
+        let plan = plan(&many, &settings);
+        let bytes = 4 * u64::from(plan.resolution).pow(2) * plan.views.len() as u64;
+        assert!(bytes <= settings.memory && plan.resolution >= LEAST_RESOLUTION, "{bytes}");
+        assert_eq!(plan.left_out, 500 - plan.views.len());
+        assert_eq!(plan.lights[499].1, 1, "the most intense has one");
+        assert_eq!(plan.lights[0].1, 0);
+        let none = super::ShadowPlan::new(
+            &many,
+            &[],
+            &BOUNDS,
+            &Shadows { resolution: 0, ..settings },
+            256,
+        );
+        assert!(none.views.is_empty() && none.lights.len() == 500);
+    }
+
+    #[test]
+    fn wide_spots_have_a_cube() {
+        let spot = |outer| placed(LightKind::Spot { inner: 0.0, outer, radius: 0.0 }, 1.0);
+        let plan = plan(&[spot(0.5), spot(1.5)], &Shadows::default());
+        assert_eq!(plan.lights, [(0, 1), (1, 6)]);
+    }
+}

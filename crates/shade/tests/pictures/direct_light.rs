@@ -1,0 +1,225 @@
+//! Direct light beside the path tracer's direct part. Shadows' edges are counted apart: pixels that
+//! differ by more than a tolerance may be as many as edges take.
+
+use std::sync::Arc;
+
+use crate::common::{SIZE, difference, drawn, traced};
+use glam::{Affine3A, Vec3, Vec4};
+use lumencast_gather::reference::Parts;
+use lumencast_scene::{
+    AlphaMode, Environment, Light, LightKind, Material, Projection, Scene, Snapshot, View,
+};
+use lumencast_shade::{Lighting, Materials, Settings, Shading, Shadows};
+use lumencast_testkit::scenes::{Stage, lambert};
+
+fn settings() -> Settings {
+    Settings {
+        size: SIZE,
+        samples: 16,
+        shading: Shading::Samples,
+        lighting: Lighting::DIRECT,
+        ..Settings::default()
+    }
+}
+
+fn light(kind: LightKind, intensity: f32) -> Light {
+    Light { kind, color: Vec3::new(1.0, 0.9, 0.7), intensity, range: None }
+}
+
+const POINT: LightKind = LightKind::Point { radius: 0.0 };
+
+/// Floor, back wall, and what stands on the floor.
+fn stage(own: impl FnOnce(&mut Stage)) -> Arc<Snapshot> {
+    let mut stage = Stage::default();
+    let white = stage.material(lambert(Vec3::new(0.8, 0.7, 0.6), Vec3::ZERO));
+    stage.quad(Vec3::new(-4.0, 0.0, 4.0), Vec3::X * 8.0, Vec3::NEG_Z * 8.0, white);
+    stage.quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::X * 8.0, Vec3::Y * 8.0, white);
+    own(&mut stage);
+    stage.snapshot()
+}
+
+fn ball(stage: &mut Stage, material: Material) {
+    let material = stage.material(material);
+    stage.sphere(Vec3::new(0.0, 1.0, 0.0), 1.0, 48, material);
+}
+
+fn view() -> View {
+    View::look_at(Vec3::new(1.0, 2.2, 5.0), Vec3::new(0.0, 0.9, 0.0), 0.8).unwrap()
+}
+
+/// Every kind of material under every kind of light: where no edge of a shadow is near, the rest is
+/// the sampling of the path tracer, of which a point light has none but at the pixels' borders.
+#[test]
+fn every_light_on_every_material() {
+    let metal = Material { metallic: 1.0, roughness: 0.4, ..Material::default() };
+    let plastic = Material {
+        base_color: Vec4::new(0.2, 0.5, 0.7, 1.0),
+        metallic: 0.0,
+        roughness: 0.3,
+        ..Material::default()
+    };
+    let sheer = Material { transmission: 0.8, double_sided: true, ..plastic.clone() };
+    let lights = [
+        ("point", POINT, 60.0, Vec3::new(1.5, 4.0, 3.0)),
+        (
+            "spot",
+            LightKind::Spot { inner: 0.2, outer: 0.6, radius: 0.0 },
+            80.0,
+            Vec3::new(1.5, 4.0, 3.0),
+        ),
+        ("sun", LightKind::Directional { angle: 0.0 }, 4.0, Vec3::ZERO),
+    ];
+    for (material_name, material) in [
+        ("Lambert", lambert(Vec3::splat(0.7), Vec3::ZERO)),
+        ("metal", metal),
+        ("plastic", plastic),
+        ("sheer", sheer),
+    ] {
+        for (light_name, kind, intensity, position) in lights {
+            let scene = stage(|stage| {
+                ball(stage, material.clone());
+                stage.light(light(kind, intensity), position, Vec3::new(-0.3, -0.8, -0.55));
+            });
+            let reference = traced(&scene, view(), &settings(), Parts::Direct, 64);
+            let picture = drawn(&scene, view(), &settings());
+            let name = format!("{light_name} on {material_name}");
+            let found = difference(&name, &picture, &reference, 0.04);
+            assert!(found.off < 0.015 && found.rms < 0.012, "{name}: {found:?}");
+        }
+    }
+}
+
+/// The comparison above notices light that is a tenth too bright, and shadows that are missing.
+#[test]
+fn planted_faults_are_noticed() {
+    let scene = |intensity: f32| {
+        stage(|stage| {
+            ball(stage, lambert(Vec3::splat(0.7), Vec3::ZERO));
+            stage.light(light(POINT, intensity), Vec3::new(1.5, 4.0, 3.0), Vec3::Y);
+        })
+    };
+    let reference = traced(&scene(60.0), view(), &settings(), Parts::Direct, 64);
+    let brighter = drawn(&scene(66.0), view(), &settings());
+    assert!(difference("brighter", &brighter, &reference, 0.04).off > 0.2);
+    let shadows = Shadows { resolution: 0, ..Shadows::default() };
+    let unshadowed = drawn(&scene(60.0), view(), &Settings { shadows, ..settings() });
+    assert!(difference("unshadowed", &unshadowed, &reference, 0.04).off > 0.025);
+}
+
+/// Lights with a size: their edges are as wide as the tracer's, on average.
+#[test]
+fn sized_lights_have_soft_edges() {
+    for (name, kind, intensity) in [
+        ("sphere", LightKind::Point { radius: 0.4 }, 60.0),
+        ("sun", LightKind::Directional { angle: 0.12 }, 4.0),
+    ] {
+        let scene = stage(|stage| {
+            let white = stage.material(lambert(Vec3::splat(0.7), Vec3::ZERO));
+            stage.sphere(Vec3::new(0.0, 0.5, 0.0), 0.5, 32, white);
+            // Something that is far from its shadow.
+            stage.sphere(Vec3::new(-0.3, 1.8, 0.6), 0.4, 32, white);
+            stage.light(
+                light(kind, intensity),
+                Vec3::new(1.5, 4.0, 3.0),
+                Vec3::new(-0.3, -0.8, -0.55),
+            );
+        });
+        let reference = traced(&scene, view(), &settings(), Parts::Direct, 256);
+        let soft = drawn(&scene, view(), &settings());
+        let soft = difference(&format!("soft {name}"), &soft, &reference, 0.1).rms;
+        let shadows = Shadows { search_samples: 0, ..Shadows::default() };
+        let sharp = drawn(&scene, view(), &Settings { shadows, ..settings() });
+        let sharp = difference(&format!("sharp {name}"), &sharp, &reference, 0.1).rms;
+        assert!(soft < 0.01 && soft < 0.7 * sharp, "{name}: {soft} soft, {sharp} sharp");
+    }
+}
+
+/// Masked and blended surfaces cast the shadows that the tracer gives them.
+#[test]
+fn coverage_matches_the_tracers() {
+    for (name, alpha_mode, alpha) in
+        [("mask", AlphaMode::Mask(0.5), 0.4), ("blend", AlphaMode::Blend, 0.4)]
+    {
+        let scene = stage(|stage| {
+            let material = lambert(Vec3::splat(0.7), Vec3::ZERO);
+            let base_color = material.base_color.truncate().extend(alpha);
+            ball(stage, Material { base_color, alpha_mode, double_sided: true, ..material });
+            stage.light(light(POINT, 60.0), Vec3::new(1.5, 4.0, 3.0), Vec3::Y);
+        });
+        let settings = Settings { samples: 64, ..settings() };
+        let reference = traced(&scene, view(), &settings, Parts::Direct, 256);
+        let found = difference(name, &drawn(&scene, view(), &settings), &reference, 0.1);
+        assert!(found.rms < 0.03, "{name}: {found:?}");
+    }
+}
+
+/// The built-in Cornell box, textures and all of glTF's doing, through both kinds of cameras.
+#[test]
+fn cornell() {
+    let mut scene = Scene::open("cornell").unwrap();
+    let perspective = scene.cameras()[0].view();
+    let projection =
+        Projection::Orthographic { half_width: 1.2, half_height: 1.2, near: 0.0, far: 20.0 };
+    for view in [perspective, View { projection, ..perspective }] {
+        for materials in [Materials::Full, Materials::Lambert] {
+            let settings = Settings { materials, ..settings() };
+            let snapshot = scene.snapshot();
+            let reference = traced(&snapshot, view, &settings, Parts::Direct, 64);
+            let name = format!("cornell {} {materials:?}", projection_name(&view));
+            let picture = drawn(&snapshot, view, &settings);
+            let found = difference(&name, &picture, &reference, 0.04);
+            assert!(found.off < 0.03, "{name}: {found:?}");
+        }
+    }
+}
+
+fn projection_name(view: &View) -> &'static str {
+    match view.projection {
+        Projection::Perspective { .. } => "perspective",
+        Projection::Orthographic { .. } => "orthographic",
+    }
+}
+
+/// Environments as the camera sees them, and single-sided surfaces from behind, which are black.
+#[test]
+fn background_and_backs() {
+    let mut stage = Stage::default();
+    let glowing = stage.material(lambert(Vec3::splat(0.5), Vec3::splat(3.0)));
+    stage.quad(Vec3::new(-1.0, 0.0, 0.0), Vec3::X, Vec3::Y, glowing);
+    stage.quad(Vec3::new(1.0, 0.0, 0.0), Vec3::NEG_X, Vec3::Y, glowing);
+    stage.environment(Environment::Sky {
+        zenith: Vec3::new(0.2, 0.4, 1.0),
+        horizon: Vec3::splat(1.0),
+        ground: Vec3::new(0.3, 0.2, 0.1),
+    });
+    let scene = stage.snapshot();
+    let view = View::look_at(Vec3::new(0.0, 0.5, 3.0), Vec3::Y * 0.5, 1.2).unwrap();
+    let settings = settings();
+    let reference = traced(&scene, view, &settings, Parts::Direct, 64);
+    let picture = drawn(&scene, view, &settings);
+    let found = difference("background", &picture, &reference, 0.02);
+    assert!(found.rms < 0.02 && found.off < 0.02, "{found:?}");
+    let at = |x: u32| picture[(SIZE.y / 2 * SIZE.x + x) as usize];
+    assert!((at(40) - 3.0).abs().max_element() < 0.02, "the front shines: {}", at(40));
+    assert_eq!(at(56), Vec3::ZERO, "the back is black");
+}
+
+/// An instance whose transform mirrors shows its front all the same.
+#[test]
+fn mirrored_instances() {
+    let mut stage = Stage::default();
+    let white = stage.material(lambert(Vec3::splat(0.8), Vec3::ZERO));
+    stage.sphere(Vec3::ZERO, 1.0, 32, white);
+    let ball = stage.snapshot().instances[0].clone();
+    let mirror = Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+    let mut mirrored = Stage::default();
+    mirrored.material(lambert(Vec3::splat(0.8), Vec3::ZERO));
+    mirrored.instance(ball.mesh_id, ball.mesh, mirror);
+    mirrored.light(light(POINT, 60.0), Vec3::new(1.5, 4.0, 3.0), Vec3::Y);
+    let scene = mirrored.snapshot();
+    let view = View::look_at(Vec3::new(0.0, 1.0, 4.0), Vec3::ZERO, 0.8).unwrap();
+    let reference = traced(&scene, view, &settings(), Parts::Direct, 64);
+    assert!(reference.iter().any(|p| p.x > 0.5));
+    let found = difference("mirrored", &drawn(&scene, view, &settings()), &reference, 0.04);
+    assert!(found.off < 0.03, "{found:?}");
+}

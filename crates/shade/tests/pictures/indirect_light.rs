@@ -1,0 +1,220 @@
+//! Light of the field: where it is read and what it becomes, beside `light`'s own reading on the
+//! processor and beside numerical integration.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use crate::common::{SIZE, drawn, renderer};
+use glam::{DVec3, Quat, UVec3, Vec3};
+use lumencast_light::{
+    Grid, LightField, OffsetPolicy, Order, ProbeVolume, Sh, VolumeId, sh::basis,
+};
+use lumencast_scene::{Material, Snapshot, View};
+use lumencast_shade::{Lighting, Settings};
+use lumencast_testkit::scenes::{Stage, lambert};
+
+fn settings() -> Settings {
+    Settings { size: SIZE, samples: 1, lighting: Lighting::INDIRECT, ..Settings::default() }
+}
+
+/// A floor of a material at y = 0, 6 m wide.
+fn floor(material: Material) -> Arc<Snapshot> {
+    let mut stage = Stage::default();
+    let material = stage.material(material);
+    stage.quad(Vec3::new(-3.0, 0.0, 3.0), Vec3::X * 6.0, Vec3::NEG_Z * 6.0, material);
+    stage.snapshot()
+}
+
+/// Smooth light that differs from probe to probe and from coefficient to coefficient.
+fn volume(id: u32, center: Vec3, turn: f32, cells: UVec3, order: Order) -> ProbeVolume {
+    let grid = Grid {
+        center,
+        rotation: Quat::from_rotation_y(turn),
+        size: Vec3::new(5.0, 2.0, 4.0),
+        resolution: cells,
+    };
+    let mut volume = ProbeVolume::dark(VolumeId(id), grid, order);
+    for probe in 0..grid.probe_count() {
+        let at = grid.position(grid.cell(probe));
+        for (i, c) in volume.probe_mut(probe).iter_mut().enumerate() {
+            let i = i as f32;
+            let wave = |k: f32| (k + 0.7 * i + at.x + 0.5 * at.z + at.y).sin();
+            let share = if i == 0.0 { 9.0 } else { 0.0 };
+            *c = 1000.0 * (share + 2.0 * Vec3::new(wave(0.0), wave(1.0), wave(2.0)));
+        }
+    }
+    volume
+}
+
+/// What every pixel of the floor should show, read from the field on the processor; the largest
+/// difference from what the adapter draws, relative to the largest light.
+fn worst(drawn_light: &LightField, light: &LightField, offset: OffsetPolicy) -> f32 {
+    let albedo = Vec3::new(0.9, 0.6, 0.3);
+    let scene = floor(lambert(albedo, Vec3::ZERO));
+    let view = View::look_at(Vec3::new(1.0, 2.5, 3.0), Vec3::ZERO, 0.9).unwrap();
+    let settings = Settings { offset, pre_exposure: 1e-3, ..settings() };
+    let mut renderer = renderer(&scene, &settings);
+    renderer.set_light(drawn_light, offset).unwrap();
+    let picture = renderer.pictures(&[view], &settings).unwrap().remove(0);
+
+    let (mut worst, mut largest) = (0.0f32, 0.0f32);
+    for (i, pixel) in (0..).zip(&picture) {
+        let at = (glam::UVec2::new(i % SIZE.x, i / SIZE.x).as_vec2() + 0.5) / SIZE.as_vec2();
+        let (origin, direction) = view.ray(at, SIZE.x as f32 / SIZE.y as f32);
+        let point = origin - direction * (origin.y / direction.y);
+        // Pixels that the floor's edge goes through belong to either side.
+        if direction.y >= 0.0 || point.abs().max_element() > 2.95 {
+            continue;
+        }
+        let irradiance = light.irradiance(point, Vec3::Y, offset).max(Vec3::ZERO);
+        let expected = albedo / std::f32::consts::PI * irradiance;
+        largest = largest.max(expected.max_element());
+        worst = worst.max((*pixel - expected).abs().max_element());
+    }
+    assert!(largest > 0.0, "the floor is seen");
+    worst / largest
+}
+
+#[test]
+fn read_as_on_the_processor() {
+    const ORDERS: [Order; 4] = [Order::L1, Order::L2, Order::L3, Order::L4];
+    for order in ORDERS {
+        let light =
+            LightField::new(vec![volume(0, Vec3::Y * 0.5, 0.4, UVec3::new(5, 3, 4), order)]);
+        for offset in [OffsetPolicy::None, OffsetPolicy::HalfCell, OffsetPolicy::Metres(0.3)] {
+            let worst = worst(&light, &light, offset);
+            assert!(worst < 5e-3, "{order:?} {offset:?}: {worst}");
+        }
+    }
+}
+
+#[test]
+fn volumes_of_many_kinds_meet() {
+    let light = LightField::new(vec![
+        volume(0, Vec3::new(0.0, 0.5, 0.0), 0.0, UVec3::new(3, 2, 3), Order::L1),
+        volume(1, Vec3::new(1.5, 0.2, 0.5), 0.7, UVec3::new(8, 4, 7), Order::L3),
+        volume(2, Vec3::new(-2.0, 0.4, -1.0), -0.3, UVec3::new(9, 3, 9), Order::L2),
+    ]);
+    let offset = OffsetPolicy::HalfCell;
+    let all = worst(&light, &light, offset);
+    assert!(all < 5e-3, "{all}");
+    // What was read is really that of these volumes.
+    let fewer = LightField::new(light.volumes()[..2].to_vec());
+    assert!(worst(&fewer, &light, offset) > 0.05, "a volume that is missing is noticed");
+    let mut other = light.clone();
+    other.volumes_mut()[1].coefficients.iter_mut().for_each(|c| *c *= 1.1);
+    assert!(worst(&other, &light, offset) > 0.01, "a tenth more light is noticed");
+}
+
+/// A field of one probe, which is the same everywhere.
+fn uniform(sh: &Sh) -> LightField {
+    let grid = Grid {
+        center: Vec3::ZERO,
+        rotation: Quat::IDENTITY,
+        size: Vec3::splat(10.0),
+        resolution: UVec3::ONE,
+    };
+    let mut volume = ProbeVolume::dark(VolumeId(0), grid, sh.order);
+    volume.probe_mut(0).copy_from_slice(sh.values());
+    LightField::new(vec![volume])
+}
+
+/// ∫ f(v, l) L(l) (n·l) dω for a metal of F0 = 1 seen from straight above, by quadrature over l.
+fn reflected_by_metal(sh: &Sh, roughness: f64) -> f64 {
+    const STEPS: usize = 400;
+    let alpha2 = roughness.powi(4);
+    let mut sum = 0.0;
+    for i in 0..STEPS {
+        // Denser near the mirror's direction: cos θ_h = 1 − (1 − cos 45°) t³.
+        let t = (i as f64 + 0.5) / STEPS as f64;
+        let range = 1.0 - 0.5f64.sqrt();
+        let cos_h = 1.0 - range * t.powi(3);
+        let weight = 3.0 * range * t * t / STEPS as f64;
+        let n_l = 2.0 * cos_h * cos_h - 1.0;
+        if n_l <= 0.0 {
+            continue;
+        }
+        let d = alpha2 / (PI * (cos_h * cos_h * (alpha2 - 1.0) + 1.0).powi(2));
+        let lambda = 0.5 * ((1.0 + alpha2 * (1.0 - n_l * n_l) / (n_l * n_l)).sqrt() - 1.0);
+        // D G / (4 n·v n·l) n·l dω_l, and dω_l = 4 v·h dω_h.
+        let density = d / (1.0 + lambda) * cos_h * weight;
+        let sin_l = (1.0 - n_l * n_l).sqrt();
+        let mut around = 0.0;
+        for k in 0..16 {
+            let phi = TAU * (k as f64 + 0.5) / 16.0;
+            let l = DVec3::new(sin_l * phi.cos(), n_l, sin_l * phi.sin()).as_vec3();
+            around += f64::from(sh.radiance(l).x) / 16.0;
+        }
+        sum += TAU * density * around;
+    }
+    sum
+}
+
+/// Seen from straight above, where the split sum and the fitted lobe leave out nothing, the error is
+/// that of taking the two factors' integrals apart.
+#[test]
+fn specular_light_is_the_integral() {
+    let order = Order::L2;
+    // A bright sky with a brighter side: what a lobe sees depends on how wide it is.
+    let toward = Vec3::new(0.3, 0.9, 0.2).normalize();
+    let mut sh = Sh::dark(order);
+    for (c, b) in sh.values_mut().iter_mut().zip(basis(order, toward)) {
+        *c = Vec3::splat(b);
+    }
+    sh.coefficients[0] += 1.5;
+    let view = View::look_at(Vec3::new(0.0, 6.0, 0.0), Vec3::ZERO, 0.05).unwrap();
+    let light = uniform(&sh);
+    let mut errors = Vec::new();
+    for roughness in [0.1_f32, 0.3, 0.5, 0.7, 0.85, 1.0] {
+        let scene = floor(Material { metallic: 1.0, roughness, ..Material::default() });
+        let mut renderer = renderer(&scene, &settings());
+        renderer.set_light(&light, OffsetPolicy::None).unwrap();
+        let picture = renderer.pictures(&[view], &settings()).unwrap().remove(0);
+        let middle = picture[(SIZE.y / 2 * SIZE.x + SIZE.x / 2) as usize].x;
+        let expected = reflected_by_metal(&sh, roughness.into()) as f32;
+        errors.push(middle / expected - 1.0);
+    }
+    // The fit leaves out shadowing, which takes from wide lobes what arrives at grazing angles.
+    let largest = [0.005, 0.02, 0.05, 0.07, 0.07, 0.07];
+    let within = |(error, largest): (&f32, f32)| error.abs() < largest;
+    assert!(errors.iter().zip(largest).all(within), "{errors:?}");
+}
+
+/// In uniform light a white surface that absorbs nothing vanishes; rough metals lose what single
+/// scattering loses, which the tracer's tests state.
+#[test]
+fn furnace() {
+    let mut sh = Sh::dark(Order::L2);
+    sh.coefficients[0] = Vec3::splat(1.0 / 0.282_094_8);
+    let light = uniform(&sh);
+    let view = View::look_at(Vec3::new(1.0, 2.5, 3.0), Vec3::ZERO, 0.9).unwrap();
+    let smooth = Material { metallic: 0.0, roughness: 0.05, ..Material::default() };
+    let rough = Material { roughness: 0.6, ..smooth.clone() };
+    for (name, material, least) in [
+        ("Lambert", lambert(Vec3::ONE, Vec3::ZERO), 0.998),
+        ("smooth plastic", smooth, 0.99),
+        ("rough plastic", rough, 0.96),
+    ] {
+        let scene = floor(material);
+        let mut renderer = renderer(&scene, &settings());
+        renderer.set_light(&light, OffsetPolicy::None).unwrap();
+        let picture = renderer.pictures(&[view], &settings()).unwrap().remove(0);
+        let middle = picture[(SIZE.y / 2 * SIZE.x + SIZE.x / 2) as usize].x;
+        assert!((least..1.003).contains(&middle), "{name}: {middle}");
+    }
+}
+
+/// Without a field there is no indirect light, and light that truncated expansions make negative is
+/// none.
+#[test]
+fn no_light() {
+    let view = View::look_at(Vec3::new(1.0, 2.5, 3.0), Vec3::ZERO, 0.9).unwrap();
+    let scene = floor(lambert(Vec3::ONE, Vec3::ZERO));
+    assert!(drawn(&scene, view, &settings()).iter().all(|p| *p == Vec3::ZERO));
+    let mut sh = Sh::dark(Order::L2);
+    sh.coefficients[0] = Vec3::splat(-3.0);
+    let mut renderer = renderer(&scene, &settings());
+    renderer.set_light(&uniform(&sh), OffsetPolicy::None).unwrap();
+    let picture = renderer.pictures(&[view], &settings()).unwrap().remove(0);
+    assert!(picture.iter().all(|p| *p == Vec3::ZERO));
+}

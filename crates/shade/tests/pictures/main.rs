@@ -1,0 +1,7 @@
+//! Pictures that an adapter draws: on a machine without a GPU in software, which is part of what is
+//! tested.
+
+mod bad_input;
+mod common;
+mod direct_light;
+mod indirect_light;

@@ -1,0 +1,175 @@
+//! Structs as the shaders have them in memory: names, order and offsets are those of their namesakes
+//! in WGSL (`crates/shaders/wgsl`), where the fields are explained. A test compares them.
+
+#![expect(missing_docs, reason = "fields are explained where the shaders declare them")]
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Affine3A, Mat4, Vec3, Vec4};
+
+/// A row-major affine transform.
+pub type Rows = [Vec4; 3];
+
+/// The rows of a transform.
+pub fn rows(transform: &Affine3A) -> Rows {
+    let linear = transform.matrix3.transpose();
+    let t = transform.translation;
+    [linear.x_axis.extend(t.x), linear.y_axis.extend(t.y), linear.z_axis.extend(t.z)]
+}
+
+/// From where a pass looks. Group 0, binding 0, by dynamic offset.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct View {
+    pub clip_from_world: Mat4,
+    pub world_from_clip: Mat4,
+    pub eye: Vec3,
+    pub perspective: f32,
+    pub forward: Vec3,
+    pub turn: f32,
+}
+
+/// A placed mesh. Group 0, binding 1.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Instance {
+    pub world_from_object: Rows,
+    pub normal_from_object: Rows,
+    pub mirrors: u32,
+    pub number: u32,
+    pub _pad: [u32; 2],
+}
+
+/// What holds for all of a frame's passes. Group 1, binding 0.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Frame {
+    pub light_count: u32,
+    pub parts: u32,
+    pub filter_samples: u32,
+    pub search_samples: u32,
+    pub pre_exposure: f32,
+    pub sample_count: u32,
+    pub filter_radius: f32,
+    pub frame: u32,
+}
+
+/// Light from afar. Group 1, binding 1.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Environment {
+    pub zenith: Vec3,
+    pub kind: u32,
+    pub ground: Vec3,
+    pub turn: f32,
+    pub horizon: Vec3,
+    pub _pad: u32,
+}
+
+/// A punctual light. Group 1, binding 3.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Light {
+    pub position: Vec3,
+    pub kind: u32,
+    pub direction: Vec3,
+    pub size: f32,
+    pub intensity: Vec3,
+    pub window: f32,
+    pub cone_scale: f32,
+    pub cone_offset: f32,
+    pub first_shadow: u32,
+    pub shadow_count: u32,
+}
+
+/// A layer of the shadow maps. Group 1, binding 4.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ShadowView {
+    pub clip_from_world: Mat4,
+    pub texel: f32,
+    pub near: f32,
+    pub depth_range: f32,
+    pub reach: f32,
+    pub search: f32,
+    pub _pad0: f32,
+    pub _pad1: f32,
+    pub _pad2: f32,
+}
+
+/// How many volumes there are, and where they are read. Group 2, binding 0.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Field {
+    pub count: u32,
+    pub offset_policy: u32,
+    pub offset_metres: f32,
+    pub _pad: u32,
+}
+
+/// A probe volume in the atlas. Group 2, binding 1.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Volume {
+    pub cell_from_world: Rows,
+    pub spacing: Vec3,
+    pub scale: f32,
+    pub resolution: Vec3,
+    pub texels: u32,
+    pub origin: Vec3,
+    pub _pad: f32,
+}
+
+/// How a texture is looked up.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Map {
+    pub row0: Vec4,
+    pub row1: Vec4,
+}
+
+/// A material. Group 3, binding 0.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Material {
+    pub base_color: Vec4,
+    pub emissive: Vec3,
+    pub metallic: f32,
+    pub specular_color: Vec3,
+    pub roughness: f32,
+    pub transmission: f32,
+    pub ior: f32,
+    pub specular: f32,
+    pub normal_scale: f32,
+    pub cutoff: f32,
+    pub flags: u32,
+    pub _pad: [u32; 2],
+    pub base_color_map: Map,
+    pub metallic_roughness_map: Map,
+    pub normal_map: Map,
+    pub emissive_map: Map,
+    pub specular_map: Map,
+    pub specular_color_map: Map,
+    pub transmission_map: Map,
+}
+
+/// Bits of [`Frame::parts`].
+pub mod parts {
+    /// Emission and environment, as the camera sees them.
+    pub const EMISSION: u32 = 1;
+    /// Light of punctual lights scattered once.
+    pub const DIRECT: u32 = 2;
+    /// Light of the field.
+    pub const INDIRECT: u32 = 4;
+}
+
+/// Bits of [`Material::flags`].
+pub mod material {
+    /// Both sides scatter.
+    pub const DOUBLE_SIDED: u32 = 1;
+    /// Base colour is shown as it is.
+    pub const UNLIT: u32 = 2;
+    /// Covers by its opacity.
+    pub const BLEND: u32 = 4;
+    /// Opaque, two-sided, Lambert, emitting from the front only.
+    pub const LAMBERT: u32 = 8;
+}

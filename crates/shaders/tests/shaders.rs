@@ -1,0 +1,151 @@
+//! Every shader is valid WGSL, put together as at run time, and every struct lies in memory as Rust
+//! has it.
+
+use std::mem::{offset_of, size_of};
+
+use lumencast_shaders::{Shading, background, depth, forward, layout};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::{Module, TypeInner};
+
+fn compiled(name: &str, source: &str) -> Module {
+    let module = naga::front::wgsl::parse_str(source)
+        .unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(source)));
+    let capabilities = Capabilities::MULTISAMPLED_SHADING;
+    Validator::new(ValidationFlags::all(), capabilities)
+        .validate(&module)
+        .unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(source)));
+    module
+}
+
+#[test]
+fn every_shader_is_valid() {
+    for (name, source, entries) in [
+        ("forward, by pixels", forward(Shading::Pixels), 2),
+        ("forward, by samples", forward(Shading::Samples), 2),
+        ("depth", depth(), 3),
+        ("background", background(), 2),
+    ] {
+        assert_eq!(compiled(name, &source).entry_points.len(), entries, "{name}");
+    }
+}
+
+#[test]
+fn samples_are_shaded_one_by_one_only_where_asked() {
+    assert!(!forward(Shading::Pixels).contains("sample_index"));
+    let samples = forward(Shading::Samples);
+    assert!(samples.contains("sample_index") && !samples.contains("perspective, center"));
+}
+
+/// Names and offsets of a struct's members, and its size.
+fn of_shader(modules: &[Module], name: &str) -> (Vec<(String, usize)>, usize) {
+    let found = modules.iter().flat_map(|m| m.types.iter()).find_map(|(_, ty)| match &ty.inner {
+        TypeInner::Struct { members, span } if ty.name.as_deref() == Some(name) => {
+            let member =
+                |m: &naga::StructMember| (m.name.clone().unwrap_or_default(), m.offset as usize);
+            Some((members.iter().map(member).collect(), *span as usize))
+        }
+        _ => None,
+    });
+    found.unwrap_or_else(|| panic!("the shaders have no struct {name}"))
+}
+
+macro_rules! same {
+    ($modules:expr, $ty:ident { $($field:ident),* $(,)? }) => {{
+        let rust = vec![$((stringify!($field).to_owned(), offset_of!(layout::$ty, $field))),*];
+        let (shader, size) = of_shader($modules, stringify!($ty));
+        assert_eq!(shader, rust, "{}", stringify!($ty));
+        assert_eq!(size, size_of::<layout::$ty>(), "size of {}", stringify!($ty));
+    }};
+}
+
+#[test]
+fn layouts_agree() {
+    let modules = [compiled("forward", &forward(Shading::Pixels))];
+    let m = &modules;
+    same!(m, View { clip_from_world, world_from_clip, eye, perspective, forward, turn });
+    same!(m, Instance { world_from_object, normal_from_object, mirrors, number, _pad });
+    same!(
+        m,
+        Frame {
+            light_count,
+            parts,
+            filter_samples,
+            search_samples,
+            pre_exposure,
+            sample_count,
+            filter_radius,
+            frame,
+        }
+    );
+    same!(m, Environment { zenith, kind, ground, turn, horizon, _pad });
+    same!(
+        m,
+        Light {
+            position,
+            kind,
+            direction,
+            size,
+            intensity,
+            window,
+            cone_scale,
+            cone_offset,
+            first_shadow,
+            shadow_count,
+        }
+    );
+    same!(
+        m,
+        ShadowView {
+            clip_from_world,
+            texel,
+            near,
+            depth_range,
+            reach,
+            search,
+            _pad0,
+            _pad1,
+            _pad2,
+        }
+    );
+    same!(m, Field { count, offset_policy, offset_metres, _pad });
+    same!(m, Volume { cell_from_world, spacing, scale, resolution, texels, origin, _pad });
+    same!(m, Map { row0, row1 });
+    same!(
+        m,
+        Material {
+            base_color,
+            emissive,
+            metallic,
+            specular_color,
+            roughness,
+            transmission,
+            ior,
+            specular,
+            normal_scale,
+            cutoff,
+            flags,
+            _pad,
+            base_color_map,
+            metallic_roughness_map,
+            normal_map,
+            emissive_map,
+            specular_map,
+            specular_color_map,
+            transmission_map,
+        }
+    );
+}
+
+/// The comparison of layouts notices a member that has moved.
+#[test]
+#[should_panic(expected = "Field")]
+fn a_moved_member_is_noticed() {
+    let sound =
+        "    count: u32,\n    // 0: none, 1: half a cell, 2: metres.\n    offset_policy: u32,\n";
+    let moved = "    offset_policy: u32,\n    count: u32,\n";
+    let shader = forward(Shading::Pixels);
+    assert!(shader.contains(sound));
+    let moved = shader.replace(sound, moved);
+    let modules = [compiled("moved", &moved)];
+    same!(&modules, Field { count, offset_policy, offset_metres, _pad });
+}

@@ -1,0 +1,175 @@
+// The light field: probe volumes in one 3D texture, sampled as `light::LightField` does.
+
+struct Volume {
+    // World positions to cells: the first probe lies at 0, the next along x at (1, 0, 0).
+    cell_from_world: array<vec4f, 3>,
+    // Size of a cell along the box's axes, metres.
+    spacing: vec3f,
+    // Light is so much times what the texture holds.
+    scale: f32,
+    resolution: vec3f,
+    // Of a probe: 3, 7, 12 or 19.
+    texels: u32,
+    // Texel of the atlas where the volume begins.
+    origin: vec3f,
+    _pad: f32,
+}
+
+struct Field {
+    count: u32,
+    // 0: none, 1: half a cell, 2: metres.
+    offset_policy: u32,
+    offset_metres: f32,
+    _pad: u32,
+}
+
+@group(2) @binding(0) var<uniform> field: Field;
+@group(2) @binding(1) var<storage, read> volumes: array<Volume>;
+@group(2) @binding(2) var atlas: texture_3d<f32>;
+@group(2) @binding(3) var atlas_sampler: sampler;
+
+// Light of two lobes.
+struct TwoLobes {
+    a: vec3f,
+    b: vec3f,
+}
+
+fn cell_of(v: Volume, position: vec3f) -> vec3f {
+    return transform_point(v.cell_from_world, position);
+}
+
+// How much a position belongs to the box (Grid::weight).
+fn volume_weight(v: Volume, position: vec3f) -> f32 {
+    let cell = cell_of(v, position);
+    let t = clamp(2.0 * min(cell + 0.5, v.resolution - 0.5 - cell), vec3f(0.0), vec3f(1.0));
+    let s = t * t * (3.0 - 2.0 * t);
+    return s.x * s.y * s.z;
+}
+
+// How much of what no box claims belongs to this one (Grid::reach).
+fn volume_reach(v: Volume, position: vec3f) -> f32 {
+    let cell = cell_of(v, position);
+    let outside = max(max(-0.5 - cell, cell + 0.5 - v.resolution), vec3f(0.0));
+    let near = max(1.0 - 2.0 * outside, vec3f(0.0));
+    return near.x * near.y * near.z;
+}
+
+// Distance from the box, metres (Grid::distance).
+fn volume_distance(v: Volume, position: vec3f) -> f32 {
+    let cell = cell_of(v, position);
+    return length(max(max(-0.5 - cell, cell + 0.5 - v.resolution), vec3f(0.0)) * v.spacing);
+}
+
+// Where the texture is read for a surface: in cells, clamped to the outermost probes.
+fn sampled_cell(v: Volume, position: vec3f, normal: vec3f) -> vec3f {
+    var cell = cell_of(v, position);
+    if field.offset_policy == 1u {
+        cell += 0.5 * transform_vector(v.cell_from_world, normal) * v.spacing;
+    } else if field.offset_policy == 2u {
+        cell += field.offset_metres * transform_vector(v.cell_from_world, normal);
+    }
+    return clamp(cell, vec3f(0.0), v.resolution - 1.0);
+}
+
+// A group of four coefficients, three texels of four channels each, weighed.
+fn weighed(t0: vec4f, t1: vec4f, t2: vec4f, w: vec4f) -> vec3f {
+    return t0.xyz * w.x + vec3f(t0.w, t1.xy) * w.y + vec3f(t1.zw, t2.x) * w.z + t2.yzw * w.w;
+}
+
+// What two lobes see from a cell of a volume. A texel is read once for both, and what it brings is
+// added at once: no probe's coefficients are ever held together, so that order 4 needs no more
+// registers than order 1.
+fn volume_light(v: Volume, cell: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
+    let texel = 1.0 / vec3f(textureDimensions(atlas));
+    let first = (v.origin + cell + vec3f(0.5, 0.5, 1.5)) * texel;
+    let step = vec3f(0.0, 0.0, (v.resolution.z + 2.0) * texel.z);
+    var light: TwoLobes;
+
+    var t0 = textureSampleLevel(atlas, atlas_sampler, first, 0.0);
+    var t1 = textureSampleLevel(atlas, atlas_sampler, first + step, 0.0);
+    var t2 = textureSampleLevel(atlas, atlas_sampler, first + 2.0 * step, 0.0);
+    light.a = weighed(t0, t1, t2, a.g0);
+    light.b = weighed(t0, t1, t2, b.g0);
+    if v.texels > 3u {
+        t0 = textureSampleLevel(atlas, atlas_sampler, first + 3.0 * step, 0.0);
+        t1 = textureSampleLevel(atlas, atlas_sampler, first + 4.0 * step, 0.0);
+        t2 = textureSampleLevel(atlas, atlas_sampler, first + 5.0 * step, 0.0);
+        light.a += weighed(t0, t1, t2, a.g1);
+        light.b += weighed(t0, t1, t2, b.g1);
+        t0 = textureSampleLevel(atlas, atlas_sampler, first + 6.0 * step, 0.0);
+        if v.texels == 7u {
+            light.a += t0.xyz * a.g2.x;
+            light.b += t0.xyz * b.g2.x;
+        } else {
+            t1 = textureSampleLevel(atlas, atlas_sampler, first + 7.0 * step, 0.0);
+            t2 = textureSampleLevel(atlas, atlas_sampler, first + 8.0 * step, 0.0);
+            light.a += weighed(t0, t1, t2, a.g2);
+            light.b += weighed(t0, t1, t2, b.g2);
+            t0 = textureSampleLevel(atlas, atlas_sampler, first + 9.0 * step, 0.0);
+            t1 = textureSampleLevel(atlas, atlas_sampler, first + 10.0 * step, 0.0);
+            t2 = textureSampleLevel(atlas, atlas_sampler, first + 11.0 * step, 0.0);
+            light.a += weighed(t0, t1, t2, a.g3);
+            light.b += weighed(t0, t1, t2, b.g3);
+        }
+        if v.texels > 12u {
+            t0 = textureSampleLevel(atlas, atlas_sampler, first + 12.0 * step, 0.0);
+            t1 = textureSampleLevel(atlas, atlas_sampler, first + 13.0 * step, 0.0);
+            t2 = textureSampleLevel(atlas, atlas_sampler, first + 14.0 * step, 0.0);
+            light.a += weighed(t0, t1, t2, a.g4);
+            light.b += weighed(t0, t1, t2, b.g4);
+            t0 = textureSampleLevel(atlas, atlas_sampler, first + 15.0 * step, 0.0);
+            t1 = textureSampleLevel(atlas, atlas_sampler, first + 16.0 * step, 0.0);
+            t2 = textureSampleLevel(atlas, atlas_sampler, first + 17.0 * step, 0.0);
+            light.a += weighed(t0, t1, t2, a.g5);
+            light.b += weighed(t0, t1, t2, b.g5);
+            t0 = textureSampleLevel(atlas, atlas_sampler, first + 18.0 * step, 0.0);
+            light.a += t0.xyz * a.g6;
+            light.b += t0.xyz * b.g6;
+        }
+    }
+    light.a *= v.scale;
+    light.b *= v.scale;
+    return light;
+}
+
+// What two lobes see at a point of a surface (LightField::sample): the finest volume counts, passing
+// smoothly into the next; beyond all of them the nearest one's border does. Negative light, which
+// truncated expansions have, is none.
+fn field_light(position: vec3f, normal: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
+    var sum = TwoLobes(vec3f(0.0), vec3f(0.0));
+    var left = 1.0;
+    for (var i = 0u; i < field.count && left > 0.0; i++) {
+        let weight = left * volume_weight(volumes[i], position);
+        if weight > 0.0 {
+            let light = volume_light(volumes[i], sampled_cell(volumes[i], position, normal), a, b);
+            sum.a += weight * light.a;
+            sum.b += weight * light.b;
+            left -= weight;
+        }
+    }
+    if left > 0.0 && field.count > 0u {
+        var reach = 0.0;
+        var nearest = 0u;
+        var distance = 3.4e38;
+        for (var i = 0u; i < field.count; i++) {
+            reach += volume_reach(volumes[i], position);
+            let d = volume_distance(volumes[i], position);
+            if d < distance {
+                nearest = i;
+                distance = d;
+            }
+        }
+        for (var i = 0u; i < field.count; i++) {
+            var share = select(0.0, 1.0, i == nearest);
+            if reach > 0.0 {
+                share = volume_reach(volumes[i], position) / reach;
+            }
+            if share > 0.0 {
+                let light = volume_light(volumes[i], sampled_cell(volumes[i], position, normal), a, b);
+                sum.a += left * share * light.a;
+                sum.b += left * share * light.b;
+            }
+        }
+    }
+    return TwoLobes(max(sum.a, vec3f(0.0)), max(sum.b, vec3f(0.0)));
+}

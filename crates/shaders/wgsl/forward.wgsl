@@ -1,0 +1,216 @@
+// Draws surfaces: direct light of punctual lights, indirect light of the field, emission.
+
+struct Vertex {
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) tangent: vec4f,
+    @location(3) uv0: vec2f,
+    @location(4) uv1: vec2f,
+    @location(5) color: vec4f,
+    @builtin(instance_index) instance: u32,
+}
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(perspective, center) position: vec3f,
+    @location(1) @interpolate(perspective, center) normal: vec3f,
+    @location(2) @interpolate(perspective, center) tangent: vec4f,
+    @location(3) @interpolate(perspective, center) uv: vec4f,
+    @location(4) @interpolate(perspective, center) color: vec4f,
+    @location(5) @interpolate(flat) instance: u32,
+    // 1 at every vertex. Lavapipe (Mesa 25.0) interpolates a sample's attributes over the depth of the
+    // sample but divides by the depth of the pixel's middle: what this has become tells by how much
+    // the others are wrong, up to some parts in a hundred where surfaces are seen at an angle.
+    @location(6) @interpolate(perspective, center) one: f32,
+}
+
+@vertex
+fn forward_vertex(in: Vertex) -> Varying {
+    let index = visible[in.instance];
+    let instance = instances[index];
+    var out: Varying;
+    out.position = transform_point(instance.world_from_object, in.position);
+    out.clip = view.clip_from_world * vec4f(out.position, 1.0);
+    // In object space, as the tracer interpolates them.
+    out.normal = in.normal;
+    out.tangent = in.tangent;
+    out.uv = vec4f(in.uv0, in.uv1);
+    out.color = in.color;
+    out.instance = index;
+    out.one = 1.0;
+    return out;
+}
+
+// The shading normal on the viewer's side, bent as little as makes it face the viewer
+// (`gather::surface`).
+fn visible_normal(shading: vec3f, geometric: vec3f, v: vec3f) -> vec3f {
+    const LEAST: f32 = 1e-3;
+    if dot(shading, shading) == 0.0 {
+        return geometric;
+    }
+    let n = normalize(select(shading, -shading, dot(shading, geometric) < 0.0));
+    let cosine = dot(n, v);
+    if cosine >= LEAST {
+        return n;
+    }
+    return normalize(n + (2.0 * LEAST - cosine) * v);
+}
+
+// Interleaved gradient noise (Jimenez 2014): a value a pixel, well spread among neighbours.
+fn pattern(pixel: vec2f) -> f32 {
+    return fract(52.9829189 * fract(dot(floor(pixel), vec2f(0.06711056, 0.00583715))) + view.turn);
+}
+
+// Whether blended surfaces are mixed with what lies behind them, which then has to be drawn before.
+override BLENDED: bool = false;
+
+struct Shaded {
+    @location(0) color: vec4f,
+    @builtin(sample_mask) coverage: u32,
+}
+
+// The samples that a surface of so much opacity covers: as many as it should on average, others for
+// every surface, so that one that lies behind shows through (Enderton et al. 2010).
+fn covered(alpha: f32, pixel: vec2f, layer: u32) -> u32 {
+    let n = frame.sample_count;
+    let key = hash(u32(pixel.x) + hash(u32(pixel.y) + hash(layer + hash(frame.frame))));
+    let first = key % n;
+    let dither = unit(hash(key));
+    var mask = 0u;
+    for (var i = 0u; i < n; i++) {
+        let threshold = (f32((i + first) % n) + dither) / f32(n);
+        mask |= select(0u, 1u << i, threshold < alpha);
+    }
+    return mask;
+}
+
+@fragment
+fn forward_fragment(
+    in: Varying,
+    @builtin(front_facing) faces_front: bool,
+    /*SAMPLE*/
+) -> Shaded {
+    let position = in.position / in.one;
+    let geometry = cross(dpdx(position), dpdy(position));
+    let uv = in.uv / in.one;
+    let at = Coordinates(uv.xy, uv.zw);
+    let base_color = base_color_at(at, in.color / in.one);
+    let substance = substance_at(at, base_color);
+    let emission = emission_at(at);
+    let tangent_normal = mapped_normal(at);
+
+    let opaque = (material.flags & MATERIAL_LAMBERT) != 0u;
+    var out: Shaded;
+    out.coverage = 0xffffffffu;
+    var alpha = 1.0;
+    if !opaque {
+        if base_color.a < material.cutoff {
+            discard;
+        }
+        if (material.flags & MATERIAL_BLEND) != 0u {
+            alpha = saturate(base_color.a);
+            if BLENDED {
+                if alpha == 0.0 {
+                    discard;
+                }
+            } else {
+                // Layers of one surface differ in their side, or by a hundredth of their distance.
+                let depth = u32(i32(64.0 * log2(in.clip.w)) + 8192);
+                let side = select(0u, 1u, faces_front);
+                out.coverage = covered(alpha, in.clip.xy, hash(in.instance + hash(2u * depth + side)));
+                if out.coverage == 0u {
+                    discard;
+                }
+                alpha = 1.0;
+            }
+        }
+    }
+
+    let instance = instances[in.instance];
+    let front = faces_front != (instance.mirrors == 1u);
+    let v = towards_eye(position);
+    // Of the side that is seen.
+    var geometric = v;
+    if dot(geometry, geometry) > 0.0 {
+        geometric = normalize(geometry);
+        geometric = select(geometric, -geometric, dot(geometric, v) < 0.0);
+    }
+
+    var radiance = vec3f(0.0);
+    let two_sided = (material.flags & MATERIAL_DOUBLE_SIDED) != 0u;
+    if (frame.parts & PART_EMISSION) != 0u {
+        if (material.flags & MATERIAL_UNLIT) != 0u && !opaque {
+            radiance += select(vec3f(0.0), saturate(base_color.rgb), front || two_sided) / frame.pre_exposure;
+        } else if front || (two_sided && !opaque) {
+            radiance += emission;
+        }
+    }
+    let scatters = opaque || ((material.flags & MATERIAL_UNLIT) == 0u && (front || two_sided));
+    if scatters {
+        let n0 = normalize_or_zero(in.normal);
+        var object_normal = n0;
+        if material.normal_map.row1.w > 0.5 && !opaque && dot(in.tangent.xyz, in.tangent.xyz) > 0.0 {
+            let bitangent = cross(n0, in.tangent.xyz) * sign(in.tangent.w);
+            object_normal = tangent_normal.x * in.tangent.xyz + tangent_normal.y * bitangent + tangent_normal.z * n0;
+        }
+        let shading = transform_vector(instance.normal_from_object, object_normal);
+        let n = visible_normal(shading, geometric, v);
+        var b = bsdf_of(substance);
+        if opaque {
+            b = lambert(substance.base_color);
+        }
+        if (frame.parts & PART_DIRECT) != 0u {
+            radiance += direct_light(b, n, v, position, geometric, pattern(in.clip.xy)/*ITS TURN*/);
+        }
+        if (frame.parts & PART_INDIRECT) != 0u {
+            radiance += indirect_light(b, n, v, position, substance.roughness);
+        }
+    }
+    out.color = vec4f(radiance * frame.pre_exposure * alpha, alpha);
+    return out;
+}
+
+fn normalize_or_zero(v: vec3f) -> vec3f {
+    let square = dot(v, v);
+    return select(vec3f(0.0), v * inverseSqrt(max(square, 1e-38)), square > 0.0);
+}
+
+// Light of punctual lights scattered once.
+fn direct_light(b: Bsdf, n: vec3f, v: vec3f, position: vec3f, geometric: vec3f, turn: f32) -> vec3f {
+    var sum = vec3f(0.0);
+    for (var i = 0u; i < frame.light_count; i++) {
+        let light = lights[i];
+        let arriving = incident(light, position);
+        let scattered_light = scattered(b, n, v, arriving.direction) * arriving.irradiance;
+        if max(max(scattered_light.x, scattered_light.y), scattered_light.z) > 0.0 {
+            // Light through a thin surface arrives at its other side.
+            let side = select(geometric, -geometric, dot(n, arriving.direction) < 0.0);
+            sum += scattered_light * visibility(light, arriving.direction, arriving.distance, position, side, turn);
+        }
+    }
+    return sum;
+}
+
+// Light of the field, chapter 4.2.2 of the second paper: diffuse by irradiance, specular by the split
+// sum, the lobe's mean radiance about the mirrored direction times the environment BRDF.
+fn indirect_light(b: Bsdf, n: vec3f, v: vec3f, position: vec3f, roughness: f32) -> vec3f {
+    let n_v = dot(n, v);
+    let bands = ggx_bands(roughness);
+    let mirrored = reflect(-v, n);
+    let light = field_light(position, n, lobe(n, cosine_bands()), lobe(mirrored, bands));
+    let under = 1.0 - reflectance(b, n_v);
+    var sum = b.diffuse * under * light.a / PI;
+    let by = textureSampleLevel(environment_brdf, table_sampler, table_at(n_v, roughness), 0.0).xy;
+    sum += (b.f0 * by.x + b.f90 * by.y) * light.b;
+    if any(b.transmission > vec3f(0.0)) {
+        let behind = field_light(position, -n, lobe(-v, bands), lobe(-v, bands));
+        sum += b.transmission * under * behind.a;
+    }
+    return sum;
+}
+
+// Where the table has a cosine and a roughness: its outermost texels stand for 0 and 1.
+fn table_at(cosine: f32, roughness: f32) -> vec2f {
+    let size = vec2f(textureDimensions(environment_brdf));
+    return (saturate(vec2f(cosine, roughness)) * (size - 1.0) + 0.5) / size;
+}

@@ -1,0 +1,32 @@
+// From where a pass looks, and what it draws. The one group that every pass has.
+
+struct View {
+    clip_from_world: mat4x4f,
+    world_from_clip: mat4x4f,
+    eye: vec3f,
+    // 1 where all rays leave from the eye, 0 where they are parallel.
+    perspective: f32,
+    forward: vec3f,
+    // Fraction of a turn added to patterns, so that frames of one picture differ.
+    turn: f32,
+}
+
+struct Instance {
+    world_from_object: array<vec4f, 3>,
+    // Inverse transpose of its linear part.
+    normal_from_object: array<vec4f, 3>,
+    // 1 where the transform mirrors, so that windings are turned about.
+    mirrors: u32,
+    number: u32,
+    _pad: vec2u,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<storage, read> instances: array<Instance>;
+// Indices of the instances that the pass draws, draw by draw.
+@group(0) @binding(2) var<storage, read> visible: array<u32>;
+
+// Unit vector from a point towards the eye.
+fn towards_eye(position: vec3f) -> vec3f {
+    return normalize(mix(-view.forward, view.eye - position, view.perspective));
+}
