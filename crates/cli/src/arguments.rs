@@ -10,7 +10,7 @@ use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::Gather;
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, MaterialModel, Options};
-use lumencast_light::{Grid, Order};
+use lumencast_light::{Grid, OffsetPolicy, Order};
 use lumencast_scene::{Edit, Scene, Script, VolumeSpec};
 use lumencast_server::{GatherOptions, SampleRange, TickOptions};
 
@@ -267,6 +267,18 @@ where
 }
 
 /// `1` to `4`
+/// How far in front of a surface a field is read.
+pub(crate) fn parse_offset(text: &str) -> Result<OffsetPolicy, String> {
+    match text {
+        "none" => Ok(OffsetPolicy::None),
+        "half-cell" => Ok(OffsetPolicy::HalfCell),
+        metres => match metres.parse::<f32>() {
+            Ok(metres) if metres.is_finite() => Ok(OffsetPolicy::Metres(metres)),
+            _ => Err("none, half-cell, or a number of metres".into()),
+        },
+    }
+}
+
 pub(crate) fn parse_order(text: &str) -> Result<Order, String> {
     let band: u8 = text.parse().map_err(|e| format!("{e}"))?;
     Order::try_from(band)
@@ -335,5 +347,12 @@ mod tests {
         for wrong in ["", "0", "64..4", "..", "-1", "4..x", "99999999"] {
             assert!(parse_samples(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn offsets() {
+        assert_eq!(parse_offset("none"), Ok(OffsetPolicy::None));
+        assert_eq!(parse_offset("0.25"), Ok(OffsetPolicy::Metres(0.25)));
+        assert!(parse_offset("inf").is_err() && parse_offset("half").is_err());
     }
 }

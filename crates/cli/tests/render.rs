@@ -155,3 +155,73 @@ fn says_what_is_wrong_before_it_begins() {
         .failed_saying(&["attic", "0 ("]);
     run(&["render", "/no/such/scene.glb", "-o", text(&picture)]).failed_saying(&["scene.glb"]);
 }
+
+/// A field is baked, a client's picture drawn under it, and both judged by the path tracer.
+#[test]
+fn a_clients_picture_is_near_the_reference() {
+    let folder = Folder::new("render-field");
+    let at = |name: &str| folder.0.join(name);
+    let draw = |name: &str, arguments: &[&str]| {
+        let exr = at(name);
+        let mut all = vec!["render", "cornell", "--size", "72x48", "-o", text(&exr), "--json"];
+        all.extend(arguments);
+        let ran = run(&all);
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        ran.json()
+    };
+    let light = at("cornell.light");
+    let bake = ["bake", "cornell", "-o", text(&light), "--samples", "512", "--bounces", "3"];
+    assert_eq!(run(&bake).code, Some(0));
+    draw("reference.exr", &["--spp", "128"]);
+    let told = draw("field.exr", &["--lighting", "field", "--light", text(&light)]);
+    assert_eq!((&told["probes"], &told["samples"]), (&512.into(), &8.into()));
+    draw("direct.exr", &["--lighting", "direct"]);
+    draw("indirect.exr", &["--lighting", "indirect", "--probe-samples", "256"]);
+
+    let reference = Loaded::read(at("reference.exr")).expect("a picture");
+    let psnr = |name: &str| {
+        let picture = Loaded::read(at(name)).expect("a picture");
+        compare(&reference, &picture, None, 67.0).expect("of one size").psnr
+    };
+    assert!(psnr("field.exr") > 28.0, "{}", psnr("field.exr"));
+    assert!(psnr("direct.exr") < 20.0, "without indirect light it is noticed");
+    assert!(linear(&at("indirect.exr")).pixels().iter().any(|p| p.x > 0.1));
+
+    let pair = at("pair.png");
+    let ran = run(&[
+        "render",
+        "cornell",
+        "--lighting",
+        "direct",
+        "--views",
+        "stereo",
+        "--size",
+        "40x30",
+        "--samples",
+        "1",
+        "-o",
+        text(&pair),
+    ]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let pair = linear(&pair);
+    assert_eq!((pair.width(), pair.height()), (80, 30));
+    assert_ne!(pair.pixel(15, 20), pair.pixel(55, 20), "the eyes stand apart");
+}
+
+#[test]
+fn what_cannot_be_drawn_is_said() {
+    let folder = Folder::new("render-refused");
+    let picture = folder.0.join("x.png");
+    let render = |arguments: &[&str]| {
+        let mut all = vec!["render", "cornell", "--size", "8x8", "-o", text(&picture)];
+        all.extend(arguments);
+        run(&all)
+    };
+    render(&["--lighting", "field", "--light", "nowhere.light"])
+        .failed_saying(&["nowhere.light", "cannot read"]);
+    let other = folder.0.join("other.light");
+    std::fs::write(&other, b"LUMENCST is not all").expect("written");
+    render(&["--lighting", "field", "--light", text(&other)]).failed_saying(&["no light field"]);
+    render(&["--lighting", "field", "--parts", "direct"]).failed_saying(&["--lighting direct"]);
+    assert!(!picture.exists());
+}

@@ -133,6 +133,26 @@ impl Gpu {
         self.check(during)
     }
 
+    /// Waits for what was copied to a buffer.
+    pub(crate) fn read(
+        &self,
+        buffer: &wgpu::Buffer,
+        during: &'static str,
+    ) -> Result<wgpu::BufferView, ShadeError> {
+        let failed = |reason: String| ShadeError::Failed { during, reason };
+        let (sender, receiver) = std::sync::mpsc::channel();
+        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+            // Nobody waits any more where the renderer gave up.
+            let _ = sender.send(result);
+        });
+        self.finish(during)?;
+        receiver
+            .recv()
+            .map_err(|error| failed(error.to_string()))?
+            .map_err(|error| failed(error.to_string()))?;
+        buffer.get_mapped_range(..).map_err(|error| failed(error.to_string()))
+    }
+
     /// A buffer with contents; of at least `least` bytes, since bindings may not be empty.
     pub(crate) fn buffer(
         &self,

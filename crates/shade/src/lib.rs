@@ -29,9 +29,10 @@ mod settings;
 mod shadows;
 mod target;
 mod textures;
+mod timing;
 
 pub use environment_brdf::{environment_brdf, reflected};
 pub use error::ShadeError;
 pub use gpu::Gpu;
-pub use renderer::{Drawn, Renderer};
+pub use renderer::{Drawn, PassTimes, Renderer};
 pub use settings::{Lighting, Materials, Settings, Shading, Shadows, Transparency};

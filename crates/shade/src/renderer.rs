@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use lumencast_light::LightField;
 use lumencast_scene::{Snapshot, View};
 use lumencast_shaders::layout;
@@ -17,7 +17,8 @@ use crate::pipelines::{Layouts, Pipelines, Variant};
 use crate::scene::{Call, GpuScene};
 use crate::settings::{Lighting, Materials, Settings, Transparency};
 use crate::shadows::ShadowPlan;
-use crate::target::{Target, depth_attachment};
+use crate::target::{Copied, Target, depth_attachment};
+use crate::timing::Timing;
 
 /// How far patterns turn from one frame of a picture to the next: the golden section fills the circle
 /// evenly for any number.
@@ -57,7 +58,7 @@ pub struct Renderer {
 }
 
 /// What drawing took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drawn {
     /// Frames that were averaged.
     pub frames: u32,
@@ -69,6 +70,43 @@ pub struct Drawn {
     pub shadow_resolution: u32,
     /// Lights that cast no shadow, because there is no room for their maps.
     pub lights_without_shadow: usize,
+    /// What the device says that it took, of all frames; nothing where it has no clock.
+    pub time: Option<PassTimes>,
+}
+
+/// Seconds on the device, by pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PassTimes {
+    /// Shadow maps: drawn once for all views, and kept while neither scene nor cascades change.
+    pub shadows: f64,
+    /// Surfaces and what lies behind them, of all views.
+    pub pictures: f64,
+}
+
+/// A frame on its way back.
+struct Frame {
+    copies: Vec<Copied>,
+    timing: Option<Timing>,
+    /// How many of the timed passes drew shadow maps.
+    shadow_maps: usize,
+}
+
+/// What the passes of a frame share: group 0, with bytes from one pass's view to the next's.
+struct Passes {
+    group: wgpu::BindGroup,
+    stride: u32,
+    timing: Option<Timing>,
+}
+
+impl Passes {
+    /// Binds what pass `number` looks from.
+    fn bind(&self, pass: &mut wgpu::RenderPass<'_>, number: u32) {
+        pass.set_bind_group(0, &self.group, &[number * self.stride]);
+    }
+
+    fn timestamps(&self, number: u32) -> Option<wgpu::RenderPassTimestampWrites<'_>> {
+        self.timing.as_ref().map(|timing| timing.of_pass(number))
+    }
 }
 
 impl Renderer {
@@ -142,23 +180,32 @@ impl Renderer {
         let mut pictures = vec![vec![Vec3::ZERO; pixels]; views.len()];
         let weight = 1.0 / (settings.pre_exposure * frames as f32);
         let mut drawn = Drawn { frames, samples, ..Drawn::default() };
+        let Some((snapshot, _)) = self.shown.clone() else { return Ok((pictures, drawn)) };
+        let camera = |view: &View, moved| Camera::new(view, settings.size, moved);
+        // The same for all frames, so that its maps are drawn once.
+        let still: Vec<Camera> = views.iter().map(|view| camera(view, Vec2::ZERO)).collect();
+        let plan = self.shadow_plan(&snapshot, &still, settings);
         for number in 0..frames {
             // Samples of a pixel are spread over strata along both axes; frames move them within.
             let moved = jitter(number, frames) / samples as f32;
-            let cameras: Vec<Camera> =
-                views.iter().map(|view| Camera::new(view, settings.size, moved)).collect();
+            let cameras: Vec<Camera> = views.iter().map(|view| camera(view, moved)).collect();
             let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-            let copies = self.frame(&mut encoder, &cameras, settings, number);
+            let frame = self.frame(&mut encoder, &snapshot, &cameras, &plan, settings, number);
             self.gpu.queue.submit([encoder.finish()]);
-            for (picture, copy) in pictures.iter_mut().zip(copies) {
+            for (picture, copy) in pictures.iter_mut().zip(&frame.copies) {
                 copy.add_to(&self.gpu, picture, weight)?;
             }
+            if let Some(timing) = &frame.timing {
+                let seconds = timing.seconds(&self.gpu)?;
+                let (shadows, views) = seconds.split_at(frame.shadow_maps);
+                let time = drawn.time.get_or_insert_default();
+                time.shadows += shadows.iter().sum::<f64>();
+                time.pictures += views.iter().sum::<f64>();
+            }
         }
-        if let Some(plan) = &self.drawn {
-            drawn.shadow_maps = plan.views.len();
-            drawn.shadow_resolution = plan.resolution;
-            drawn.lights_without_shadow = plan.left_out;
-        }
+        drawn.shadow_maps = plan.views.len();
+        drawn.shadow_resolution = plan.resolution;
+        drawn.lights_without_shadow = plan.left_out;
         Ok((pictures, drawn))
     }
 
@@ -191,13 +238,13 @@ impl Renderer {
     fn frame(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
+        snapshot: &Snapshot,
         cameras: &[Camera],
+        plan: &ShadowPlan,
         settings: &Settings,
-        number: u32,
-    ) -> Vec<crate::target::Copied> {
-        let Some((snapshot, _)) = self.shown.clone() else { return Vec::new() };
-        let plan = self.shadow_plan(&snapshot, cameras, settings);
-        let redraws = self.drawn.as_ref() != Some(&plan);
+        frame: u32,
+    ) -> Frame {
+        let redraws = self.drawn.as_ref() != Some(plan);
 
         let mut visible = Vec::new();
         let shadow_calls: Vec<Vec<Call>> = match redraws {
@@ -206,7 +253,7 @@ impl Renderer {
         };
         let camera_calls: Vec<Vec<Call>> =
             cameras.iter().map(|c| self.seen(c, settings.transparency, &mut visible)).collect();
-        let turn = GOLDEN * number as f32;
+        let turn = GOLDEN * frame as f32;
         let shadows = if redraws { plan.views.as_slice() } else { &[] };
         let views: Vec<layout::View> = shadows
             .iter()
@@ -216,23 +263,26 @@ impl Renderer {
             })
             .chain(cameras.iter().map(|camera| camera.layout(turn)))
             .collect();
-        let pass = self.pass_group(&views, &visible);
+        let passes = self.passes(&views, &visible);
 
         if redraws {
-            let layers = self.lights.shadow_maps(&self.gpu, &plan);
-            for ((layer, calls), view) in layers.iter().zip(&shadow_calls).zip(0..) {
-                self.draw_shadow_map(encoder, layer, calls, &pass, view);
+            let layers = self.lights.shadow_maps(&self.gpu, plan);
+            for ((layer, calls), number) in layers.iter().zip(&shadow_calls).zip(0..) {
+                self.draw_shadow_map(encoder, &passes, number, layer, calls);
             }
             self.drawn = Some(plan.clone());
         }
-        let frame = frame_layout(settings, self.pipelines.as_ref(), number);
-        let light = self.lights.group(&self.gpu, &snapshot, &plan, frame);
+        let frame = frame_layout(settings, self.pipelines.as_ref(), frame);
+        let light = self.lights.group(&self.gpu, snapshot, plan, frame);
         let mut copies = Vec::with_capacity(cameras.len());
-        for (calls, view) in camera_calls.iter().zip(shadows.len() as u32..) {
-            self.draw_picture(encoder, calls, &pass, view, &light, settings.lighting);
+        for (calls, number) in camera_calls.iter().zip(shadows.len() as u32..) {
+            self.draw_picture(encoder, &passes, number, calls, &light, settings.lighting);
             copies.extend(self.target.as_ref().map(|target| target.copy(&self.gpu, encoder)));
         }
-        copies
+        if let Some(timing) = &passes.timing {
+            timing.resolve(encoder);
+        }
+        Frame { copies, timing: passes.timing, shadow_maps: shadows.len() }
     }
 
     fn shadow_plan(
@@ -276,8 +326,9 @@ impl Renderer {
         }
     }
 
-    /// Group 0, and the distance in bytes from one view to the next.
-    fn pass_group(&self, views: &[layout::View], visible: &[u32]) -> (wgpu::BindGroup, u32) {
+    /// A pass a view; `visible`: the instances that they draw.
+    fn passes(&self, views: &[layout::View], visible: &[u32]) -> Passes {
+        let timing = Timing::new(&self.gpu, views.len());
         let alignment = self.gpu.device.limits().min_uniform_buffer_offset_alignment;
         let size = size_of::<layout::View>();
         let stride = (size as u32).next_multiple_of(alignment);
@@ -304,20 +355,21 @@ impl Renderer {
                 entry(2, visible.as_entire_binding()),
             ],
         });
-        (group, stride)
+        Passes { group, stride, timing }
     }
 
     fn draw_shadow_map(
         &self,
         encoder: &mut wgpu::CommandEncoder,
+        passes: &Passes,
+        number: u32,
         layer: &wgpu::TextureView,
         calls: &[Call],
-        (group, stride): &(wgpu::BindGroup, u32),
-        view: u32,
     ) {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("shadow map"),
             depth_stencil_attachment: Some(depth_attachment(layer, wgpu::StoreOp::Store)),
+            timestamp_writes: passes.timestamps(number),
             ..Default::default()
         });
         let mut last = None;
@@ -325,7 +377,7 @@ impl Renderer {
             let (draw, material) = self.scene.draw(call);
             if last != Some(draw.surface) {
                 pass.set_pipeline(self.layouts.depth(draw.surface));
-                pass.set_bind_group(0, group, &[view * stride]);
+                passes.bind(&mut pass, number);
                 last = Some(draw.surface);
             }
             if draw.surface != Surface::Solid {
@@ -338,15 +390,15 @@ impl Renderer {
     fn draw_picture(
         &self,
         encoder: &mut wgpu::CommandEncoder,
+        passes: &Passes,
+        number: u32,
         calls: &[Call],
-        (group, stride): &(wgpu::BindGroup, u32),
-        view: u32,
         light: &wgpu::BindGroup,
         lighting: Lighting,
     ) {
         let (Some(target), Some(pipelines)) = (&self.target, &self.pipelines) else { return };
-        let mut pass = target.pass(encoder);
-        pass.set_bind_group(0, group, &[view * stride]);
+        let mut pass = target.pass(encoder, passes.timestamps(number));
+        passes.bind(&mut pass, number);
         pass.set_bind_group(1, light, &[]);
         // What is mixed with the background comes after it.
         let is_mixed = |call: &Call| {

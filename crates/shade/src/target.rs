@@ -56,7 +56,11 @@ impl Target {
     }
 
     /// A pass that draws a picture from nothing.
-    pub(crate) fn pass<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::RenderPass<'a> {
+    pub(crate) fn pass<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
+    ) -> wgpu::RenderPass<'a> {
         let color = wgpu::RenderPassColorAttachment {
             view: &self.drawn,
             depth_slice: None,
@@ -70,6 +74,7 @@ impl Target {
             label: Some("picture"),
             color_attachments: &[Some(color)],
             depth_stencil_attachment: Some(depth_attachment(&self.depth, wgpu::StoreOp::Discard)),
+            timestamp_writes,
             ..Default::default()
         })
     }
@@ -129,19 +134,7 @@ impl Copied {
         sum: &mut [Vec3],
         weight: f32,
     ) -> Result<(), ShadeError> {
-        const READING: &str = "reading a picture back";
-        let failed = |reason: String| ShadeError::Failed { during: READING, reason };
-        let (sender, receiver) = std::sync::mpsc::channel();
-        self.buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            // Nobody waits any more where the renderer gave up.
-            let _ = sender.send(result);
-        });
-        gpu.finish(READING)?;
-        receiver
-            .recv()
-            .map_err(|error| failed(error.to_string()))?
-            .map_err(|error| failed(error.to_string()))?;
-        let bytes = self.buffer.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
+        let bytes = gpu.read(&self.buffer, "reading a picture back")?;
         let rows = bytes.chunks_exact(self.row as usize);
         for (own, row) in sum.chunks_exact_mut(self.size.x as usize).zip(rows) {
             for (pixel, halves) in own.iter_mut().zip(row.chunks_exact(PIXEL as usize)) {

@@ -1,6 +1,7 @@
 //! `lumencast bench`: figures of this machine.
 
 mod paths;
+mod quality;
 mod rays;
 mod tick;
 
@@ -13,6 +14,7 @@ pub(crate) enum Bench {
     Tick(tick::BenchTick),
     Rays(rays::BenchRays),
     Paths(paths::BenchPaths),
+    Quality(Box<quality::BenchQuality>),
 }
 
 impl Bench {
@@ -21,6 +23,7 @@ impl Bench {
             Self::Tick(command) => command.run(),
             Self::Rays(command) => command.run(),
             Self::Paths(command) => command.run(),
+            Self::Quality(command) => command.run(),
         }
     }
 }

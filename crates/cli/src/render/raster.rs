@@ -12,11 +12,11 @@ use lumencast_light::{LightField, OffsetPolicy, ProbeVolume};
 use lumencast_picture::{Picture, exposure};
 use lumencast_scene::{Scene, View};
 use lumencast_server::GatherOptions;
-use lumencast_shade::{Drawn, Gpu, Renderer, Settings, Shading, Shadows, Transparency};
+use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadows, Transparency};
 use serde_json::json;
 
 use super::{Lighting, PartsArgument, Render};
-use crate::arguments::Materials;
+use crate::arguments::{Materials, parse_offset};
 use crate::{light_source, output};
 
 /// Samples a pixel unless told otherwise.
@@ -25,8 +25,6 @@ const SAMPLES: u32 = 8;
 const GLANCE: u32 = 4;
 /// Pre-exposure of that picture: halves then hold 0.1 to 60 million cd/m² with all their digits.
 const GLANCE_PRE_EXPOSURE: f32 = 1.0 / 1024.0;
-/// The directions of the field's surfaces are half a cell in front of them.
-const HALF_CELL: &str = "half-cell";
 
 /// How an adapter draws.
 #[derive(Debug, Args)]
@@ -41,7 +39,7 @@ pub(crate) struct RasterArguments {
           value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     probe_samples: u32,
     /// Where in front of a surface the field is read: none, half-cell or metres.
-    #[arg(long, value_name = "none|half-cell|METRES", default_value = HALF_CELL, value_parser = parse_offset)]
+    #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
     offset: OffsetPolicy,
     /// How often surfaces are shaded: once a sample, or once a pixel, which is faster.
     #[arg(long, value_enum, default_value_t = ShadingArgument::Samples)]
@@ -216,6 +214,9 @@ impl Render {
                 "lights_without_shadow": drawn.lights_without_shadow,
                 "probes": probes,
                 "seconds": seconds,
+                "device_seconds": drawn.time.map(|time| json!({
+                    "shadows": time.shadows, "pictures": time.pictures,
+                })),
                 "exposure": exposure,
             }));
         }
@@ -230,7 +231,14 @@ impl Render {
             "probes: {probes}, shadow maps: {} of {}², exposure {exposure}",
             drawn.shadow_maps, drawn.shadow_resolution
         );
-        println!("{adapter}");
+        match drawn.time {
+            Some(PassTimes { shadows, pictures }) => println!(
+                "{adapter}: {:.1} ms shadow maps, {:.1} ms pictures",
+                1e3 * shadows,
+                1e3 * pictures
+            ),
+            None => println!("{adapter}"),
+        }
         Ok(())
     }
 }
@@ -269,17 +277,6 @@ fn side_by_side(pictures: &[Vec<Vec3>], size: UVec2, grid: UVec2) -> Result<Pict
     Ok(Picture::from_fn(size.x * grid.x, size.y * grid.y, pixel))
 }
 
-fn parse_offset(text: &str) -> Result<OffsetPolicy, String> {
-    match text {
-        "none" => Ok(OffsetPolicy::None),
-        HALF_CELL => Ok(OffsetPolicy::HalfCell),
-        metres => match metres.parse::<f32>() {
-            Ok(metres) if metres.is_finite() => Ok(OffsetPolicy::Metres(metres)),
-            _ => Err("none, half-cell, or a number of metres".into()),
-        },
-    }
-}
-
 fn parse_views(text: &str) -> Result<UVec2, String> {
     const MOST: u32 = 256;
     if text == "stereo" {
@@ -313,12 +310,5 @@ mod tests {
         let grid = views(&middle, UVec2::splat(2), 1.0);
         assert_eq!(eye(&grid[0]), Vec3::new(-0.5, 0.5, 0.0), "the upper left");
         assert_eq!(views(&middle, UVec2::ONE, 1.0)[0], middle);
-    }
-
-    #[test]
-    fn offsets() {
-        assert_eq!(parse_offset("none"), Ok(OffsetPolicy::None));
-        assert_eq!(parse_offset("0.25"), Ok(OffsetPolicy::Metres(0.25)));
-        assert!(parse_offset("inf").is_err() && parse_offset("half").is_err());
     }
 }
