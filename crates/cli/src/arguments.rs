@@ -166,6 +166,14 @@ impl Materials {
             Self::Lambert => MaterialModel::Lambert,
         }
     }
+
+    /// The same for what an adapter draws.
+    pub(crate) fn drawn(self) -> lumencast_shade::Materials {
+        match self {
+            Self::Full => lumencast_shade::Materials::Full,
+            Self::Lambert => lumencast_shade::Materials::Lambert,
+        }
+    }
 }
 
 impl fmt::Display for Materials {

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use anyhow::{Result, bail};
 use clap::Args;
 use glam::{EulerRot, Quat, UVec2, Vec3};
+use lumencast_gather::path_trace::Options;
 use lumencast_gather::reference::PictureSettings;
 use lumencast_scene::{Scene, View};
 
@@ -33,6 +34,11 @@ pub(crate) struct PictureArguments {
 }
 
 impl PictureArguments {
+    /// How probes of the same picture are traced.
+    pub(crate) fn tracing(&self) -> Options {
+        Options { materials: self.materials.model(), threads: self.threads }
+    }
+
     pub(crate) fn settings(&self) -> PictureSettings {
         PictureSettings {
             size: self.size,

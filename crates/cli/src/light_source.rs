@@ -1,12 +1,17 @@
-//! Light fields from where people have them: files and servers.
+//! Light fields from where people have them, files and servers, or computed on the spot.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use lumencast_codec::LightFile;
+use lumencast_gather::blend::BlendSettings;
+use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::ProbeVolume;
+use lumencast_scene::{Snapshot, VolumeSpec};
+use lumencast_server::GatherOptions;
 
-use crate::remote;
+use crate::{output, remote};
 
 /// Whether it is the address of a server's scene.
 pub(crate) fn is_address(what: &str) -> bool {
@@ -21,4 +26,40 @@ pub(crate) fn volumes(what: &str) -> Result<Vec<ProbeVolume>> {
     let bytes = std::fs::read(Path::new(what)).with_context(|| format!("cannot read {what}"))?;
     let read = || LightFile::read(&bytes)?.volumes();
     read().with_context(|| format!("{what} is no light field"))
+}
+
+/// How a field is computed.
+#[derive(Debug)]
+pub(crate) struct Computed {
+    /// Samples a probe.
+    pub(crate) samples: u32,
+    /// Surface scattering events, seen from a probe.
+    pub(crate) bounces: u32,
+    /// Upper limit of one path vertex's contribution, cd/m².
+    pub(crate) clamp: f32,
+    pub(crate) tracing: Options,
+}
+
+impl Computed {
+    /// The light of volumes, with a bar that shows how far it is.
+    pub(crate) fn volumes(
+        self,
+        scene: &Arc<Snapshot>,
+        volumes: &[VolumeSpec],
+    ) -> Result<Vec<ProbeVolume>> {
+        let mut tracer =
+            CpuPathTracer::new(self.tracing).context("cannot start the threads that trace")?;
+        let gather = GatherOptions {
+            bounces: self.bounces,
+            clamp: self.clamp,
+            blend: BlendSettings::default(),
+        };
+        let bar = output::share_bar("Computing the light field");
+        let progress =
+            |done: f32| bar.set_position((f64::from(done) * output::SHARE_BAR_LENGTH) as u64);
+        let light =
+            lumencast_server::bake(scene, volumes, &mut tracer, self.samples, gather, progress);
+        bar.finish_and_clear();
+        Ok(light?)
+    }
 }

@@ -1,6 +1,7 @@
 //! `lumencast bench`: figures of this machine.
 
 mod paths;
+mod peers;
 mod quality;
 mod rays;
 mod tick;
@@ -15,6 +16,7 @@ pub(crate) enum Bench {
     Rays(rays::BenchRays),
     Paths(paths::BenchPaths),
     Quality(Box<quality::BenchQuality>),
+    Peers(peers::BenchPeers),
 }
 
 impl Bench {
@@ -24,6 +26,7 @@ impl Bench {
             Self::Rays(command) => command.run(),
             Self::Paths(command) => command.run(),
             Self::Quality(command) => command.run(),
+            Self::Peers(command) => command.run(),
         }
     }
 }

@@ -8,21 +8,19 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::Vec3;
-use lumencast_gather::blend::BlendSettings;
-use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::reference::{Film, Parts, PictureSettings};
 use lumencast_light::{LightField, OffsetPolicy, Order};
 use lumencast_picture::{
     Comparison, Loaded, PIXELS_PER_DEGREE, Picture, ToneMap, compare, exposure,
 };
 use lumencast_scene::{Scene, Snapshot, View, VolumeSpec};
-use lumencast_server::GatherOptions;
 use lumencast_shade::{Gpu, Lighting, Renderer, Settings, Shading};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::arguments::{Materials, SceneArguments, parse_offset, parse_positive};
+use crate::arguments::{SceneArguments, parse_offset, parse_positive};
 use crate::camera::{self, PictureArguments};
+use crate::light_source::Computed;
 use crate::output;
 
 /// Measures how near pictures drawn under light fields come to path-traced ones.
@@ -165,10 +163,7 @@ impl BenchQuality {
             size: self.picture.size,
             samples: self.samples,
             shading: Shading::Samples,
-            materials: match self.picture.materials {
-                Materials::Full => lumencast_shade::Materials::Full,
-                Materials::Lambert => lumencast_shade::Materials::Lambert,
-            },
+            materials: self.picture.materials.drawn(),
             offset: self.offset,
             pre_exposure: exposure,
             ..Settings::default()
@@ -218,19 +213,9 @@ impl BenchQuality {
         spec: VolumeSpec,
         bounces: u32,
     ) -> Result<LightField> {
-        let options =
-            Options { materials: self.picture.materials.model(), threads: self.picture.threads };
-        let mut tracer =
-            CpuPathTracer::new(options).context("cannot start the threads that trace")?;
-        let gather = GatherOptions { bounces, clamp: self.clamp, blend: BlendSettings::default() };
-        let bar = output::share_bar("Computing a light field");
-        let samples = self.probe_samples;
-        let volumes =
-            lumencast_server::bake(snapshot, &[spec], &mut tracer, samples, gather, |done| {
-                bar.set_position((f64::from(done) * output::SHARE_BAR_LENGTH) as u64);
-            });
-        bar.finish_and_clear();
-        Ok(LightField::new(volumes?))
+        let (samples, clamp) = (self.probe_samples, self.clamp);
+        let computed = Computed { samples, bounces, clamp, tracing: self.picture.tracing() };
+        Ok(LightField::new(computed.volumes(snapshot, &[spec])?))
     }
 
     fn judge(&self, reference: &Picture, picture: &Picture, exposure: f32) -> Result<Comparison> {

@@ -2,22 +2,19 @@
 
 use std::time::Instant;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use glam::{Affine3A, UVec2, Vec3};
-use lumencast_gather::Gather;
-use lumencast_gather::blend::BlendSettings;
-use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{LightField, OffsetPolicy, ProbeVolume};
 use lumencast_picture::{Picture, exposure};
 use lumencast_scene::{Scene, View};
-use lumencast_server::GatherOptions;
 use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadows, Transparency};
 use serde_json::json;
 
 use super::{Lighting, PartsArgument, Render};
-use crate::arguments::{Materials, parse_offset};
-use crate::{light_source, output};
+use crate::arguments::parse_offset;
+use crate::light_source::{self, Computed};
+use crate::output;
 
 /// Samples a pixel unless told otherwise.
 const SAMPLES: u32 = 8;
@@ -127,10 +124,7 @@ impl Render {
                 Lighting::Indirect => lumencast_shade::Lighting::INDIRECT,
                 Lighting::None => lumencast_shade::Lighting::NONE,
             },
-            materials: match self.picture.materials {
-                Materials::Full => lumencast_shade::Materials::Full,
-                Materials::Lambert => lumencast_shade::Materials::Lambert,
-            },
+            materials: self.picture.materials.drawn(),
             shadows: Shadows {
                 resolution: shadow_resolution,
                 filter_samples: pcf,
@@ -159,29 +153,13 @@ impl Render {
             return Ok(volumes);
         }
         let specs = self.scene.volumes(scene)?;
-        let options = GatherOptions {
+        let computed = Computed {
+            samples: self.raster.probe_samples,
             bounces: self.picture.bounces.saturating_sub(1),
             clamp: self.clamp,
-            blend: BlendSettings::default(),
+            tracing: self.picture.tracing(),
         };
-        let tracing =
-            Options { materials: self.picture.materials.model(), threads: self.picture.threads };
-        let mut gatherer: Box<dyn Gather> =
-            Box::new(CpuPathTracer::new(tracing).context("cannot start the threads that trace")?);
-        let bar = output::share_bar("Computing the light field");
-        let progress =
-            |done: f32| bar.set_position((f64::from(done) * output::SHARE_BAR_LENGTH) as u64);
-        let samples = self.raster.probe_samples;
-        let volumes = lumencast_server::bake(
-            &scene.snapshot(),
-            &specs,
-            &mut *gatherer,
-            samples,
-            options,
-            progress,
-        );
-        bar.finish_and_clear();
-        Ok(volumes?)
+        computed.volumes(&scene.snapshot(), &specs)
     }
 
     fn report_drawn(
