@@ -99,11 +99,11 @@ fn forward_fragment(
     let emission = emission_at(at);
     let tangent_normal = mapped_normal(at);
 
-    let opaque = (material.flags & MATERIAL_LAMBERT) != 0u;
+    let plain = (material.flags & MATERIAL_LAMBERT) != 0u;
     var out: Shaded;
     out.coverage = 0xffffffffu;
     var alpha = 1.0;
-    if !opaque {
+    if !plain {
         if base_color.a < material.cutoff {
             discard;
         }
@@ -139,24 +139,24 @@ fn forward_fragment(
     var radiance = vec3f(0.0);
     let two_sided = (material.flags & MATERIAL_DOUBLE_SIDED) != 0u;
     if (frame.parts & PART_EMISSION) != 0u {
-        if (material.flags & MATERIAL_UNLIT) != 0u && !opaque {
+        if (material.flags & MATERIAL_UNLIT) != 0u && !plain {
             radiance += select(vec3f(0.0), saturate(base_color.rgb), front || two_sided) / frame.pre_exposure;
-        } else if front || (two_sided && !opaque) {
+        } else if front || (two_sided && !plain) {
             radiance += emission;
         }
     }
-    let scatters = opaque || ((material.flags & MATERIAL_UNLIT) == 0u && (front || two_sided));
+    let scatters = plain || ((material.flags & MATERIAL_UNLIT) == 0u && (front || two_sided));
     if scatters {
         let n0 = normalize_or_zero(in.normal);
         var object_normal = n0;
-        if material.normal_map.row1.w > 0.5 && !opaque && dot(in.tangent.xyz, in.tangent.xyz) > 0.0 {
+        if material.normal_map.row1.w > 0.5 && !plain && dot(in.tangent.xyz, in.tangent.xyz) > 0.0 {
             let bitangent = cross(n0, in.tangent.xyz) * sign(in.tangent.w);
             object_normal = tangent_normal.x * in.tangent.xyz + tangent_normal.y * bitangent + tangent_normal.z * n0;
         }
         let shading = transform_vector(instance.normal_from_object, object_normal);
         let n = visible_normal(shading, geometric, v);
         var b = bsdf_of(substance);
-        if opaque {
+        if plain {
             b = lambert(substance.base_color);
         }
         if (frame.parts & PART_DIRECT) != 0u {

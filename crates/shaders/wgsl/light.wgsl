@@ -201,12 +201,12 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
                 found += 1.0;
             }
         }
-        if found == 0.0 {
-            return 1.0;
+        // Where nothing was found the light is seen, or what hides it is too near to have been met.
+        if found > 0.0 {
+            let mean = sum / found;
+            let penumbra = select(light.size * (1.0 - mean) / max(mean, 0.05), light.size * mean, parallel);
+            radius = max(radius, penumbra);
         }
-        let mean = sum / found;
-        let penumbra = select(light.size * (1.0 - mean) / max(mean, 0.05), light.size * mean, parallel);
-        radius = max(radius, penumbra);
     }
 
     var lit = 0.0;
