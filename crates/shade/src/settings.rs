@@ -59,6 +59,9 @@ pub struct Shadows {
     pub memory: u64,
     /// Maps of a directional light, for nearer and farther parts of the view, 1 to 4.
     pub cascades: u32,
+    /// Whether cascades keep their size while the camera turns, so that edges do not shimmer; else
+    /// they fit the view, which is up to twice as sharp.
+    pub steady: bool,
     /// Samples of a shadow's edge (percentage-closer filtering).
     pub filter_samples: u32,
     /// Samples of the search for what casts it, which tells how wide the edge of a light with a size
@@ -74,6 +77,7 @@ impl Default for Shadows {
             resolution: 2048,
             memory: 512 << 20,
             cascades: 4,
+            steady: false,
             filter_samples: 16,
             search_samples: 16,
             filter_radius: 1.0,

@@ -2,13 +2,14 @@
 //!
 //! Spots have one map, or six where their cone is too wide for one; points six, the faces of a cube;
 //! directional lights a cascade of maps (Engel 2006) over parts of the view, each twice to four times
-//! as deep as the one before. A cascade's map covers the sphere around its part and moves by whole
-//! texels, so that edges stand still when the camera moves. It ends before its border by the widest
-//! edge that is filtered there (the second paper's guard band, chapter 4.2.3).
+//! as deep as the one before. A cascade's map covers what of its part lies within the scene; where
+//! cameras move it covers the sphere around it instead and moves by whole texels, so that edges stand
+//! still. It ends before its border by the widest edge that is filtered there (the second paper's
+//! guard band, chapter 4.2.3).
 
 use std::f32::consts::FRAC_PI_2;
 
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Mat4, Vec2, Vec3, Vec4};
 use lumencast_scene::{Aabb, LightKind, PlacedLight};
 use lumencast_shaders::layout;
 
@@ -111,38 +112,48 @@ impl ShadowPlan {
         let light_from_world = Mat4::look_to_rh(Vec3::ZERO, direction, up_for(direction));
         let all = bounds_in(&light_from_world, bounds);
         let depth_range = (all.max.z - all.min.z).max(1e-3) * 1.001;
-        let whole = 0.5 * (all.max - all.min).truncate().max_element().max(1e-3);
         let farthest = cameras.iter().map(|c| farthest(c, bounds)).fold(1e-2, f32::max);
         let nearest = 0.005 * farthest;
         for cascade in 0..cascades {
             let from = if cascade == 0 { 0.0 } else { split(nearest, farthest, cascade, cascades) };
             let to = split(nearest, farthest, cascade + 1, cascades);
-            let (center, radius) = sphere(cameras, from, to);
-            // The map of the whole scene is the largest there has to be.
-            let (center, radius) = if radius < whole {
-                (light_from_world.transform_point3(center), radius)
-            } else {
-                (0.5 * (all.min + all.max), whole)
+            let seen = match settings.steady {
+                true => around_sphere(&light_from_world, cameras, from, to),
+                false => around(&light_from_world, slices(cameras, from, to)),
             };
+            // What lies outside the scene needs no map.
+            let (low, high) = (seen.min.max(all.min), seen.max.min(all.max));
+            let (low, high) = (low.truncate().min(high.truncate()), high.truncate());
+            let middle = 0.5 * (low + high);
             let texels = self.resolution as f32;
-            let search = (size * depth_range).min(WIDEST_SEARCH * 2.0 * radius / texels);
+            let inner = (0.5 * (high - low)).max(Vec2::splat(1e-3));
+            let texel = 2.0 * inner.max_element() / texels;
             // Wider by what edges at the border reach beyond it.
-            let margin = search + (settings.filter_radius + MARGIN) * 2.0 * radius / texels;
-            let half = radius + margin;
+            let search = (size * depth_range).min(WIDEST_SEARCH * texel);
+            let margin = search + (settings.filter_radius + MARGIN) * texel;
+            let half = inner + margin;
             let texel = 2.0 * half / texels;
-            let snapped = (center.truncate() / texel).floor() * texel;
+            let snapped = (middle / texel).floor() * texel;
             // Depth 1 is nearest to the light, which looks along −z.
             let clip_from_light = Mat4::from_cols(
-                Vec4::X / half,
-                Vec4::Y / half,
+                Vec4::X / half.x,
+                Vec4::Y / half.y,
                 Vec4::Z / depth_range,
-                Vec4::new(-snapped.x / half, -snapped.y / half, 1.0 - all.max.z / depth_range, 1.0),
+                Vec4::new(
+                    -snapped.x / half.x,
+                    -snapped.y / half.y,
+                    1.0 - all.max.z / depth_range,
+                    1.0,
+                ),
             );
             self.views.push(layout::ShadowView {
                 clip_from_world: clip_from_light * light_from_world,
-                texel,
+                texel: texel.max_element(),
                 depth_range,
-                reach: if cascade + 1 == cascades { 1.0 } else { 1.0 - margin / half },
+                reach: match cascade + 1 == cascades {
+                    true => 1.0,
+                    false => 1.0 - margin / half.min_element(),
+                },
                 search,
                 ..layout::ShadowView::default()
             });
@@ -230,13 +241,27 @@ fn split(nearest: f32, farthest: f32, i: u32, n: u32) -> f32 {
     even + (logarithmic - even) * LOGARITHMIC
 }
 
-/// A sphere around what cameras see between two distances.
-fn sphere(cameras: &[Camera], from: f32, to: f32) -> (Vec3, f32) {
-    let points: Vec<Vec3> = cameras.iter().flat_map(|c| c.slice(from, to)).collect();
+/// The corners of what cameras see between two distances.
+fn slices(cameras: &[Camera], from: f32, to: f32) -> Vec<Vec3> {
+    cameras.iter().flat_map(|camera| camera.slice(from, to)).collect()
+}
+
+/// The box around points, seen from a light.
+fn around(light_from_world: &Mat4, points: Vec<Vec3>) -> Aabb {
+    let mut bounds = Aabb::EMPTY;
+    points.iter().for_each(|p| bounds.grow(light_from_world.transform_point3(*p)));
+    bounds
+}
+
+/// The box around the sphere around what cameras see: as large whichever way they turn.
+fn around_sphere(light_from_world: &Mat4, cameras: &[Camera], from: f32, to: f32) -> Aabb {
+    let points = slices(cameras, from, to);
     let center = points.iter().sum::<Vec3>() / points.len().max(1) as f32;
     let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f32::max);
-    // Rounded, so that it stays the same while the camera turns.
-    (center, (radius * 16.0).ceil() / 16.0)
+    // Rounded, so that it stays the same while the camera moves.
+    let radius = (radius * 16.0).ceil() / 16.0;
+    let center = light_from_world.transform_point3(center);
+    Aabb { min: center - radius, max: center + radius }
 }
 
 #[cfg(test)]
@@ -270,7 +295,13 @@ mod tests {
     #[test]
     fn cascades_see_what_the_camera_sees() {
         let angle = 0.01;
-        let plan = plan(&[placed(LightKind::Directional { angle }, 1.0)], &Shadows::default());
+        for steady in [false, true] {
+            cascades_see(angle, &Shadows { steady, ..Shadows::default() });
+        }
+    }
+
+    fn cascades_see(angle: f32, settings: &Shadows) {
+        let plan = plan(&[placed(LightKind::Directional { angle }, 1.0)], settings);
         assert_eq!(plan.lights, [(0, 4)]);
         let view = View::look_at(Vec3::new(0.0, 1.0, 8.0), Vec3::ZERO, 0.9).unwrap();
         let camera = Camera::new(&view, UVec2::new(160, 90), Vec2::ZERO);

@@ -14,7 +14,7 @@ use lumencast_picture::{
     Comparison, Loaded, PIXELS_PER_DEGREE, Picture, ToneMap, compare, exposure,
 };
 use lumencast_scene::{Scene, Snapshot, View, VolumeSpec};
-use lumencast_shade::{Gpu, Lighting, Renderer, Settings, Shading};
+use lumencast_shade::{Gpu, Lighting, Renderer, Settings, Shading, Shadows};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -22,6 +22,9 @@ use crate::arguments::{SceneArguments, parse_offset, parse_positive};
 use crate::camera::{self, PictureArguments};
 use crate::light_source::Computed;
 use crate::output;
+
+/// Texels along the side of a shadow map.
+const SHADOW_RESOLUTION: u32 = 4096;
 
 /// Measures how near pictures drawn under light fields come to path-traced ones.
 #[derive(Debug, Args)]
@@ -164,6 +167,7 @@ impl BenchQuality {
             samples: self.samples,
             shading: Shading::Samples,
             materials: self.picture.materials.drawn(),
+            shadows: Shadows { resolution: SHADOW_RESOLUTION, ..Shadows::default() },
             offset: self.offset,
             pre_exposure: exposure,
             ..Settings::default()

@@ -42,7 +42,7 @@ pub(crate) struct RasterArguments {
     #[arg(long, value_enum, default_value_t = ShadingArgument::Samples)]
     shading: ShadingArgument,
     /// Texels along the side of a shadow map; 0 draws no shadows.
-    #[arg(long, value_name = "N", default_value_t = 2048,
+    #[arg(long, value_name = "N", default_value_t = 4096,
           value_parser = clap::value_parser!(u32).range(0..=16_384))]
     shadow_resolution: u32,
     /// Samples of a shadow's edge.
