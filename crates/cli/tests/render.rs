@@ -183,7 +183,7 @@ fn a_clients_picture_is_near_the_reference() {
         let picture = Loaded::read(at(name)).expect("a picture");
         compare(&reference, &picture, None, 67.0).expect("of one size").psnr
     };
-    assert!(psnr("field.exr") > 28.0, "{}", psnr("field.exr"));
+    assert!(psnr("field.exr") > 26.0, "{}", psnr("field.exr"));
     assert!(psnr("direct.exr") < 20.0, "without indirect light it is noticed");
     assert!(linear(&at("indirect.exr")).pixels().iter().any(|p| p.x > 0.1));
 
