@@ -95,11 +95,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// Triangles of one mesh.
+type Triangles = Vec<[Vec3; 3]>;
+
 /// The scene's meshes, once each (deformed ones once an instance), and where they stand.
 fn levels(
     snapshot: &Snapshot,
     triangles: &[[Vec3; 3]],
-) -> (Vec<Vec<[Vec3; 3]>>, Vec<(usize, Affine3A)>) {
+) -> (Vec<Triangles>, Vec<(usize, Affine3A)>) {
     let (mut meshes, mut known, mut placed) = (Vec::new(), HashMap::new(), Vec::new());
     let mut rest = triangles;
     for instance in &snapshot.instances {
