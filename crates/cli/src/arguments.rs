@@ -274,7 +274,6 @@ where
     numbers.try_into().map_err(|n: Vec<T>| anyhow!("3 numbers are needed, not {}", n.len()))
 }
 
-/// `1` to `4`
 /// How far in front of a surface a field is read.
 pub(crate) fn parse_offset(text: &str) -> Result<OffsetPolicy, String> {
     match text {
@@ -287,6 +286,7 @@ pub(crate) fn parse_offset(text: &str) -> Result<OffsetPolicy, String> {
     }
 }
 
+/// `1` to `4`
 pub(crate) fn parse_order(text: &str) -> Result<Order, String> {
     let band: u8 = text.parse().map_err(|e| format!("{e}"))?;
     Order::try_from(band)

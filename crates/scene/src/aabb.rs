@@ -1,4 +1,4 @@
-use glam::Vec3;
+use glam::{BVec3, Vec3};
 
 /// An axis-aligned box, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,6 +16,21 @@ impl Aabb {
     /// Whether nothing is in it.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
+    }
+
+    /// Its eight corners; of an empty box, points that are not finite.
+    pub fn corners(&self) -> impl Iterator<Item = Vec3> + '_ {
+        (0..8).map(|i| {
+            let far = BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0);
+            Vec3::select(far, self.max, self.min)
+        })
+    }
+
+    /// The box around what a transform makes of this one.
+    pub fn transformed(&self, transform: impl Fn(Vec3) -> Vec3) -> Self {
+        let mut result = Self::EMPTY;
+        self.corners().for_each(|corner| result.grow(transform(corner)));
+        result
     }
 
     /// Takes a point in; points that are not finite are left out.

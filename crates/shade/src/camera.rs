@@ -98,8 +98,7 @@ impl Camera {
 pub(crate) struct Frustum([Vec4; 5]);
 
 impl Frustum {
-    /// Of Gribb and Hartmann (2001). What lies before the near plane is drawn all the same where
-    /// `clamped`: depth does not matter then.
+    /// Of Gribb and Hartmann (2001); nothing is too far.
     pub(crate) fn new(clip_from_world: &Mat4) -> Self {
         let [x, y, z, w] = [0, 1, 2, 3].map(|i| clip_from_world.row(i));
         Self([w + x, w - x, w + y, w - y, w - z])

@@ -11,12 +11,13 @@ use lumencast_light::{
 use lumencast_shaders::layout;
 
 use crate::ShadeError;
+use crate::bindings::{self, FILTERED, SAMPLER, STORAGE, UNIFORM, entry};
 use crate::gpu::Gpu;
 
 /// Group 2 of the shaders.
 #[derive(Debug)]
 pub(crate) struct GpuField {
-    layout: wgpu::BindGroupLayout,
+    pub(crate) layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
     pub(crate) group: wgpu::BindGroup,
     /// What the texture was made for.
@@ -27,29 +28,14 @@ pub(crate) struct GpuField {
 }
 
 /// The bindings of group 2.
-pub(crate) fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::FRAGMENT,
-        ty,
-        count: None,
-    };
-    let buffer =
-        |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("field"),
         entries: &[
-            entry(0, buffer(wgpu::BufferBindingType::Uniform)),
-            entry(1, buffer(wgpu::BufferBindingType::Storage { read_only: true })),
-            entry(
-                2,
-                wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                    view_dimension: wgpu::TextureViewDimension::D3,
-                    multisampled: false,
-                },
-            ),
-            entry(3, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+            entry(0, UNIFORM),
+            entry(1, STORAGE),
+            entry(2, bindings::texture(FILTERED, wgpu::TextureViewDimension::D3)),
+            entry(3, SAMPLER),
         ],
     })
 }

@@ -14,6 +14,7 @@
 
 #![forbid(unsafe_code)]
 
+mod bindings;
 mod camera;
 mod environment_brdf;
 mod error;

@@ -7,6 +7,7 @@ use half::f16;
 use lumencast_scene::{Environment, HdrImage, Light, LightKind, PlacedLight, Snapshot};
 use lumencast_shaders::layout;
 
+use crate::bindings::{FILTERED, SAMPLER, STORAGE, UNIFORM, entry, texture};
 use crate::environment_brdf::environment_brdf;
 use crate::gpu::{DEPTH, Gpu};
 use crate::shadows::ShadowPlan;
@@ -17,7 +18,7 @@ const TABLE: usize = 32;
 /// What lights a frame.
 #[derive(Debug)]
 pub(crate) struct GpuLights {
-    layout: wgpu::BindGroupLayout,
+    pub(crate) layout: wgpu::BindGroupLayout,
     comparison: wgpu::Sampler,
     linear: wgpu::Sampler,
     table: wgpu::TextureView,
@@ -26,36 +27,23 @@ pub(crate) struct GpuLights {
 }
 
 /// The bindings of group 1.
-pub(crate) fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::FRAGMENT,
-        ty,
-        count: None,
-    };
-    let buffer =
-        |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
-    let texture = |sample_type, view_dimension| wgpu::BindingType::Texture {
-        sample_type,
-        view_dimension,
-        multisampled: false,
-    };
+fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let plane = wgpu::TextureViewDimension::D2;
-    let uniform = wgpu::BufferBindingType::Uniform;
-    let storage = wgpu::BufferBindingType::Storage { read_only: true };
-    let float = |filterable| wgpu::TextureSampleType::Float { filterable };
+    let exact = wgpu::TextureSampleType::Float { filterable: false };
+    let depth = wgpu::TextureSampleType::Depth;
+    let comparison = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("light"),
         entries: &[
-            entry(0, buffer(uniform)),
-            entry(1, buffer(uniform)),
-            entry(2, texture(float(false), plane)),
-            entry(3, buffer(storage)),
-            entry(4, buffer(storage)),
-            entry(5, texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2Array)),
-            entry(6, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison)),
-            entry(7, texture(float(true), plane)),
-            entry(8, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+            entry(0, UNIFORM),
+            entry(1, UNIFORM),
+            entry(2, texture(exact, plane)),
+            entry(3, STORAGE),
+            entry(4, STORAGE),
+            entry(5, texture(depth, wgpu::TextureViewDimension::D2Array)),
+            entry(6, comparison),
+            entry(7, texture(FILTERED, plane)),
+            entry(8, SAMPLER),
         ],
     })
 }

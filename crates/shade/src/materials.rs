@@ -4,6 +4,7 @@ use glam::{Affine2, Vec4};
 use lumencast_scene::{AlphaMode, Material, TextureRef};
 use lumencast_shaders::layout::{self, material};
 
+use crate::bindings::{FILTERED, SAMPLER, UNIFORM, entry, texture};
 use crate::gpu::Gpu;
 use crate::settings::Materials;
 use crate::textures::{Coding, Textures};
@@ -31,24 +32,11 @@ const MAPS: usize = 7;
 
 /// The bindings of group 3: numbers, then a texture and a sampler for each map.
 pub(crate) fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let fragment = wgpu::ShaderStages::FRAGMENT;
-    let entry =
-        |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: fragment, ty, count: None };
-    let numbers = wgpu::BindingType::Buffer {
-        ty: wgpu::BufferBindingType::Uniform,
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    };
-    let texture = wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Float { filterable: true },
-        view_dimension: wgpu::TextureViewDimension::D2,
-        multisampled: false,
-    };
-    let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-    let mut entries = vec![entry(0, numbers)];
+    let map_texture = texture(FILTERED, wgpu::TextureViewDimension::D2);
+    let mut entries = vec![entry(0, UNIFORM)];
     for map in 0..MAPS as u32 {
-        entries.push(entry(2 * map + 1, texture));
-        entries.push(entry(2 * map + 2, sampler));
+        entries.push(entry(2 * map + 1, map_texture));
+        entries.push(entry(2 * map + 2, SAMPLER));
     }
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("material"),

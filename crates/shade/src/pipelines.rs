@@ -5,7 +5,7 @@ use lumencast_shaders::{Shading, background, depth, forward};
 use crate::gpu::{COLOR, DEPTH};
 use crate::materials::Surface;
 use crate::settings::Transparency;
-use crate::{field, geometry, lights, materials};
+use crate::{geometry, materials};
 
 /// What pipelines depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,10 +56,13 @@ fn pass_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 }
 
 impl Layouts {
-    pub(crate) fn new(device: &wgpu::Device) -> Self {
+    /// `light` and `field`: the bindings of groups 1 and 2.
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        light: &wgpu::BindGroupLayout,
+        field: &wgpu::BindGroupLayout,
+    ) -> Self {
         let pass = pass_layout(device);
-        let light = lights::group_layout(device);
-        let field = field::group_layout(device);
         let material = materials::group_layout(device);
         let layout = |label, groups: &[Option<&wgpu::BindGroupLayout>]| {
             device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -68,9 +71,8 @@ impl Layouts {
                 immediate_size: 0,
             })
         };
-        let forward =
-            layout("forward", &[Some(&pass), Some(&light), Some(&field), Some(&material)]);
-        let background = layout("background", &[Some(&pass), Some(&light)]);
+        let forward = layout("forward", &[Some(&pass), Some(light), Some(field), Some(&material)]);
+        let background = layout("background", &[Some(&pass), Some(light)]);
         let module = shader(device, "depth", depth());
         let solid = layout("depth", &[Some(&pass)]);
         let masked = layout("masked depth", &[Some(&pass), None, None, Some(&material)]);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
-use lumencast_light::LightField;
+use lumencast_light::{LightField, OffsetPolicy};
 use lumencast_scene::{Snapshot, View};
 use lumencast_shaders::layout;
 
@@ -27,7 +27,7 @@ const GOLDEN: f32 = 0.618_034;
 /// Draws pictures of a scene under the light of a field.
 ///
 /// ```no_run
-/// use lumencast_light::LightField;
+/// use lumencast_light::{LightField, OffsetPolicy};
 /// use lumencast_scene::Scene;
 /// use lumencast_shade::{Gpu, Renderer, Settings};
 ///
@@ -35,7 +35,7 @@ const GOLDEN: f32 = 0.618_034;
 /// let settings = Settings::default();
 /// let mut renderer = Renderer::new(Gpu::new()?, &settings);
 /// renderer.set_scene(&scene.snapshot());
-/// renderer.set_light(&LightField::default(), settings.offset)?;
+/// renderer.set_light(&LightField::default(), OffsetPolicy::HalfCell)?;
 /// let view = scene.cameras()[0].view();
 /// let pictures = renderer.pictures(&[view], &settings)?;
 /// assert_eq!(pictures[0].len(), 1280 * 720);
@@ -112,12 +112,12 @@ impl Passes {
 impl Renderer {
     /// With an empty scene and no light; of the settings only what holds for textures counts.
     pub fn new(gpu: Gpu, settings: &Settings) -> Self {
-        let layouts = Layouts::new(&gpu.device);
+        let (lights, field) = (GpuLights::new(&gpu), GpuField::new(&gpu));
         Self {
+            layouts: Layouts::new(&gpu.device, &lights.layout, &field.layout),
             scene: GpuScene::new(&gpu, settings.anisotropy),
-            lights: GpuLights::new(&gpu),
-            field: GpuField::new(&gpu),
-            layouts,
+            lights,
+            field,
             gpu,
             pipelines: None,
             target: None,
@@ -138,14 +138,14 @@ impl Renderer {
         self.wanted = Some(snapshot.clone());
     }
 
-    /// Takes indirect light from this field from now on.
+    /// Takes indirect light from this field from now on, read so far in front of surfaces.
     ///
     /// # Errors
     /// Where it does not fit the device's textures.
     pub fn set_light(
         &mut self,
         light: &LightField,
-        offset: lumencast_light::OffsetPolicy,
+        offset: OffsetPolicy,
     ) -> Result<(), ShadeError> {
         self.field.update(&self.gpu, light, offset)
     }

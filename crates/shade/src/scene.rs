@@ -72,8 +72,7 @@ impl GpuScene {
         model: Materials,
     ) {
         self.update_materials(gpu, material_layout, &snapshot.materials, model);
-        let placed: Vec<layout::Instance> =
-            snapshot.instances.iter().zip(0..).map(|(i, number)| placed(i, number)).collect();
+        let placed: Vec<layout::Instance> = snapshot.instances.iter().map(placed).collect();
         self.instances = instance_buffer(gpu, &placed);
         self.draws.clear();
         let mut rigid: HashMap<(usize, usize), usize> = HashMap::new();
@@ -95,7 +94,8 @@ impl GpuScene {
                 if part.index_count == 0 {
                     continue;
                 }
-                let bounds = in_world(&part.bounds, &instance.world_from_object);
+                let place = |corner| instance.world_from_object.transform_point3(corner);
+                let bounds = part.bounds.transformed(place);
                 let key = (Arc::as_ptr(&instance.mesh).addr(), primitive);
                 let known = if own.is_none() { rigid.get(&key).copied() } else { None };
                 let draw = known.unwrap_or_else(|| {
@@ -199,30 +199,17 @@ fn instance_buffer(gpu: &Gpu, placed: &[layout::Instance]) -> wgpu::Buffer {
     gpu.buffer("instances", wgpu::BufferUsages::STORAGE, bytemuck::cast_slice(placed), least)
 }
 
-fn placed(instance: &Instance, number: u32) -> layout::Instance {
+fn placed(instance: &Instance) -> layout::Instance {
     let to = &instance.world_from_object;
     let normal = Affine3A::from_mat3(to.inverse().matrix3.transpose().into());
     layout::Instance {
         world_from_object: layout::rows(to),
         normal_from_object: layout::rows(&normal),
         mirrors: u32::from(to.matrix3.determinant() < 0.0),
-        number,
-        _pad: [0; 2],
+        ..layout::Instance::default()
     }
 }
 
 fn deform(gpu: &Gpu, parts: &[Part], vertices: &[Vertices]) -> Vec<Part> {
     parts.iter().zip(vertices).map(|(part, vertices)| part.deformed(gpu, vertices)).collect()
-}
-
-fn in_world(bounds: &Aabb, to: &Affine3A) -> Aabb {
-    let mut result = Aabb::EMPTY;
-    if bounds.is_empty() {
-        return result;
-    }
-    for i in 0..8 {
-        let side = glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0);
-        result.grow(to.transform_point3(Vec3::select(side, bounds.max, bounds.min)));
-    }
-    result
 }

@@ -1,7 +1,6 @@
 //! How a picture is drawn.
 
 use glam::UVec2;
-use lumencast_light::OffsetPolicy;
 pub use lumencast_shaders::Shading;
 
 /// Which light is drawn. Direct, indirect and emission add up to the whole picture.
@@ -103,8 +102,6 @@ pub struct Settings {
     pub shadows: Shadows,
     /// Blended surfaces.
     pub transparency: Transparency,
-    /// Where in front of a surface the field is read.
-    pub offset: OffsetPolicy,
     /// Multiplies all light before it is stored in half floats; pictures come back divided by it.
     /// Best where it makes the brightest that matters about 1.
     pub pre_exposure: f32,
@@ -123,7 +120,6 @@ impl Default for Settings {
             materials: Materials::Full,
             shadows: Shadows::default(),
             transparency: Transparency::Coverage,
-            offset: OffsetPolicy::HalfCell,
             pre_exposure: 1.0,
             anisotropy: 8,
         }

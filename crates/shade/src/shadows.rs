@@ -110,7 +110,7 @@ impl ShadowPlan {
         cascades: u32,
     ) {
         let light_from_world = Mat4::look_to_rh(Vec3::ZERO, direction, up_for(direction));
-        let all = bounds_in(&light_from_world, bounds);
+        let all = bounds.transformed(|corner| light_from_world.transform_point3(corner));
         let depth_range = (all.max.z - all.min.z).max(1e-3) * 1.001;
         let farthest = cameras.iter().map(|c| farthest(c, bounds)).fold(1e-2, f32::max);
         let nearest = 0.005 * farthest;
@@ -215,22 +215,9 @@ fn up_for(direction: Vec3) -> Vec3 {
     if direction.y.abs() > 0.99 { Vec3::Z } else { Vec3::Y }
 }
 
-fn corners(bounds: &Aabb) -> impl Iterator<Item = Vec3> + '_ {
-    (0..8).map(|i| {
-        let side = |bit: u32| i & bit != 0;
-        Vec3::select(glam::BVec3::new(side(1), side(2), side(4)), bounds.max, bounds.min)
-    })
-}
-
-fn bounds_in(to: &Mat4, bounds: &Aabb) -> Aabb {
-    let mut result = Aabb::EMPTY;
-    corners(bounds).for_each(|corner| result.grow(to.transform_point3(corner)));
-    result
-}
-
 /// How far along its axis a camera sees anything.
 fn farthest(camera: &Camera, bounds: &Aabb) -> f32 {
-    corners(bounds).map(|c| (c - camera.eye).dot(camera.forward)).fold(0.0, f32::max)
+    bounds.corners().map(|c| (c - camera.eye).dot(camera.forward)).fold(0.0, f32::max)
 }
 
 /// Where part `i` of `n` of the view begins, metres.

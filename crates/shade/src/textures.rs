@@ -6,7 +6,8 @@
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock};
 
-use glam::{UVec2, Vec4};
+use glam::{UVec2, Vec3, Vec4};
+use lumencast_picture::{linear_from_srgb, srgb_from_linear};
 use lumencast_scene::{Filter, Image, TextureRef, Wrap};
 use rayon::prelude::*;
 
@@ -127,12 +128,9 @@ fn halved(texels: &[[u8; 4]], size: UVec2, coding: Coding) -> (Vec<[u8; 4]>, UVe
     ((0..half.y).into_par_iter().flat_map_iter(row).collect(), half)
 }
 
-/// sRGB codes to linear, IEC 61966-2-1.
+/// What each code of sRGB stands for.
 static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|code| {
-        let c = code as f32 / 255.0;
-        if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-    })
+    std::array::from_fn(|code| linear_from_srgb(Vec3::splat(code as f32 / 255.0)).x)
 });
 
 fn linear([r, g, b, a]: [u8; 4], coding: Coding) -> Vec4 {
@@ -149,12 +147,7 @@ fn linear([r, g, b, a]: [u8; 4], coding: Coding) -> Vec4 {
 fn coded(linear: Vec4, coding: Coding) -> [u8; 4] {
     let code = match coding {
         Coding::Linear => linear,
-        Coding::Srgb => {
-            let of = |v: f32| {
-                if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
-            };
-            Vec4::new(of(linear.x), of(linear.y), of(linear.z), linear.w)
-        }
+        Coding::Srgb => srgb_from_linear(linear.truncate()).extend(linear.w),
     };
     (code * 255.0 + 0.5).to_array().map(|v| v as u8)
 }

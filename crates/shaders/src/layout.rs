@@ -35,8 +35,9 @@ pub struct Instance {
     pub world_from_object: Rows,
     pub normal_from_object: Rows,
     pub mirrors: u32,
-    pub number: u32,
-    pub _pad: [u32; 2],
+    pub _pad0: u32,
+    pub _pad1: u32,
+    pub _pad2: u32,
 }
 
 /// What holds for all of a frame's passes. Group 1, binding 0.

@@ -63,7 +63,7 @@ fn layouts_agree() {
     let modules = [compiled("forward", &forward(Shading::Pixels))];
     let m = &modules;
     same!(m, View { clip_from_world, world_from_clip, eye, perspective, forward, turn });
-    same!(m, Instance { world_from_object, normal_from_object, mirrors, number, _pad });
+    same!(m, Instance { world_from_object, normal_from_object, mirrors, _pad0, _pad1, _pad2 });
     same!(
         m,
         Frame {

@@ -76,6 +76,23 @@ fn weighed(t0: vec4f, t1: vec4f, t2: vec4f, w: vec4f) -> vec3f {
     return t0.xyz * w.x + vec3f(t0.w, t1.xy) * w.y + vec3f(t1.zw, t2.x) * w.z + t2.yzw * w.w;
 }
 
+// Adds group `number` of four coefficients, weighed for both lobes.
+fn add_group(light: ptr<function, TwoLobes>, first: vec3f, step: vec3f, number: f32, a: vec4f, b: vec4f) {
+    let at = first + 3.0 * number * step;
+    let t0 = textureSampleLevel(atlas, atlas_sampler, at, 0.0);
+    let t1 = textureSampleLevel(atlas, atlas_sampler, at + step, 0.0);
+    let t2 = textureSampleLevel(atlas, atlas_sampler, at + 2.0 * step, 0.0);
+    (*light).a += weighed(t0, t1, t2, a);
+    (*light).b += weighed(t0, t1, t2, b);
+}
+
+// Adds the last coefficient of an even order, which has a group to itself.
+fn add_last(light: ptr<function, TwoLobes>, first: vec3f, step: vec3f, number: f32, a: f32, b: f32) {
+    let t = textureSampleLevel(atlas, atlas_sampler, first + 3.0 * number * step, 0.0);
+    (*light).a += t.xyz * a;
+    (*light).b += t.xyz * b;
+}
+
 // What two lobes see from a cell of a volume. A texel is read once for both, and what it brings is
 // added at once: no probe's coefficients are ever held together, so that order 4 needs no more
 // registers than order 1.
@@ -84,52 +101,23 @@ fn volume_light(v: Volume, cell: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
     let first = (v.origin + cell + vec3f(0.5, 0.5, 1.5)) * texel;
     let step = vec3f(0.0, 0.0, (v.resolution.z + 2.0) * texel.z);
     var light: TwoLobes;
-
-    var t0 = textureSampleLevel(atlas, atlas_sampler, first, 0.0);
-    var t1 = textureSampleLevel(atlas, atlas_sampler, first + step, 0.0);
-    var t2 = textureSampleLevel(atlas, atlas_sampler, first + 2.0 * step, 0.0);
-    light.a = weighed(t0, t1, t2, a.g0);
-    light.b = weighed(t0, t1, t2, b.g0);
+    add_group(&light, first, step, 0.0, a.g0, b.g0);
     if v.texels > 3u {
-        t0 = textureSampleLevel(atlas, atlas_sampler, first + 3.0 * step, 0.0);
-        t1 = textureSampleLevel(atlas, atlas_sampler, first + 4.0 * step, 0.0);
-        t2 = textureSampleLevel(atlas, atlas_sampler, first + 5.0 * step, 0.0);
-        light.a += weighed(t0, t1, t2, a.g1);
-        light.b += weighed(t0, t1, t2, b.g1);
-        t0 = textureSampleLevel(atlas, atlas_sampler, first + 6.0 * step, 0.0);
-        if v.texels == 7u {
-            light.a += t0.xyz * a.g2.x;
-            light.b += t0.xyz * b.g2.x;
-        } else {
-            t1 = textureSampleLevel(atlas, atlas_sampler, first + 7.0 * step, 0.0);
-            t2 = textureSampleLevel(atlas, atlas_sampler, first + 8.0 * step, 0.0);
-            light.a += weighed(t0, t1, t2, a.g2);
-            light.b += weighed(t0, t1, t2, b.g2);
-            t0 = textureSampleLevel(atlas, atlas_sampler, first + 9.0 * step, 0.0);
-            t1 = textureSampleLevel(atlas, atlas_sampler, first + 10.0 * step, 0.0);
-            t2 = textureSampleLevel(atlas, atlas_sampler, first + 11.0 * step, 0.0);
-            light.a += weighed(t0, t1, t2, a.g3);
-            light.b += weighed(t0, t1, t2, b.g3);
-        }
-        if v.texels > 12u {
-            t0 = textureSampleLevel(atlas, atlas_sampler, first + 12.0 * step, 0.0);
-            t1 = textureSampleLevel(atlas, atlas_sampler, first + 13.0 * step, 0.0);
-            t2 = textureSampleLevel(atlas, atlas_sampler, first + 14.0 * step, 0.0);
-            light.a += weighed(t0, t1, t2, a.g4);
-            light.b += weighed(t0, t1, t2, b.g4);
-            t0 = textureSampleLevel(atlas, atlas_sampler, first + 15.0 * step, 0.0);
-            t1 = textureSampleLevel(atlas, atlas_sampler, first + 16.0 * step, 0.0);
-            t2 = textureSampleLevel(atlas, atlas_sampler, first + 17.0 * step, 0.0);
-            light.a += weighed(t0, t1, t2, a.g5);
-            light.b += weighed(t0, t1, t2, b.g5);
-            t0 = textureSampleLevel(atlas, atlas_sampler, first + 18.0 * step, 0.0);
-            light.a += t0.xyz * a.g6;
-            light.b += t0.xyz * b.g6;
-        }
+        add_group(&light, first, step, 1.0, a.g1, b.g1);
     }
-    light.a *= v.scale;
-    light.b *= v.scale;
-    return light;
+    if v.texels == 7u {
+        add_last(&light, first, step, 2.0, a.g2.x, b.g2.x);
+    }
+    if v.texels > 7u {
+        add_group(&light, first, step, 2.0, a.g2, b.g2);
+        add_group(&light, first, step, 3.0, a.g3, b.g3);
+    }
+    if v.texels > 12u {
+        add_group(&light, first, step, 4.0, a.g4, b.g4);
+        add_group(&light, first, step, 5.0, a.g5, b.g5);
+        add_last(&light, first, step, 6.0, a.g6, b.g6);
+    }
+    return TwoLobes(light.a * v.scale, light.b * v.scale);
 }
 
 // What two lobes see at a point of a surface (LightField::sample): the finest volume counts, passing

@@ -17,8 +17,9 @@ struct Instance {
     normal_from_object: array<vec4f, 3>,
     // 1 where the transform mirrors, so that windings are turned about.
     mirrors: u32,
-    number: u32,
-    _pad: vec2u,
+    _pad0: u32,
+    _pad1: u32,
+    _pad2: u32,
 }
 
 @group(0) @binding(0) var<uniform> view: View;

@@ -8,6 +8,9 @@ mod tick;
 
 use anyhow::Result;
 use clap::Subcommand;
+use lumencast_picture::Picture;
+use lumencast_scene::{View, VolumeSpec};
+use lumencast_shade::{Lighting, Renderer, Settings};
 
 /// Measures what this machine does.
 #[derive(Debug, Subcommand)]
@@ -29,6 +32,24 @@ impl Bench {
             Self::Peers(command) => command.run(),
         }
     }
+}
+
+/// What an adapter draws of a part of the light.
+fn draw(
+    renderer: &mut Renderer,
+    view: View,
+    settings: &Settings,
+    lighting: Lighting,
+) -> Result<Picture> {
+    let settings = Settings { lighting, ..*settings };
+    let pixels = renderer.pictures(&[view], &settings)?.remove(0);
+    Ok(Picture::new(settings.size.x, settings.size.y, pixels)?)
+}
+
+/// A volume's cells as they are given on the command line.
+fn cells(spec: &VolumeSpec) -> String {
+    let [x, y, z] = spec.grid.resolution.to_array();
+    format!("{x}x{y}x{z}")
 }
 
 /// The value below which the share `q` of sorted values lies.

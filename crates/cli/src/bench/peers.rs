@@ -9,12 +9,13 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use glam::{UVec2, Vec3};
 use lumencast_gather::path_trace::{MaterialModel, Options};
-use lumencast_light::{LightField, OffsetPolicy, Order};
+use lumencast_light::{LightField, OffsetPolicy};
 use lumencast_picture::{Loaded, Pair, Picture, gamma_code, psnr};
 use lumencast_scene::{Environment, Material, Scene, Snapshot, View, VolumeSpec};
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading};
 use serde_json::{Value, json};
 
+use super::{cells, draw};
 use crate::arguments::{SceneArguments, parse_offset};
 use crate::camera;
 use crate::light_source::Computed;
@@ -34,13 +35,13 @@ const REFERENCE: [(&str, &str); 2] = [("--spp", "1024"), ("--bounces", "4")];
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  lumencast bench peers CornellBoxPoint.glb --volume 8x8x8 --tools ../shared/tools/mitsuba --python VENV/bin/python
+  lumencast bench peers CornellBoxPoint.glb --volume 8x8x8 --reference box.exr --tools ../shared/tools/mitsuba --python VENV/bin/python
   lumencast bench peers Sponza.glb --volume 10x6x7 --reference sponza-mitsuba.exr
 
 The reference is a picture by Mitsuba 3 of 1024 samples a pixel and 4 bounces, of the first camera;
 --tools and --python make it where --reference is not there yet. Probes have 3 bounces and 64 × 512
-samples unless told otherwise. PSNR is of codes v^(1/2.2) clamped to 0 to 1 at exposure 1, over pixels that show nothing but
-surfaces; in brackets after a filter of 4×4 pixels.")]
+samples unless told otherwise. PSNR is of codes v^(1/2.2) clamped to 0 to 1 at exposure 1, over pixels
+that show nothing but surfaces; in brackets after a filter of 4×4 pixels.")]
 pub(crate) struct BenchPeers {
     #[command(flatten)]
     scene: SceneArguments,
@@ -85,19 +86,18 @@ impl BenchPeers {
             samples: 64,
             shading: Shading::Samples,
             materials: Materials::Lambert,
-            offset: self.offset,
             ..Settings::default()
         };
         let mut renderer = Renderer::new(Gpu::new()?, &settings);
         let covered = covered(&mut renderer, &snapshot, view, &settings)?;
         renderer.set_scene(&snapshot);
-        let direct = self.draw(&mut renderer, view, &settings, Lighting::DIRECT)?;
+        let direct = draw(&mut renderer, view, &settings, Lighting::DIRECT)?;
 
         let mut rows = Vec::new();
         for grid in &grids {
             let light = self.light(&snapshot, *grid)?;
             renderer.set_light(&light, self.offset)?;
-            let picture = self.draw(&mut renderer, view, &settings, Lighting::FIELD)?;
+            let picture = draw(&mut renderer, view, &settings, Lighting::FIELD)?;
             rows.push((*grid, judge(&reference, &picture, &covered)?));
         }
         let without = judge(&reference, &direct, &covered)?;
@@ -110,17 +110,6 @@ impl BenchPeers {
         }
         println!("without indirect light: {:.1} ({:.1}) dB", without[0], without[1]);
         Ok(())
-    }
-
-    fn draw(
-        &self,
-        renderer: &mut Renderer,
-        view: View,
-        settings: &Settings,
-        lighting: Lighting,
-    ) -> Result<Picture> {
-        let pixels = renderer.pictures(&[view], &Settings { lighting, ..*settings })?.remove(0);
-        Ok(Picture::new(SIZE.x, SIZE.y, pixels)?)
     }
 
     fn light(&self, snapshot: &Arc<Snapshot>, grid: VolumeSpec) -> Result<LightField> {
@@ -182,9 +171,8 @@ fn covered(
         ..snapshot.clone()
     };
     renderer.set_scene(&Arc::new(silhouette));
-    let settings = Settings { lighting: Lighting::NONE, ..*settings };
-    let pixels = renderer.pictures(&[view], &settings)?.remove(0);
-    Ok(pixels.into_iter().map(|p| p == Vec3::ZERO).collect())
+    let picture = draw(renderer, view, settings, Lighting::NONE)?;
+    Ok(picture.pixels().iter().map(|p| *p == Vec3::ZERO).collect())
 }
 
 /// PSNR, and the same of filtered pictures, over covered pixels.
@@ -224,11 +212,6 @@ fn filtered(picture: &Picture, covered: &[bool]) -> Vec<Vec3> {
     (0..blocks.element_product()).filter_map(block).collect()
 }
 
-fn cells(spec: &VolumeSpec) -> String {
-    let [x, y, z] = spec.grid.resolution.to_array();
-    format!("{x}x{y}x{z}")
-}
-
 fn report(
     scene: &Scene,
     rows: &[(VolumeSpec, [f64; 2])],
@@ -238,9 +221,8 @@ fn report(
     let fields: Vec<Value> = rows
         .iter()
         .map(|(grid, [sharp, filtered])| {
-            let order: Order = grid.order;
             json!({
-                "grid": cells(grid), "order": order, "psnr": sharp, "psnr_filtered": filtered,
+                "grid": cells(grid), "order": grid.order, "psnr": sharp, "psnr_filtered": filtered,
             })
         })
         .collect();

@@ -18,10 +18,11 @@ use lumencast_shade::{Gpu, Lighting, Renderer, Settings, Shading, Shadows};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use super::{cells, draw};
 use crate::arguments::{SceneArguments, parse_offset, parse_positive};
 use crate::camera::{self, PictureArguments};
 use crate::light_source::Computed;
-use crate::output;
+use crate::{fingerprint, output};
 
 /// Texels along the side of a shadow map.
 const SHADOW_RESOLUTION: u32 = 4096;
@@ -123,7 +124,7 @@ impl BenchQuality {
         let settings = self.settings(exposure);
         let mut renderer = Renderer::new(Gpu::new()?, &settings);
         renderer.set_scene(&snapshot);
-        let direct = draw(&mut renderer, view, &settings, Lighting::DIRECT)?.0;
+        let direct = draw(&mut renderer, view, &settings, Lighting::DIRECT)?;
         let judged = |picture: &Picture| self.judge(&all, picture, exposure);
         let direct_part = judged(&sum(&direct, &reference.indirect))?;
 
@@ -168,7 +169,6 @@ impl BenchQuality {
             shading: Shading::Samples,
             materials: self.picture.materials.drawn(),
             shadows: Shadows { resolution: SHADOW_RESOLUTION, ..Shadows::default() },
-            offset: self.offset,
             pre_exposure: exposure,
             ..Settings::default()
         }
@@ -185,15 +185,16 @@ impl BenchQuality {
         bounces: u32,
         exposure: f32,
     ) -> Result<Row> {
-        let [x, y, z] = spec.grid.resolution.to_array();
-        let name = format!("{x}x{y}x{z} L{} {bounces} bounces", u8::from(spec.order));
+        let name = format!("{} L{} {bounces} bounces", cells(&spec), u8::from(spec.order));
         let start = Instant::now();
         let light = self.light(snapshot, spec, bounces)?;
         let probe_seconds = start.elapsed().as_secs_f64();
         let settings = self.settings(exposure);
         renderer.set_light(&light, self.offset)?;
-        let (whole, draw_seconds) = draw(renderer, view, &settings, Lighting::FIELD)?;
-        let (indirect, _) = draw(renderer, view, &settings, Lighting::INDIRECT)?;
+        let start = Instant::now();
+        let whole = draw(renderer, view, &settings, Lighting::FIELD)?;
+        let draw_seconds = start.elapsed().as_secs_f64();
+        let indirect = draw(renderer, view, &settings, Lighting::INDIRECT)?;
         self.keep_picture(&name, &whole, exposure)?;
         let all = sum(&reference.direct, &reference.indirect);
         let row = Row {
@@ -271,10 +272,7 @@ impl BenchQuality {
             scene.environment(),
             self.clamp
         );
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        for byte in said.bytes() {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        }
+        let hash = fingerprint::of(scene, said);
         format!("{}-{}x{}-{}spp-{hash:016x}", scene.name(), p.size.x, p.size.y, self.reference_spp)
     }
 
@@ -386,20 +384,6 @@ impl BenchQuality {
             "reference": reference.told, "direct": errors(direct), "fields": fields,
         })
     }
-}
-
-/// A picture, and the seconds that it took.
-fn draw(
-    renderer: &mut Renderer,
-    view: View,
-    settings: &Settings,
-    lighting: Lighting,
-) -> Result<(Picture, f64)> {
-    let start = Instant::now();
-    let settings = Settings { lighting, ..*settings };
-    let pixels = renderer.pictures(&[view], &settings)?.remove(0);
-    let picture = Picture::new(settings.size.x, settings.size.y, pixels)?;
-    Ok((picture, start.elapsed().as_secs_f64()))
 }
 
 fn sum(a: &Picture, b: &Picture) -> Picture {

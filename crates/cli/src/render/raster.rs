@@ -93,7 +93,7 @@ impl Render {
         if settings.lighting.indirect {
             let volumes = self.volumes(scene)?;
             probes = volumes.iter().map(|volume| volume.grid.probe_count()).sum();
-            renderer.set_light(&LightField::new(volumes), settings.offset)?;
+            renderer.set_light(&LightField::new(volumes), self.raster.offset)?;
         }
         let grid = self.raster.views.unwrap_or(UVec2::ONE);
         let views = views(&view, grid, self.raster.view_spacing);
@@ -110,7 +110,7 @@ impl Render {
     }
 
     fn raster_settings(&self) -> Settings {
-        let RasterArguments { offset, shading, shadow_resolution, pcf, pcss, .. } = self.raster;
+        let RasterArguments { shading, shadow_resolution, pcf, pcss, .. } = self.raster;
         Settings {
             size: self.picture.size,
             samples: self.spp.unwrap_or(SAMPLES),
@@ -135,7 +135,6 @@ impl Render {
                 TransparencyArgument::Coverage => Transparency::Coverage,
                 TransparencyArgument::Sorted => Transparency::Sorted,
             },
-            offset,
             ..Settings::default()
         }
     }

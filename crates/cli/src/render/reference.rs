@@ -1,7 +1,6 @@
 //! Pictures by path tracing every pixel.
 
 use std::fs;
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -10,11 +9,11 @@ use anyhow::{Context, Result};
 use glam::UVec2;
 use lumencast_gather::reference::{Film, Filter, Noise, PASS, Parts, PictureSettings, Renderer};
 use lumencast_picture::{Picture, exposure};
-use lumencast_scene::{FileContents, Scene, View};
+use lumencast_scene::{Scene, View};
 use serde_json::{Value, json};
 
 use super::{FilterArgument, PartsArgument, Render, partial};
-use crate::{interrupt, output};
+use crate::{fingerprint, interrupt, output};
 
 /// The unfinished picture is kept at least so often.
 const KEEP_EVERY: Duration = Duration::from_secs(60);
@@ -90,25 +89,12 @@ impl Render {
         }
     }
 
-    /// A hash of all that a sample depends on: scene files by length and time of change.
+    /// All that a sample depends on.
     fn key(&self, scene: &Scene, view: View, settings: PictureSettings) -> u64 {
-        let mut hasher = DefaultHasher::new();
         let settings = PictureSettings { threads: None, ..settings };
         let said =
             format!("{} {view:?} {settings:?} {:?}", env!("CARGO_PKG_VERSION"), self.scene.source);
-        (said, self.time.to_bits()).hash(&mut hasher);
-        for file in scene.files() {
-            file.name.hash(&mut hasher);
-            match &file.contents {
-                FileContents::Bytes(bytes) => bytes.hash(&mut hasher),
-                FileContents::Path(path) => {
-                    if let Ok(metadata) = fs::metadata(path) {
-                        (metadata.len(), metadata.modified().ok()).hash(&mut hasher);
-                    }
-                }
-            }
-        }
-        hasher.finish()
+        fingerprint::of(scene, (said, self.time.to_bits()))
     }
 
     /// The film to go on with.

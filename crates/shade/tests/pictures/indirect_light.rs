@@ -52,7 +52,7 @@ fn worst(drawn_light: &LightField, light: &LightField, offset: OffsetPolicy) -> 
     let albedo = Vec3::new(0.9, 0.6, 0.3);
     let scene = floor(lambert(albedo, Vec3::ZERO));
     let view = View::look_at(Vec3::new(1.0, 2.5, 3.0), Vec3::ZERO, 0.9).unwrap();
-    let settings = Settings { offset, pre_exposure: 1e-3, ..settings() };
+    let settings = Settings { pre_exposure: 1e-3, ..settings() };
     let mut renderer = renderer(&scene, &settings);
     renderer.set_light(drawn_light, offset).unwrap();
     let picture = renderer.pictures(&[view], &settings).unwrap().remove(0);
