@@ -9,21 +9,24 @@ use crate::mesh::{Mesh, Primitive, Vertices};
 /// Vertices handled by a core at a time.
 const BATCH: usize = 2048;
 
-/// A mesh's vertices after morphing by `weights` and, if there are joints, skinning: then they are in
-/// the space that `to_space` (one a joint) leads to, and parts without joints are brought there by
-/// `rigid`. One entry a primitive.
-pub(crate) fn deform(
-    mesh: &Mesh,
-    weights: &[f32],
-    to_space: Option<&[Affine3A]>,
-    rigid: Affine3A,
-) -> Vec<Vertices> {
+/// Where a skin's joints are.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Pose {
+    /// One a joint, from the mesh at rest to the space of the skinned vertices.
+    pub(crate) joints: Vec<Affine3A>,
+    /// The same for vertices without joints.
+    pub(crate) rigid: Affine3A,
+}
+
+/// A mesh's vertices after morphing by `weights` and, where it has a skin, skinning. One entry a
+/// primitive.
+pub(crate) fn deform(mesh: &Mesh, weights: &[f32], pose: Option<&Pose>) -> Vec<Vertices> {
     let deform = |primitive: &Primitive| {
         let mut vertices = morph(primitive, weights);
-        if let Some(joints) = to_space {
-            skin(primitive, &mut vertices, joints, rigid);
+        if let Some(pose) = pose {
+            skin(primitive, &mut vertices, pose);
         }
-        let moved = to_space.is_some() || !primitive.morph_targets.is_empty();
+        let moved = pose.is_some() || !primitive.morph_targets.is_empty();
         if moved && primitive.flat {
             let triangles = vertices.positions.as_chunks::<3>().0;
             vertices.normals = triangles.iter().flat_map(|t| [face_normal(*t); 3]).collect();
@@ -62,13 +65,13 @@ fn unit(tangent: Vec3, rest: Vec4) -> Vec4 {
     tangent.try_normalize().map_or(rest, |t| t.extend(rest.w))
 }
 
-fn skin(primitive: &Primitive, vertices: &mut Vertices, joints: &[Affine3A], rigid: Affine3A) {
+fn skin(primitive: &Primitive, vertices: &mut Vertices, Pose { joints, rigid }: &Pose) {
     let blended = |vertex: usize| {
-        let Some(names) = primitive.joints.get(vertex) else { return rigid };
+        let Some(names) = primitive.joints.get(vertex) else { return *rigid };
         let weights = primitive.weights[vertex].to_array();
         let mut matrix = Affine3A::from_mat3_translation(glam::Mat3::ZERO, Vec3::ZERO);
         for (joint, weight) in names.iter().zip(weights).filter(|(_, w)| *w > 0.0) {
-            let joint = joints.get(usize::from(*joint)).copied().unwrap_or(rigid);
+            let joint = joints.get(usize::from(*joint)).copied().unwrap_or(*rigid);
             matrix.matrix3 += joint.matrix3 * weight;
             matrix.translation += joint.translation * weight;
         }

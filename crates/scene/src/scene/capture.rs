@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::{Affine3A, Vec3, Vec3A};
+use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
 use super::Scene;
 use super::nodes::{Node, PlacedSkin};
-use crate::deform::deform;
+use crate::deform::{Pose, deform};
 use crate::trs::is_invertible;
 use crate::{Instance, Mesh, NodeId, PlacedLight, Snapshot, Vertices};
 
@@ -27,8 +27,13 @@ struct Kept {
 #[derive(Clone, Debug, PartialEq)]
 struct Cause {
     weights: Vec<f32>,
-    world_from_rest: Option<Vec<Affine3A>>,
+    pose: Option<Pose>,
 }
+
+/// The space of skinned meshes that are mirrored: their triangles then wind as at rest, and the
+/// transform tells, as for any other instance, that they are to be seen from the other side.
+const MIRROR: Affine3A =
+    Affine3A { matrix3: Mat3A::from_diagonal(Vec3::new(-1.0, 1.0, 1.0)), translation: Vec3A::ZERO };
 
 impl Scene {
     /// The scene as it is now. Cheap while nothing changes: then it is the same one.
@@ -86,11 +91,19 @@ impl Scene {
             return None;
         }
         // A skinned mesh is where its joints are; its own node's place does not count.
-        let is_skinned = world_from_rest.is_some();
-        let world_from_object = if is_skinned { Affine3A::IDENTITY } else { world_from_node };
-        let deformed = (is_skinned || !node.weights.is_empty()).then(|| {
-            let cause = Cause { weights: node.weights.clone(), world_from_rest };
-            deformed.vertices(id, &mesh, cause, world_from_node)
+        let world_from_object = match &world_from_rest {
+            Some(joints) if is_mirrored(joints) => MIRROR,
+            Some(_) => Affine3A::IDENTITY,
+            None => world_from_node,
+        };
+        let is_deformed = world_from_rest.is_some() || !node.weights.is_empty();
+        let deformed = is_deformed.then(|| {
+            // A mirror is its own inverse.
+            let pose = world_from_rest.map(|joints| Pose {
+                joints: joints.into_iter().map(|joint| world_from_object * joint).collect(),
+                rigid: world_from_object * world_from_node,
+            });
+            deformed.vertices(id, &mesh, Cause { weights: node.weights.clone(), pose })
         });
         Some(Instance { node: id, mesh_id, mesh, deformed, world_from_object })
     }
@@ -120,7 +133,6 @@ impl Deformed {
         id: NodeId,
         mesh: &Arc<Mesh>,
         cause: Cause,
-        world_from_node: Affine3A,
     ) -> Arc<Vec<Vertices>> {
         if let Some(kept) = self.0.get_mut(&id)
             && Arc::ptr_eq(&kept.mesh, mesh)
@@ -129,12 +141,17 @@ impl Deformed {
             kept.used = true;
             return kept.vertices.clone();
         }
-        let joints = cause.world_from_rest.as_deref();
-        let vertices = Arc::new(deform(mesh, &cause.weights, joints, world_from_node));
+        let vertices = Arc::new(deform(mesh, &cause.weights, cause.pose.as_ref()));
         let kept = Kept { mesh: mesh.clone(), cause, vertices: vertices.clone(), used: true };
         self.0.insert(id, kept);
         vertices
     }
+}
+
+/// Whether most joints turn what they move inside out.
+fn is_mirrored(joints: &[Affine3A]) -> bool {
+    let mirrored = joints.iter().filter(|joint| joint.matrix3.determinant() < 0.0).count();
+    2 * mirrored > joints.len()
 }
 
 /// The light of a node. Its intensity is the same whatever the node's scale.

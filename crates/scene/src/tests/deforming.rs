@@ -150,6 +150,44 @@ fn skinned_vertices_follow_their_joints() {
     assert!((v.normals[2] - Vec3::Y).length() < 1e-6, "{}", v.normals[2]);
 }
 
+/// A skin below a mirrored node winds and faces as a rigid mesh there does.
+#[test]
+fn mirrored_skins_keep_their_front() {
+    let mut w = Writer::default();
+    let positions = w.floats("VEC3", &[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
+    let normals = w.vectors(&[Vec3::Z; 3]);
+    let joints_view = w.view(&[0; 12]);
+    let joints = w.add(
+        "accessors",
+        json!({ "bufferView": joints_view, "componentType": 5121, "type": "VEC4", "count": 3 }),
+    );
+    let weights = w.floats("VEC4", &[1., 0., 0., 0.].repeat(3));
+    let rigid = json!({ "POSITION": positions, "NORMAL": normals });
+    let skinned = json!({ "POSITION": positions, "NORMAL": normals, "JOINTS_0": joints, "WEIGHTS_0": weights });
+    w.add("meshes", json!({ "primitives": [{ "attributes": skinned }] }));
+    w.add("meshes", json!({ "primitives": [{ "attributes": rigid }] }));
+    w.add("skins", json!({ "joints": [1] }));
+    w.node(json!({ "mesh": 0, "skin": 0 }));
+    w.node(json!({ "scale": [1.0, -2.0, 1.0], "mesh": 1 }));
+    let snapshot = load(w).snapshot();
+    let seen: Vec<_> = snapshot
+        .instances
+        .iter()
+        .map(|instance| {
+            let to_world = instance.world_from_object;
+            let rest = &instance.mesh.primitives[0].vertices;
+            let vertices = instance.deformed.as_ref().map_or(rest, |deformed| &deformed[0]);
+            let p = |i: usize| to_world.transform_point3(vertices.positions[i]);
+            let winding = to_world.matrix3.determinant().signum();
+            let face = winding * (p(1) - p(0)).cross(p(2) - p(0)).normalize();
+            let normal = to_world.inverse().matrix3.transpose() * glam::Vec3A::from(vertices.normals[0]);
+            (p(1), p(2), face, Vec3::from(normal).normalize())
+        })
+        .collect();
+    assert_eq!(seen[0], seen[1]);
+    assert_eq!(seen[0], (Vec3::X, Vec3::new(0.0, -2.0, 0.0), Vec3::Z, Vec3::Z));
+}
+
 #[test]
 fn the_later_animation_of_a_node_wins() {
     let mut w = triangle();
