@@ -38,6 +38,7 @@ pub(crate) struct Bake {
 
 impl Bake {
     pub(crate) fn run(self) -> Result<()> {
+        output::check_file(&self.output)?;
         let mut scene = self.scene.source.open()?;
         let volumes = self.scene.volumes(&scene)?;
         let snapshot = scene.snapshot();

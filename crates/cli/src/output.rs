@@ -1,9 +1,10 @@
 //! What goes to the terminal.
 
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 use std::time::Duration;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Ends the program as Unix's own do when nobody reads on, `lumencast inspect FILE | head` for
@@ -33,6 +34,15 @@ pub(crate) fn json(value: &serde_json::Value) -> Result<()> {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(BROKEN_PIPE),
         written => written.context("cannot write to standard output"),
     }
+}
+
+/// Whether a file can be written there: said before hours of work, not after.
+pub(crate) fn check_file(path: &Path) -> Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    ensure!(folder.is_dir(), "{}: there is no such folder", folder.display());
+    ensure!(!path.is_dir(), "{}: is a folder", path.display());
+    Ok(())
 }
 
 /// A line that turns while something of unknown length goes on; on standard error, and only if

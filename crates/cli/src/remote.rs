@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use lumencast_codec::{Catalog, Field, ProbeDecoder, Region, RegionLight, StateFrame};
+use lumencast_codec::{Catalog, Field, ProbeDecoder, Region, RegionLight, StateFrame, limits};
 use lumencast_light::{ProbeVolume, VolumeId};
 use lumencast_transport::{Client, ConnectOptions, ReadOptions};
 
@@ -81,7 +81,7 @@ async fn region_light(
 
 /// The first frame of a track.
 async fn first(client: &Client, track: &str) -> Result<bytes::Bytes> {
-    let mut reader = client.subscribe(client.scene(), track, ReadOptions::default());
+    let mut reader = client.subscribe(client.scene(), track, ReadOptions::default().with_max_frame(limits::FRAME_BYTES));
     let frame = reader.next().await?;
     Ok(frame.with_context(|| format!("the server has no track {track}"))?.bytes)
 }

@@ -40,7 +40,8 @@ pub(crate) struct Serve {
     /// Lets those edit who have a token signed with this key; see `lumencast token`.
     #[arg(long, value_name = "FILE", help_heading = "Network")]
     token_key: Option<PathBuf>,
-    /// Reading needs a token too.
+    /// Reading light and the scene's state needs a token too; the page's and the scene's files stay
+    /// open to all who reach the server.
     #[arg(long, requires = "token_key", help_heading = "Network")]
     token_to_read: bool,
     /// Certificate chain (PEM); without it a development certificate is made.

@@ -14,8 +14,8 @@ use crate::files::{FileSet, respond};
 use crate::metrics::Metrics;
 use crate::page;
 
-/// Seconds without a tick after which the server calls itself ill.
-const STALLED_AFTER: Duration = Duration::from_secs(5);
+/// A tick may end so much later than expected before the server calls itself ill.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Scripts, styles and connections from this server only; blobs because glTF loaders hand embedded
 /// pictures on as such.
@@ -36,8 +36,30 @@ pub(crate) struct Shared {
     pub(crate) scene: String,
     /// The scene's glTF file under `/scene/`.
     pub(crate) root: String,
-    /// When the last tick ended.
-    pub(crate) last_tick: RwLock<Instant>,
+    /// When a tick ended last, and when the next should have.
+    pub(crate) ticked: RwLock<Ticked>,
+}
+
+/// Whether ticks go on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ticked {
+    last: Instant,
+    expected: Instant,
+}
+
+impl Ticked {
+    /// A tick ended at `now`; the next is expected to begin within a period and to take up to three
+    /// times as long as this one, `seconds`.
+    pub(crate) fn at(now: Instant, period: f64, seconds: f64) -> Self {
+        Self { last: now, expected: now + Duration::from_secs_f64(period + 3.0 * seconds) }
+    }
+
+    /// What is wrong at `now`.
+    fn fault(&self, now: Instant) -> Option<String> {
+        let since = now.saturating_duration_since(self.last);
+        let stalls = now > self.expected + PATIENCE;
+        stalls.then(|| format!("the last tick ended {:.1} s ago", since.as_secs_f64()))
+    }
 }
 
 /// The routes.
@@ -83,13 +105,11 @@ async fn scene_file(State(shared): State<Arc<Shared>>, Path(name): Path<String>)
 }
 
 async fn health(State(shared): State<Arc<Shared>>) -> Response {
-    let ended = *shared.last_tick.read().unwrap_or_else(PoisonError::into_inner);
-    let since = ended.elapsed();
-    if since > STALLED_AFTER {
-        let text = format!("the last tick ended {:.1} s ago\n", since.as_secs_f64());
-        return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
+    let ticked = *shared.ticked.read().unwrap_or_else(PoisonError::into_inner);
+    match ticked.fault(Instant::now()) {
+        Some(fault) => (StatusCode::SERVICE_UNAVAILABLE, format!("{fault}\n")).into_response(),
+        None => "ok\n".into_response(),
     }
-    "ok\n".into_response()
 }
 
 async fn metrics(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
@@ -108,4 +128,23 @@ async fn secured(mut response: Response) -> Response {
     }
     headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-cache"));
     response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slow_ticks_are_no_illness_but_none_are() {
+        let now = Instant::now();
+        let after = |seconds| now + Duration::from_secs_f64(seconds);
+        let quick = Ticked::at(now, 0.04, 0.03);
+        assert_eq!(quick.fault(after(5.0)), None);
+        let fault = quick.fault(after(6.0)).expect("stalled");
+        assert!(fault.contains("6.0 s ago"), "{fault}");
+        // A tick every ten seconds, and ticks that take four.
+        assert_eq!(Ticked::at(now, 10.0, 0.03).fault(after(14.0)), None);
+        assert_eq!(Ticked::at(now, 0.04, 4.0).fault(after(16.0)), None);
+        assert!(Ticked::at(now, 10.0, 4.0).fault(after(30.0)).is_some());
+    }
 }

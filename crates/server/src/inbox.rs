@@ -1,7 +1,7 @@
 //! Edits on their way in: order, duplicates and limits, a client each. No socket and no clock: the
 //! caller passes bytes and time in.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use lumencast_codec::{ClientEdit, RefusedEdit, limits};
 use lumencast_scene::Edit;
@@ -17,25 +17,31 @@ pub struct Limits {
     pub pending: usize,
     /// Frames that are no edits at all before the client is [cut off](Verdict::CutOff).
     pub rubbish: u32,
+    /// Edits over the rate before it is; they are forgotten at the rate.
+    pub excess: f64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { rate: 250.0, burst: 500.0, pending: 1024, rubbish: 16 }
+        Self { rate: 250.0, burst: 500.0, pending: 1024, rubbish: 16, excess: 1000.0 }
     }
 }
 
 /// Clients remembered at a time.
 pub(crate) const MAX_CLIENTS: usize = 1024;
-/// Edits taken in one tick, and refusals reported in one: the wire's limit for a delta.
-pub(crate) const MAX_EDITS_A_TICK: usize = 4096;
+/// Edits taken in one tick: 12,800 a second at 25 Hz.
+pub(crate) const MAX_EDITS_A_TICK: usize = 512;
+/// Edits refused beforehand that one tick reports.
+pub(crate) const MAX_REFUSED_A_TICK: usize = 256;
 /// Bytes of a frame; no edit is nearly as long.
 pub(crate) const MAX_FRAME: usize = 4 * 1024;
-/// Edits of all clients that wait for the next tick.
-const MAX_PENDING: usize = 4 * MAX_EDITS_A_TICK;
-/// Bytes of the edits taken in one tick: half of what a frame of the state may hold.
-const MAX_BYTES_A_TICK: usize = limits::FRAME_BYTES / 2;
-/// Characters of a reason for refusing an edit that cannot be read.
+/// Edits of all clients that wait for the next tick, and refusals that wait to be reported.
+const MAX_PENDING: usize = 16 * 1024;
+/// Bytes of the edits taken in one tick. With their senders, refusals and acknowledgements they stay
+/// below 3/8 of what a frame of the state may hold; the rest is for the scene itself, which
+/// [`crate::Tick`] keeps below 5/8.
+const MAX_BYTES_A_TICK: usize = limits::FRAME_BYTES / 16;
+/// Characters of a reason for refusing an edit.
 const MAX_REASON: usize = 200;
 /// Seconds after which a silent client's numbers are forgotten.
 const FORGET_AFTER: f64 = 60.0;
@@ -71,7 +77,8 @@ pub enum Verdict {
     Refused,
     /// Not an edit frame.
     Rubbish,
-    /// The client has sent too much rubbish, or there are too many clients: read it no further.
+    /// The client has sent too much, or too much rubbish, or there are too many clients: read it no
+    /// further.
     CutOff,
 }
 
@@ -80,9 +87,9 @@ pub enum Verdict {
 pub struct Inbox {
     limits: Limits,
     clients: BTreeMap<String, Mailbox>,
-    /// With the bytes that each came in.
+    /// With the bytes that each has as JSON.
     pending: Vec<(Received, usize)>,
-    refused: Vec<RefusedEdit>,
+    refused: VecDeque<RefusedEdit>,
 }
 
 #[derive(Debug)]
@@ -92,6 +99,7 @@ struct Mailbox {
     pending: usize,
     allowance: f64,
     rubbish: u32,
+    excess: f64,
     heard: f64,
 }
 
@@ -112,10 +120,12 @@ impl Inbox {
             pending: 0,
             allowance: limits.burst,
             rubbish: 0,
+            excess: 0.0,
             heard: now,
         });
-        let elapsed = (now - mailbox.heard).max(0.0);
-        mailbox.allowance = (mailbox.allowance + elapsed * limits.rate).min(limits.burst);
+        let regained = (now - mailbox.heard).max(0.0) * limits.rate;
+        mailbox.allowance = (mailbox.allowance + regained).min(limits.burst);
+        mailbox.excess = (mailbox.excess - regained).max(0.0);
         mailbox.heard = now;
 
         let Some((seq, edit)) = parse(bytes) else {
@@ -128,8 +138,13 @@ impl Inbox {
         if seq <= mailbox.last {
             return Verdict::Taken;
         }
+        let is_over = mailbox.allowance < 1.0;
+        mailbox.excess += f64::from(u8::from(is_over));
+        if mailbox.excess > limits.excess || self.refused.len() >= MAX_PENDING {
+            return Verdict::CutOff;
+        }
         mailbox.last = seq;
-        let edit = if mailbox.allowance < 1.0 {
+        let edit = if is_over {
             Err(format!("more than {} edits a second", limits.rate))
         } else if mailbox.pending >= limits.pending || self.pending.len() >= MAX_PENDING {
             Err("too many edits are waiting for the next tick".to_owned())
@@ -140,21 +155,21 @@ impl Inbox {
         match edit {
             Ok(edit) => {
                 mailbox.pending += 1;
+                // As it will be passed on: numbers may be written otherwise than they came.
+                let length = serde_json::to_vec(&edit).map_or(bytes.len(), |json| json.len());
                 let received = Received { client: client.to_owned(), seq, edit };
-                self.pending.push((received, bytes.len()));
+                self.pending.push((received, length));
                 Verdict::Taken
             }
             Err(reason) => {
-                if self.refused.len() < MAX_EDITS_A_TICK {
-                    self.refused.push(RefusedEdit { client: client.to_owned(), seq, reason });
-                }
+                self.refused.push_back(refusal(client.to_owned(), seq, &reason));
                 Verdict::Refused
             }
         }
     }
 
-    /// What there is for a tick at `now` seconds, edits in the order in which they came. Edits over
-    /// the limit of a tick stay for the next.
+    /// What there is for a tick at `now` seconds, in the order in which it came. What is over the
+    /// limits of a tick stays for the next.
     pub fn take(&mut self, now: f64) -> Mail {
         let mut room = MAX_BYTES_A_TICK;
         let fits = |(_, bytes): &&(Received, usize)| {
@@ -170,21 +185,31 @@ impl Inbox {
             }
         }
         self.clients.retain(|_, m| m.pending > 0 || now - m.heard < FORGET_AFTER);
-        Mail { edits, refused: std::mem::take(&mut self.refused), acks: self.acks() }
+        let reported = self.refused.len().min(MAX_REFUSED_A_TICK);
+        let refused = self.refused.drain(..reported).collect();
+        Mail { edits, refused, acks: self.acks() }
     }
 
     /// The last number that is not waiting, for each client.
     fn acks(&self) -> BTreeMap<String, u64> {
         let mut acks: BTreeMap<_, _> =
             self.clients.iter().map(|(name, m)| (name.clone(), m.last)).collect();
-        for (waiting, _) in &self.pending {
-            if let Some(ack) = acks.get_mut(&waiting.client) {
-                *ack = waiting.seq.saturating_sub(1).min(*ack);
+        let pending = self.pending.iter().map(|(edit, _)| (&edit.client, edit.seq));
+        let refused = self.refused.iter().map(|refused| (&refused.client, refused.seq));
+        for (client, seq) in pending.chain(refused) {
+            if let Some(ack) = acks.get_mut(client) {
+                *ack = seq.saturating_sub(1).min(*ack);
             }
         }
         acks.retain(|_, ack| *ack > 0);
         acks
     }
+}
+
+/// An edit that is refused, for a reason of bounded length.
+pub(crate) fn refusal(client: String, seq: u64, reason: &str) -> RefusedEdit {
+    let reason = reason.chars().filter(|c| !c.is_control()).take(MAX_REASON).collect();
+    RefusedEdit { client, seq, reason }
 }
 
 /// The number of a frame and its edit, or why the edit cannot be read; `None` where there is not
@@ -196,8 +221,7 @@ fn parse(bytes: &[u8]) -> Option<(u64, Result<Edit, String>)> {
     match ClientEdit::decode(bytes) {
         Ok(ClientEdit { seq, edit }) => Some((seq, Ok(edit))),
         Err((seq, error)) => {
-            let reason = format!("not an edit: {error}");
-            Some((seq?, Err(reason.chars().take(MAX_REASON).collect())))
+            Some((seq?, Err(format!("not an edit: {error}"))))
         }
     }
 }
@@ -247,6 +271,41 @@ mod tests {
         assert_eq!(verdicts.iter().filter(|v| **v == Verdict::Taken).count(), 10);
     }
 
+    /// Who goes on far over the rate is cut off; who is over it for a moment is not.
+    #[test]
+    fn floods_are_cut_off() {
+        let limits = Limits { rate: 10.0, burst: 20.0, excess: 30.0, ..Limits::default() };
+        let mut inbox = Inbox::new(limits);
+        let flood: Vec<_> = (1..=60).map(|s| inbox.receive("a", &frame(s), 0.0)).collect();
+        let count = |verdict| flood.iter().filter(|v| **v == verdict).count();
+        assert_eq!((count(Verdict::Taken), count(Verdict::Refused)), (20, 30));
+        assert_eq!(flood[50..], [Verdict::CutOff; 10]);
+        assert_eq!(inbox.take(0.0).acks["a"], 50, "the rest was never read");
+        for second in 0..20 {
+            for i in 1..=15 {
+                let verdict = inbox.receive("b", &frame(second * 15 + i), second as f64);
+                assert_ne!(verdict, Verdict::CutOff, "half as much again");
+            }
+        }
+    }
+
+    /// However much is refused, a tick reports no more than its frame can hold, and acknowledges
+    /// only what it has reported.
+    #[test]
+    fn refusals_are_spread_over_ticks() {
+        let limits = Limits { rate: 0.0, burst: 0.0, excess: 1e9, ..Limits::default() };
+        let mut inbox = Inbox::new(limits);
+        let many = MAX_REFUSED_A_TICK as u64 + 10;
+        for seq in 1..=many {
+            assert_eq!(inbox.receive("a", &frame(seq), 0.0), Verdict::Refused);
+        }
+        let (first, second) = (inbox.take(0.0), inbox.take(0.0));
+        assert_eq!((first.refused.len(), first.acks["a"]), (MAX_REFUSED_A_TICK, many - 10));
+        assert_eq!((second.refused.len(), second.acks["a"]), (10, many));
+        let long = refusal("a".into(), 1, &"\u{1}ä".repeat(1000));
+        assert_eq!(long.reason, "ä".repeat(MAX_REASON));
+    }
+
     #[test]
     fn waiting_edits_are_limited() {
         let limits = Limits { rate: 1e9, burst: 1e9, pending: 3, ..Limits::default() };
@@ -284,10 +343,15 @@ mod tests {
             let frame = format!(r#"{{"seq":{seq},"edit":{edit}}}"#);
             assert_eq!(inbox.receive("a", frame.as_bytes(), 0.0), Verdict::Taken);
         }
-        let (first, second) = (inbox.take(0.0), inbox.take(0.0));
-        assert!(first.edits.len() * MAX_FRAME <= MAX_BYTES_A_TICK + 100 * first.edits.len());
-        assert_eq!(first.edits.len() + second.edits.len(), 200);
-        assert_eq!(second.acks["a"], 200);
+        let mut taken = 0;
+        while taken < 200 {
+            let mail = inbox.take(0.0);
+            assert!(!mail.edits.is_empty());
+            assert!(mail.edits.len() * MAX_FRAME <= MAX_BYTES_A_TICK + 100 * mail.edits.len());
+            taken += mail.edits.len();
+            assert_eq!(mail.acks["a"], taken as u64);
+        }
+        assert_eq!(taken, 200);
         let long = "x".repeat(MAX_FRAME + 1);
         assert_eq!(inbox.receive("a", long.as_bytes(), 0.0), Verdict::Rubbish);
     }

@@ -14,7 +14,7 @@ use lumencast_scene::{FileContents, Scene};
 use crate::edits;
 use crate::error::ServerError;
 use crate::files::{Contents, FileSet};
-use crate::http::{self, Shared};
+use crate::http::{self, Shared, Ticked};
 use crate::inbox::{Inbox, Limits};
 use crate::metrics::Metrics;
 use crate::pace::Beat;
@@ -73,13 +73,14 @@ impl Server {
             source,
         })?;
         let tick = Tick::new(scene, gatherer, config.tick, random_epoch())?;
+        let ticked = RwLock::new(Ticked::at(Instant::now(), tick.period(), 0.0));
         let shared = Arc::new(Shared {
             metrics: Metrics::default(),
             page,
             scene_files: RwLock::new(scene_files(tick.scene())),
             scene: tick.scene().name().to_owned(),
             root: tick.scene().root_file().to_owned(),
-            last_tick: RwLock::new(Instant::now()),
+            ticked,
         });
         let network =
             lumencast_transport::Server::bind(config.network, http::router(shared.clone())).await?;
@@ -179,7 +180,8 @@ fn beat(
                 scene_files(tick.scene());
         }
         shared.metrics.record(&report);
-        *shared.last_tick.write().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+        *shared.ticked.write().unwrap_or_else(PoisonError::into_inner) =
+            Ticked::at(Instant::now(), tick.period(), report.total_seconds());
     }
 }
 

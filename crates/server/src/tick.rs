@@ -15,7 +15,7 @@ use lumencast_scene::{Edit, Environment, InstanceSource, Scene, Script, Snapshot
 
 use crate::error::ServerError;
 use crate::field::Field;
-use crate::inbox::{Mail, Received};
+use crate::inbox::{Mail, Received, refusal};
 use crate::pace::{Budget, SampleRange};
 use crate::publish::Outlet;
 use crate::report::{Report, Stage, Stopwatch};
@@ -78,8 +78,12 @@ const SNAPSHOT_EVERY: u64 = 64;
 /// catalogs.
 const CATALOG_EVERY: u64 = 25;
 /// Bytes of a snapshot from which on nothing can be added: those who join have to get it in one
-/// frame, and moves need room too.
-const SNAPSHOT_ROOM: usize = limits::FRAME_BYTES / 2;
+/// frame, and changes need room too.
+const ADDING_ROOM: usize = limits::FRAME_BYTES / 2;
+/// Bytes of a snapshot from which on nothing more can be changed.
+const CHANGING_ROOM: usize = limits::FRAME_BYTES / 8 * 5;
+/// Bytes of the reasons that a tick gives for refusing edits; beyond them reasons are short.
+const REASON_ROOM: usize = limits::FRAME_BYTES / 32;
 /// Scene time moves at most this much in a tick, seconds, however long the machine slept.
 const LONGEST_STEP: f64 = 0.5;
 
@@ -96,8 +100,10 @@ pub struct Tick {
     told_scales: Vec<Option<i8>>,
     /// The tick from which on the catalog may go out again.
     next_catalog: u64,
-    /// Of the last snapshot, and of what was added since.
+    /// At most so many bytes has the scene's snapshot.
     snapshot_bytes: usize,
+    /// The tick in which that was measured last.
+    measured: Option<u64>,
     last_now: Option<f64>,
     last: Report,
 }
@@ -134,6 +140,7 @@ impl Tick {
             told_scales,
             next_catalog: 0,
             snapshot_bytes: 0,
+            measured: None,
             last_now: None,
             last,
         })
@@ -242,23 +249,33 @@ impl Tick {
                 Ok(edit) => {
                     outcome.accepted.push(AcceptedEdit { source: Some((client, seq)), edit });
                 }
-                Err(reason) => outcome.refused.push(RefusedEdit { client, seq, reason }),
+                Err(reason) => outcome.refused.push(refusal(client, seq, &reason)),
             }
         }
+        shorten(&mut outcome.refused);
         outcome
     }
 
     /// Applies one edit; the reason when it is refused.
     fn apply(&mut self, edit: &Edit) -> Result<Edit, String> {
+        let frees = matches!(edit, Edit::RemoveNode { .. });
         let adds = matches!(edit, Edit::AddInstance { .. } | Edit::AddLight { .. });
-        if adds && self.snapshot_bytes > SNAPSHOT_ROOM {
-            return Err("edits have added as much as a scene can hold: remove some first".into());
+        if !frees && !self.has_room(if adds { ADDING_ROOM } else { CHANGING_ROOM }) {
+            return Err("edits have changed as much as a scene can hold: remove some first".into());
         }
         let edit = self.scene.apply(edit).map_err(|error| error.to_string())?;
-        if adds {
-            self.snapshot_bytes += serde_json::to_vec(&edit).map_or(0, |json| json.len());
-        }
+        self.snapshot_bytes += json_bytes(&edit);
         Ok(edit)
+    }
+
+    /// Whether a snapshot is shorter than this. What is known of it is too much, since an edit may
+    /// take the place of another; so it is measured before anything is refused, once a tick.
+    fn has_room(&mut self, room: usize) -> bool {
+        if self.snapshot_bytes > room && self.measured != Some(self.number) {
+            self.snapshot_bytes = json_bytes(&self.scene.edits_since_load());
+            self.measured = Some(self.number);
+        }
+        self.snapshot_bytes <= room
     }
 
     /// Light for every field, all fields' jobs under way at once.
@@ -316,11 +333,7 @@ impl Tick {
             edits: edits.accepted.clone(),
             refused: edits.refused.clone(),
         };
-        let frame = frame.encode();
-        if is_snapshot {
-            self.snapshot_bytes = frame.len();
-        }
-        (frame, is_snapshot)
+        (frame.encode(), is_snapshot)
     }
 
     /// Counts the tick and sets the samples of the next.
@@ -357,6 +370,21 @@ impl Tick {
         self.last = report.clone();
         report
     }
+}
+
+/// Cuts reasons where many edits are refused, so that a frame holds all refusals.
+fn shorten(refused: &mut [RefusedEdit]) {
+    let mut room = REASON_ROOM;
+    for RefusedEdit { reason, .. } in refused {
+        match room.checked_sub(reason.len()) {
+            Some(left) => room = left,
+            None => *reason = "refused, as many others".into(),
+        }
+    }
+}
+
+fn json_bytes(value: &impl serde::Serialize) -> usize {
+    serde_json::to_vec(value).map_or(0, |json| json.len())
 }
 
 /// What became of a tick's edits.

@@ -32,7 +32,7 @@ pub enum Access {
     Token {
         /// The key that tokens must be signed with.
         key: Key,
-        /// Whether reading needs one too.
+        /// Whether reading tracks needs one too; what the application answers over HTTP does not.
         to_read: bool,
     },
 }
@@ -122,7 +122,16 @@ impl Sessions {
     }
 }
 
-struct Ticket(Arc<AtomicUsize>);
+/// One of those that are counted, until it is dropped.
+pub(crate) struct Ticket(Arc<AtomicUsize>);
+
+impl Ticket {
+    /// One more.
+    pub(crate) fn of(count: &Arc<AtomicUsize>) -> Self {
+        count.fetch_add(1, Ordering::Relaxed);
+        Self(count.clone())
+    }
+}
 
 impl Drop for Ticket {
     fn drop(&mut self) {

@@ -1,6 +1,9 @@
 //! What is answered on HTTP: WebSocket sessions, the certificate's fingerprint, and whatever the
 //! application serves; all behind the check of hosts and origins.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+
 use axum::Router;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -22,6 +25,8 @@ pub(crate) struct Front {
     pub(crate) backend: Backend,
     pub(crate) fingerprint: Fingerprint,
     pub(crate) application: Router,
+    /// TCP connections that are open for HTTP.
+    pub(crate) connections: Arc<AtomicUsize>,
 }
 
 impl Front {

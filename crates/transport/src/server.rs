@@ -1,6 +1,7 @@
 //! The server: an embedded relay on one port, QUIC on UDP and HTTP with WebSocket on TCP.
 
 use std::net::{SocketAddr, UdpSocket};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, RwLock};
 use std::time::Duration;
 
@@ -62,6 +63,8 @@ pub struct Server {
     address: SocketAddr,
     origin: origin::Producer,
     sessions: Sessions,
+    /// TCP connections that are open for HTTP.
+    connections: Arc<AtomicUsize>,
     shutdown: shutdown::Trigger,
     endpoints: Vec<noq::Endpoint>,
     tasks: Vec<JoinHandle<()>>,
@@ -105,8 +108,13 @@ impl Server {
             sessions: sessions.clone(),
             shutdown: observer,
         };
-        let front =
-            Front { backend: backend.clone(), fingerprint: fingerprint.clone(), application };
+        let connections = Arc::<AtomicUsize>::default();
+        let front = Front {
+            backend: backend.clone(),
+            fingerprint: fingerprint.clone(),
+            application,
+            connections: connections.clone(),
+        };
 
         let mut tasks = vec![
             tokio::spawn(access::decide(admissions, config.access, sessions.clone())),
@@ -119,7 +127,16 @@ impl Server {
         for endpoint in &endpoints {
             tasks.push(tokio::spawn(quic::serve(endpoint.clone(), backend.clone())));
         }
-        Ok(Self { address, origin, sessions, shutdown, endpoints, tasks, _watching: watching })
+        Ok(Self {
+            address,
+            origin,
+            sessions,
+            connections,
+            shutdown,
+            endpoints,
+            tasks,
+            _watching: watching,
+        })
     }
 
     /// The address, with the port that was chosen.
@@ -150,13 +167,13 @@ impl Server {
         Announcements::new(&self.origin.consume(), prefix, CLIENT_FRAME)
     }
 
-    /// Closes every session, so that clients know at once, and stops; takes at most `grace`. After
-    /// that the port is free again.
+    /// Closes every session, so that clients know at once, lets answers over HTTP that have begun be
+    /// read to their end, and stops; takes at most `grace`. After that the port is free again.
     pub async fn shutdown(self, grace: Duration) {
         let address = self.address;
         let closed = async {
             self.shutdown.start();
-            while self.sessions.count() > 0 {
+            while self.sessions.count() > 0 || self.connections.load(Ordering::Relaxed) > 0 {
                 tokio::time::sleep(POLL).await;
             }
             for endpoint in &self.endpoints {

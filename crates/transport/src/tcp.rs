@@ -12,6 +12,7 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
 
+use crate::access::Ticket;
 use crate::http::Front;
 use crate::session::{Failure, HANDSHAKE};
 #[cfg(target_os = "linux")]
@@ -36,6 +37,7 @@ pub(crate) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, front
             Ok((stream, remote)) => {
                 let (tls, front) = (tls.clone(), front.clone());
                 tokio::spawn(async move {
+                    let _counted = Ticket::of(&front.connections);
                     if let Err(err) = connection(stream, remote, tls, front).await {
                         tracing::debug!(%remote, %err, "TCP connection ended");
                     }

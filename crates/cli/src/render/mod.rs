@@ -4,14 +4,15 @@ mod partial;
 mod raster;
 mod reference;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use lumencast_picture::{Picture, ToneMap};
 
 use crate::arguments::{Exposure, SceneArguments, parse_positive};
 use crate::camera::{self, PictureArguments};
+use crate::output;
 
 /// Draws a picture of a scene.
 #[derive(Debug, Args)]
@@ -139,9 +140,7 @@ impl Render {
                 Some("png" | "exr") => {}
                 _ => bail!("{}: pictures are written as .exr or .png", path.display()),
             }
-            let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-            let folder = folder.unwrap_or(Path::new("."));
-            ensure!(folder.is_dir(), "{}: there is no such folder", folder.display());
+            output::check_file(path)?;
         }
         Ok(())
     }

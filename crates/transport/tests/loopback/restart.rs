@@ -6,6 +6,11 @@ use lumencast_transport::{
 };
 use std::time::{Duration, Instant};
 
+use axum::Router;
+use axum::routing::get;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+
 async fn start(config: ServerConfig) -> (Server, Broadcast, TrackWriter) {
     let server = serve(config).await;
     let broadcast = server.publish("scene").expect("published");
@@ -47,6 +52,25 @@ async fn a_reader_recovers_over_quic() {
 #[tokio::test]
 async fn a_reader_recovers_over_websocket() {
     a_reader_recovers(Transport::WebSocket).await;
+}
+
+/// An answer that is under way when the server stops is read to its end.
+#[tokio::test]
+async fn a_download_ends_before_the_server_does() {
+    /// More than the kernel takes in advance.
+    const LENGTH: usize = 64 << 20;
+    let large = Router::new().route("/large", get(|| async { vec![b'x'; LENGTH] }));
+    let server = step("bind", Server::bind(loopback(), large)).await.expect("a server");
+    let mut stream = TcpStream::connect(server.local_addr()).await.expect("a connection");
+    stream.write_all(b"GET /large HTTP/1.1\r\nHost: localhost\r\n\r\n").await.expect("sent");
+    let mut first = [0; 16];
+    step("the beginning", stream.read_exact(&mut first)).await.expect("an answer");
+    let stopping = tokio::spawn(server.shutdown(Duration::from_secs(5)));
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    let mut rest = Vec::new();
+    step("the rest", stream.read_to_end(&mut rest)).await.expect("read");
+    assert!(rest.len() > LENGTH && rest.ends_with(b"xx"), "{} bytes", rest.len());
+    step("shutdown", stopping).await.expect("stopped");
 }
 
 #[tokio::test]
