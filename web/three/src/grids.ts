@@ -26,6 +26,9 @@ const GROWTH = 0.05;
  */
 export class ProbeGrids {
   #filled: FilledGrid[] = [];
+  #fields: readonly Field[] = [];
+  /** The most grids that the plan could have. */
+  #planned = 0;
   #black = atlasTexture([1, 1, 1], new Uint16Array(4 * 7 * 3));
   #visible = true;
 
@@ -35,10 +38,25 @@ export class ProbeGrids {
   ) {}
 
   /** Replaces the grids by those for these fields; returns what could not be shown as meant. */
-  setFields(fields: readonly Field[], shadowLights: number): readonly string[] {
+  setFields(fields: readonly Field[]): readonly string[] {
+    this.#fields = fields;
+    return this.#plan();
+  }
+
+  /** Replaces the grids where the scene now leaves units for more or fewer; returns as {@link setFields}. */
+  fit(): readonly string[] {
+    return this.#mostGrids() === this.#planned ? [] : this.#plan();
+  }
+
+  #mostGrids(): number {
+    return Math.max(0, Math.min(this.platform.freeGrids(this.scene), this.#fields.length));
+  }
+
+  #plan(): readonly string[] {
     const { platform } = this;
-    const plan = planVolumes(fields, {
-      grids: platform.freeGrids(shadowLights),
+    this.#planned = this.#mostGrids();
+    const plan = planVolumes(this.#fields, {
+      grids: this.#planned,
       textureSize: platform.max3DTextureSize,
     });
     this.#clear();

@@ -1,13 +1,14 @@
 import type { AcceptedEdit, Edit, Field, Session } from '@lumencast/client';
-import { type Camera, type Object3D, type Scene, Vector3 } from 'three';
+import { type Camera, type Light, type Object3D, type Scene, Vector3 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import type { Content } from './content.js';
+import { expose, type SetWhileDrawn, whileDrawn } from './exposure.js';
 import { changedParts, FOLLOW_INTERVAL, type Pose, poseOf, worldPoseOf } from './follow.js';
 import { ProbeGrids } from './grids.js';
 import { describeLight, isPunctualLight } from './lights.js';
 import type { Platform, ProbeGrid } from './platform.js';
 import { Replica } from './replica.js';
-import { DEFAULT_SHADOW_LIGHTS, type ShadowOptions, Shadows } from './shadows.js';
+import { type ShadowOptions, Shadows } from './shadows.js';
 
 /** What a session must offer; {@link Session} does. */
 export type LightSession = Pick<
@@ -52,6 +53,15 @@ interface Followed {
 
 /** A scene lit by a server: streamed indirect light, and the server's edits applied. */
 export class LumencastLight {
+  /**
+   * What all that radiates in the scene is multiplied by while it is drawn. Half-float targets overflow
+   * at a radiance of 65,504 cd/m², which sunlit scenes pass: WebGPURenderer draws into one, and both
+   * renderers draw what transmissive materials show into another. With the picture's exposure here, and
+   * `renderer.toneMappingExposure` left at 1, they hold what is shown. Pictures in a program's own
+   * render targets are multiplied as well. 1 unless set.
+   */
+  preExposure = 1;
+
   readonly #replica: Replica;
   readonly #grids: ProbeGrids;
   readonly #shadows: Shadows | undefined;
@@ -60,6 +70,7 @@ export class LumencastLight {
   readonly #camera = new Vector3();
   readonly #warn: (message: string) => void;
   readonly #restoreHooks: () => void;
+  readonly #warned = new Set<string>();
   #show: Shown = 'both';
   #fittedRevision = -1;
   #fittedAt = 0;
@@ -81,7 +92,7 @@ export class LumencastLight {
       warning: this.#warn,
     });
     this.#added(scene);
-    this.#restoreHooks = this.#hookRendering(scene);
+    this.#restoreHooks = whileDrawn(scene, (set) => this.#changeWhileDrawn(set));
     this.#unsubscribe = [
       session.on('catalog', ({ fields }) => this.#setFields(fields)),
       session.on('snapshot', (snapshot) => this.#receive({ snapshot })),
@@ -94,6 +105,7 @@ export class LumencastLight {
   /** To be called each frame, before rendering. `now` is `performance.now()`. */
   update(camera: Camera, now: number = performance.now()): void {
     this.session.setCamera(this.#camera.setFromMatrixPosition(camera.matrixWorld).toArray());
+    this.#warnOnce(this.#grids.fit());
     if (this.#grids.update(this.session.light(now))) this.#lightRevision++;
     for (const followed of this.#followed.values()) this.#send(followed, now);
     this.#replica.update(this.session.sceneTime(now));
@@ -189,10 +201,17 @@ export class LumencastLight {
   }
 
   #setFields(fields: readonly Field[]): void {
-    const { shadows } = this.options;
-    // A program's own shadows take units as well.
-    const shadowLights = (shadows || {}).lights ?? DEFAULT_SHADOW_LIGHTS;
-    for (const warning of this.#grids.setFields(fields, shadowLights)) this.#warn(warning);
+    this.#warned.clear();
+    this.#warnOnce(this.#grids.setFields(fields));
+  }
+
+  /** Grids are made anew as materials come and go. */
+  #warnOnce(warnings: readonly string[]): void {
+    for (const warning of warnings) {
+      if (this.#warned.has(warning)) continue;
+      this.#warned.add(warning);
+      this.#warn(warning);
+    }
   }
 
   #receive(event: SceneEvent): void {
@@ -278,24 +297,17 @@ export class LumencastLight {
     void Promise.all(followed.underWay).then(() => followed.release?.());
   }
 
-  /** Lights go dark for the time of rendering only, so that the program's own values stay. */
-  #hookRendering(scene: Scene): () => void {
-    const { onBeforeRender, onAfterRender } = scene;
-    const intensities = new Map<Object3D & { intensity: number }, number>();
-    scene.onBeforeRender = (...parameters) => {
-      onBeforeRender.apply(scene, parameters);
-      if (this.#show !== 'indirect') return;
-      scene.traverse((object) => {
-        if (!isPunctualLight(object)) return;
-        intensities.set(object, object.intensity);
-        object.intensity = 0;
-      });
-    };
-    scene.onAfterRender = (...parameters) => {
-      for (const [light, intensity] of intensities) light.intensity = intensity;
-      intensities.clear();
-      onAfterRender.apply(scene, parameters);
-    };
-    return () => Object.assign(scene, { onBeforeRender, onAfterRender });
+  #changeWhileDrawn(set: SetWhileDrawn): void {
+    const { preExposure, platform } = this;
+    const { scene } = this.options;
+    if (platform.gridExposure) set(platform.gridExposure, 'value', preExposure);
+    if (preExposure === 1 && this.#show !== 'indirect') return;
+    scene.traverse((object) => {
+      if (!('isLight' in object)) return;
+      const { intensity } = object as Light;
+      const dark = this.#show === 'indirect' && isPunctualLight(object);
+      set(object, 'intensity', dark ? 0 : intensity * preExposure);
+    });
+    if (preExposure !== 1) expose(scene, preExposure, set);
   }
 }

@@ -9,18 +9,21 @@ import { FALLOFF_GLSL } from './falloff.js';
  * - shadow lookups offset towards the light also where it falls on a surface's back, else the lit
  *   back of a curtain shadows itself;
  * - irradiance of probe grids times 2^w, w the fourth channel of the atlas' last sub-volume, which is
- *   free: 0 in grids that three.js bakes, the logarithm of the field's scale in ours.
+ *   free: 0 in grids that three.js bakes, the logarithm of the field's scale in ours; and times
+ *   {@link gridExposure}.
  */
 export function patchedLights(): string {
   const lights = Object.entries(FALLOFF_GLSL).reduce(
     (chunk, [name, body]) => replaceFunction(chunk, 'float', name, body),
     ShaderChunk.lights_pars_begin,
   );
-  const probes = replaceText(
+  const scaled = replaceText(
     ShaderChunk.lightprobes_pars_fragment,
     'return max( result, vec3( 0.0 ) );',
-    'return max( result, vec3( 0.0 ) ) * exp2( s6.w );',
+    'return max( result, vec3( 0.0 ) ) * ( exp2( s6.w ) * lumencastExposure );',
   );
+  const samplers = 'uniform highp sampler3D probesSH[';
+  const probes = replaceText(scaled, samplers, `uniform float lumencastExposure;\n${samplers}`);
   return replaceText(lights, '#include <lightprobes_pars_fragment>', probes);
 }
 
@@ -64,6 +67,9 @@ function rowOf(matrices: string, row: number): string {
   return `vec3( ${[0, 1, 2].map((column) => `${matrices}[ i ][ ${column} ][ ${row} ]`).join(', ')} )`;
 }
 
+/** The uniform that multiplies light of probe grids; other than 1 only while a scene is drawn. */
+export const gridExposure = { value: 1 };
+
 let chunks: { lights: string; shadows: string } | undefined;
 const originals = new WeakMap<Material, Pick<Material, 'onBeforeCompile' | 'customProgramCacheKey'>>();
 
@@ -86,6 +92,7 @@ function patchMaterial(material: Material): void {
   const key = customProgramCacheKey.call(material);
   material.onBeforeCompile = (shader, renderer) => {
     onBeforeCompile.call(material, shader, renderer);
+    shader.uniforms.lumencastExposure = gridExposure;
     shader.fragmentShader = shader.fragmentShader.replace('#include <lights_pars_begin>', () => lights);
     shader.vertexShader = shader.vertexShader.replace('#include <shadowmap_vertex>', () => shadows);
   };

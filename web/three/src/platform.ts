@@ -1,4 +1,4 @@
-import type { Data3DTexture, Light, Object3D, Vector3, Box3 } from 'three';
+import type { Box3, Data3DTexture, Light, Object3D, Scene, Vector3 } from 'three';
 
 /** The part of three.js' two `LightProbeGrid` classes that both renderers sample. */
 export interface ProbeGrid extends Light {
@@ -25,8 +25,10 @@ export interface Platform {
    * the atlas' free channel, or `intensity` of the grid.
    */
   readonly scaleIn: 'atlas' | 'intensity';
-  /** Grids that texture units remain for, with that many lights that cast shadows. */
-  freeGrids(shadowLights: number): number;
+  /** Grids that the scene leaves texture units for, as it now is. */
+  freeGrids(scene: Scene): number;
+  /** What the shader multiplies the light of all grids by, where their own intensity does not reach it. */
+  readonly gridExposure?: { value: number };
   /** Largest size of a 3D texture along an axis. */
   readonly max3DTextureSize: number;
   /** Gives lights glTF's falloff, and what else {@link patchMaterials} lists; may be called again. */

@@ -15,7 +15,7 @@ import {
 import { isPunctualLight } from './lights.js';
 import { materialsOf } from './patch.js';
 
-export const DEFAULT_SHADOW_LIGHTS = 4;
+const DEFAULT_SHADOW_LIGHTS = 4;
 
 export interface ShadowOptions {
   /** Texels of a shadow map along an axis; a point light has six maps of half that. 2048 unless given. */

@@ -18,6 +18,7 @@ import { type ConnectOptions, connectWith } from './connect.js';
 import { MIN_CONE, MIN_DISTANCE } from './falloff.js';
 import { type AttachOptions, type LightSession, LumencastLight } from './light.js';
 import type { Platform } from './platform.js';
+import { unitsTaken } from './units.js';
 
 export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
 export type { ConnectOptions } from './connect.js';
@@ -38,8 +39,8 @@ export function attach(
   return new LumencastLight(session, webgpuPlatform(), options);
 }
 
-/** WebGPU guarantees 16 sampled textures a shader stage; a lit material takes up to seven. */
-const FREE_TEXTURES = 16 - 7;
+/** Sampled textures of a shader stage that every WebGPU device has. */
+const MAX_TEXTURES = 16;
 
 function webgpuPlatform(): Platform {
   return {
@@ -50,7 +51,7 @@ function webgpuPlatform(): Platform {
       return grid as LightProbeGrid & { dispose(): void };
     },
     scaleIn: 'intensity',
-    freeGrids: (shadowLights) => FREE_TEXTURES - shadowLights,
+    freeGrids: (scene) => MAX_TEXTURES - unitsTaken(scene, 'webgpu'),
     // The least that WebGPU allows.
     max3DTextureSize: 2048,
     patch: (root) => eachLight(root, (light, Falloff) => (light._lightNode = Falloff)),

@@ -81,6 +81,7 @@ describe('the shader twins', () => {
 describe('patchMaterials', () => {
   const compile = (material: MeshStandardMaterial) => {
     const shader = {
+      uniforms: {},
       vertexShader: '#include <shadowmap_vertex>',
       fragmentShader: '#include <lights_pars_begin>',
     } as Parameters<typeof material.onBeforeCompile>[0];

@@ -1,13 +1,18 @@
 import type { Edit, Field, LightState, SessionEvents } from '@lumencast/client';
 import {
+  Color,
   DataUtils,
   Group,
+  LinearSRGBColorSpace,
   Mesh,
+  MeshBasicMaterial,
   MeshStandardMaterial,
   PerspectiveCamera,
   PointLight,
   Scene,
   SpotLight,
+  SRGBColorSpace,
+  Texture,
 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { beforeEach, describe, expect, it, vi } from 'vitest';
@@ -203,14 +208,149 @@ describe('follow', () => {
   });
 });
 
+describe('grids', () => {
+  it('are made anew as materials leave other numbers of texture units, and warn once', () => {
+    const { grid } = field;
+    const fields = [-4, 0, 4].map((x, id) => ({
+      ...field,
+      id,
+      grid: { ...grid, center: [x, 0, 0] },
+    })) as Field[];
+    session.tell('catalog', { epoch: '', scene: { name: '', root: '' }, tickSeconds: 0.04, fields });
+    const free = vi.spyOn(platform, 'freeGrids');
+    const gridsWith = (units: number) => {
+      free.mockReturnValue(units);
+      light.update(camera);
+      return scene.children.filter((child) => child.name.startsWith('lumencast')).length;
+    };
+    warnings = [];
+    expect(gridsWith(9)).toBe(3);
+    const kept = light.grids[0];
+    expect(gridsWith(3)).toBe(3);
+    expect(light.grids[0]).toBe(kept);
+    expect(warnings).toEqual([]);
+    expect(gridsWith(1)).toBe(1);
+    expect(warnings.join()).toMatch(/texture units are short/);
+    const before = warnings.length;
+    expect([gridsWith(5), gridsWith(1)]).toEqual([3, 1]);
+    expect(warnings).toHaveLength(before);
+    expect([gridsWith(-3), gridsWith(0)]).toEqual([0, 0]);
+    expect(warnings.slice(before)).toEqual([expect.stringMatching(/no texture unit is free/)]);
+    free.mockRestore();
+  });
+});
+
+/** As a renderer does; `within` draws more. */
+function drawn(within: () => void): void {
+  scene.onBeforeRender(undefined!, scene, camera, undefined!, undefined!, undefined!);
+  within();
+  scene.onAfterRender(undefined!, scene, camera, undefined!, undefined!, undefined!);
+}
+
 describe('show', () => {
   it('darkens lights for the time of rendering only', () => {
     const lamp = new PointLight(0xffffff, 5);
     scene.add(lamp);
     light.show = 'indirect';
-    scene.onBeforeRender(undefined!, scene, camera, undefined!, undefined!, undefined!);
-    expect(lamp.intensity).toBe(0);
-    scene.onAfterRender(undefined!, scene, camera, undefined!, undefined!, undefined!);
+    drawn(() => expect(lamp.intensity).toBe(0));
     expect(lamp.intensity).toBe(5);
+  });
+
+  it('gives lights back after a picture that was drawn within another, as shadow maps are', () => {
+    const lamp = new PointLight(0xffffff, 5);
+    scene.add(lamp);
+    light.show = 'indirect';
+    drawn(() => {
+      drawn(() => expect(lamp.intensity).toBe(0));
+      expect(lamp.intensity).toBe(0);
+    });
+    expect(lamp.intensity).toBe(5);
+  });
+
+  it('gives lights back after a picture that failed', async () => {
+    const lamp = new PointLight(0xffffff, 5);
+    scene.add(lamp);
+    light.show = 'indirect';
+    expect(() => drawn(() => expect.fail('no picture'))).toThrow(/no picture/);
+    await settle();
+    expect(lamp.intensity).toBe(5);
+    drawn(() => expect(lamp.intensity).toBe(0));
+    expect(lamp.intensity).toBe(5);
+  });
+});
+
+describe('preExposure', () => {
+  const texture = (colorSpace: string) => Object.assign(new Texture(), { colorSpace });
+  let lamp: PointLight;
+  let glow: MeshStandardMaterial;
+  let unlit: MeshBasicMaterial;
+  let shownAsItIs: MeshBasicMaterial;
+  const radiating = () => [
+    lamp.intensity,
+    glow.emissiveIntensity,
+    glow.lightMapIntensity,
+    glow.envMapIntensity,
+    ...unlit.color.toArray(),
+    scene.environmentIntensity,
+    scene.backgroundIntensity,
+    platform.gridExposure!.value,
+  ];
+
+  beforeEach(() => {
+    lamp = new PointLight(0xffffff, 5);
+    glow = new MeshStandardMaterial({ emissiveIntensity: 3, lightMapIntensity: 2, envMapIntensity: 7 });
+    unlit = new MeshBasicMaterial({ color: 0x000000 });
+    unlit.color.setRGB(2, 4, 6);
+    shownAsItIs = new MeshBasicMaterial({ color: 0xffffff, toneMapped: false });
+    // One material on two meshes is still multiplied once.
+    scene.add(lamp, ...[glow, glow, unlit, shownAsItIs].map((material) => new Mesh(undefined, material)));
+    scene.backgroundIntensity = 8;
+  });
+
+  it('multiplies all that radiates while the scene is drawn, and gives it back', () => {
+    const before = radiating();
+    expect(before).toEqual([5, 3, 2, 7, 2, 4, 6, 1, 8, 1]);
+    light.preExposure = 0.25;
+    drawn(() => {
+      expect(radiating()).toEqual(before.map((value) => value / 4));
+      drawn(() => expect(radiating()).toEqual(before.map((value) => value / 4)));
+      expect(radiating()).toEqual(before.map((value) => value / 4));
+    });
+    expect(radiating()).toEqual(before);
+  });
+
+  it('touches nothing unless it is set', () => {
+    const writes: string[] = [];
+    for (const key of ['emissiveIntensity', 'envMapIntensity'] as const) {
+      const value = glow[key];
+      Object.defineProperty(glow, key, { get: () => value, set: () => writes.push(key) });
+    }
+    const before = radiating();
+    drawn(() => expect(radiating()).toEqual(before));
+    expect(writes).toEqual([]);
+  });
+
+  it('leaves what three.js shows without exposure', () => {
+    light.preExposure = 0.25;
+    scene.background = texture(SRGBColorSpace);
+    drawn(() => {
+      expect(scene.backgroundIntensity).toBe(8);
+      expect(shownAsItIs.color.r).toBe(1);
+    });
+    scene.background = texture(LinearSRGBColorSpace);
+    drawn(() => expect(scene.backgroundIntensity).toBe(2));
+    const colour = new Color(1, 1, 1);
+    scene.background = colour;
+    drawn(() => expect(colour.r).toBe(1));
+  });
+
+  it('keeps indirect light alone without lamps', () => {
+    light.preExposure = 0.25;
+    light.show = 'indirect';
+    drawn(() => {
+      expect(lamp.intensity).toBe(0);
+      expect(glow.emissiveIntensity).toBe(0.75);
+    });
+    expect([lamp.intensity, glow.emissiveIntensity]).toEqual([5, 3]);
   });
 });

@@ -2,14 +2,11 @@
  * What both renderers really draw, in a headless browser, against closed forms. Skipped, in words,
  * where there is no Chromium.
  */
-import { mkdtempSync, rmSync } from 'node:fs';
-import { tmpdir } from 'node:os';
-import { join, resolve } from 'node:path';
-import type { Browser, Page } from 'playwright-core';
-import { build, preview, type PreviewServer } from 'vite';
+import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { chromiumProgram, launchBrowser } from '../../testing/chromium.js';
+import { chromiumProgram } from '../../testing/chromium.js';
 import { distanceAttenuation, spotAttenuation } from '../src/falloff.js';
+import { openRenderPage, type RenderPage } from './support/render-page.js';
 
 if (!chromiumProgram) console.log('skipped: no Chromium');
 
@@ -19,46 +16,15 @@ const worldX = (pixel: number) => ((pixel + 0.5) / SIZE) * 4 - 2;
 const HALF_PIXEL = 2 / SIZE;
 
 describe.skipIf(!chromiumProgram)('drawn by', () => {
-  let folder: string;
-  let vite: PreviewServer;
-  let browser: Browser;
+  let opened: RenderPage;
   let page: Page;
 
   beforeAll(async () => {
-    folder = mkdtempSync(join(tmpdir(), 'lumencast-render-'));
-    const root = resolve(import.meta.dirname, 'render');
-    await build({
-      configFile: false,
-      root,
-      logLevel: 'error',
-      mode: 'production',
-      resolve: { conditions: ['lumencast-source', 'module', 'browser', 'import', 'default'] },
-      build: {
-        outDir: folder,
-        emptyOutDir: true,
-        target: 'es2023',
-        minify: false,
-        chunkSizeWarningLimit: 5000,
-      },
-    });
-    vite = await preview({
-      configFile: false,
-      root,
-      build: { outDir: folder },
-      preview: { host: '127.0.0.1', port: 0 },
-    });
-    browser = await launchBrowser();
-    page = await browser.newPage();
-    page.on('pageerror', (error) => console.error(error));
-    await page.goto(vite.resolvedUrls!.local[0]);
-    await page.waitForFunction(() => window.measure);
+    opened = await openRenderPage();
+    ({ page } = opened);
   }, 90_000);
 
-  afterAll(async () => {
-    await browser?.close();
-    await vite?.close();
-    rmSync(folder, { recursive: true, force: true });
-  }, 30_000);
+  afterAll(() => opened?.close(), 30_000);
 
   describe.each(['webgl', 'webgpu'] as const)('%s,', (kind) => {
     it.each(['point', 'spot'] as const)(

@@ -60,7 +60,7 @@ export class Controls {
     const { viewer } = this;
     const dock = this.#dock;
     dock.shown = viewer.light.show;
-    dock.exposure = Math.log2(viewer.renderer.toneMappingExposure);
+    dock.exposure = Math.log2(viewer.exposure);
     dock.lights = viewer.lights.map(nameOf);
     dock.set('fly', viewer.rig.mode === 'fly');
     dock.set('probes', viewer.probes.group.visible);
@@ -83,7 +83,7 @@ export class Controls {
         show: (shown) => viewer.setMode(shown),
         exposure: (stops) => {
           viewer.autoExposure = false;
-          viewer.renderer.toneMappingExposure = 2 ** stops;
+          viewer.exposure = 2 ** stops;
         },
         autoExposure: () => void viewer.meter(),
         tone: (name) => (viewer.renderer.toneMapping = TONE_MAPPINGS[name]),

@@ -5,7 +5,7 @@ import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { Controls } from './controls.js';
 import type { Figures } from './ui/stats.js';
 import { CameraRig } from './view/camera-rig.js';
-import { meter } from './view/exposure.js';
+import { meter, withinStops } from './view/exposure.js';
 import { findFlashlight, Flashlight } from './view/flashlight.js';
 import { ProbeSpheres } from './view/probes.js';
 import { type AnyRenderer, createRenderer, isWebGPU, Resolution } from './view/renderer.js';
@@ -175,11 +175,21 @@ export class Viewer {
     }
   }
 
+  /** Of the picture, 1 / (cd/m²). All light is drawn with it, so that half floats hold what is shown. */
+  get exposure(): number {
+    return this.light.preExposure;
+  }
+
+  set exposure(exposure: number) {
+    this.light.preExposure = withinStops(exposure);
+  }
+
   /** Sets the exposure by the picture. */
   meter(): Promise<void> {
-    return (this.#metering ??= meter(this.renderer, this.scene, this.rig.camera, this.selection.overlay)
-      .then((exposure) => {
-        if (exposure !== undefined) this.renderer.toneMappingExposure = exposure;
+    const { renderer, scene, rig, selection, exposure } = this;
+    return (this.#metering ??= meter(renderer, scene, rig.camera, selection.overlay, exposure)
+      .then((measured) => {
+        if (measured !== undefined) this.exposure = measured;
       })
       .finally(() => (this.#metering = undefined)));
   }

@@ -128,7 +128,7 @@ describe('a person at the page', () => {
   }, 60_000);
 
   it('sets the exposure, or leaves it to the page', async () => {
-    const stops = () => page.evaluate(() => Math.log2(window.lumencast!.renderer.toneMappingExposure));
+    const stops = () => page.evaluate(() => Math.log2(window.lumencast!.viewer.exposure));
     const [home, before] = [await stops(), brightness(await picture())];
     await slide('Exposure', home + 2);
     expect(await stops()).toBeCloseTo(home + 2, 0);
@@ -302,6 +302,67 @@ describe('a person at the page', () => {
     await click('Both light');
   }, 90_000);
 
+  it('finds a faint lamp as faint as it is, and does not change it by a touch', async () => {
+    const lamp = () => page.evaluate(() => window.lumencast!.viewer.spot!.intensity);
+    const set = (intensity: number) =>
+      page.evaluate((intensity) => {
+        const { light, viewer } = window.lumencast!;
+        return light.edit({ edit: 'set_light', node: light.content.nodeOf(viewer.spot!)!, intensity });
+      }, intensity);
+    const home = await lamp();
+    await page.selectOption('select[aria-label="Lights"]', { index: 1 });
+    const slider = page.locator('input[aria-label="Intensity"]');
+    for (const intensity of [1e-3, 1e-7]) {
+      await set(intensity);
+      await draw(page);
+      expect(await page.innerText('.inspector')).toContain(`${intensity} cd`);
+      await slider.dispatchEvent('input');
+      await draw(page);
+      expect(await lamp()).toBe(intensity);
+    }
+    // At that end the thumb stood already.
+    await slide('Intensity', 0);
+    await slide('Intensity', -4);
+    expect(await lamp()).toBe(0);
+    expect(await page.innerText('.inspector')).toContain('0 cd');
+    await slide('Intensity', 5);
+    expect(Math.log10(await lamp())).toBeCloseTo(5, 0);
+    await set(home);
+    await page.click('.inspector [title^="Close"]');
+  }, 60_000);
+
+  it('drags a lamp by its glyph', async () => {
+    const where = () =>
+      page.evaluate(() => {
+        const { viewer, light, camera } = window.lumencast!;
+        const at = viewer.spot!.getWorldPosition(camera.position.clone());
+        return { node: light.content.nodeOf(viewer.spot!)!, at: at.toArray() };
+      });
+    const home = await where();
+    const [x, y] = await onScreen(home.at);
+    await page.mouse.click(x, y);
+    await draw(page);
+    expect(await page.innerText('.inspector')).toMatch(/lamp[^]*spot light/);
+    await page.click('.inspector [title^="Move"]');
+    await draw(page);
+    const view = await camera();
+    // By the arrow to the right.
+    await drag([x + 30, y], [x + 40, y], [x + 60, y], [x + 90, y]);
+    expect(await camera()).toEqual(view);
+    // It is where the hand has let go of it, here and at the server.
+    const moved = await where();
+    const [nowX, nowY] = await onScreen(moved.at);
+    expect(Math.hypot(nowX - (x + 60), nowY - y)).toBeLessThan(6);
+    const sent = async () =>
+      (await accepted('move_node')).filter(({ node }) => node === home.node).at(-1)?.translation;
+    await expect.poll(async () => (await sent())?.[0], { timeout: 5000 }).toBeCloseTo(moved.at[0], 2);
+    await page.click('.inspector [title^="Close"]');
+    await page.evaluate(
+      ({ node, at }) => window.lumencast!.light.edit({ edit: 'move_node', node, translation: at }),
+      home,
+    );
+  }, 60_000);
+
   it('reads the figures and the keys, and pauses the animation for everyone', async () => {
     const figures = page.locator('.stats');
     expect(await figures.isVisible()).toBe(true);
@@ -362,6 +423,24 @@ describe('a page drawn by WebGPU', () => {
       expect(both.some(([r, g]) => g > 1.2 * r && g > 40)).toBe(true);
       expect(brightness(both)).toBeGreaterThan(1.1 * brightness(direct));
       await shoot(page, 'webgpu.png');
+      // Far brighter than in the sun: half floats do not hold its light, but what is shown of it.
+      const brightened = async (factor: number) => {
+        await page.evaluate(async (factor) => {
+          const { light, setMode, viewer } = window.lumencast!;
+          const [lamp] = viewer.lights;
+          const node = light.content.nodeOf(lamp)!;
+          await light.edit({ edit: 'set_light', node, intensity: lamp.intensity * factor });
+          setMode('direct');
+          await viewer.meter();
+        }, factor);
+        return look(page, 'direct');
+      };
+      await page.evaluate(() =>
+        window.lumencast!.light.edit({ edit: 'set_animation', animation: 0, playing: false }),
+      );
+      const [usual, sunny] = [await brightened(1), await brightened(2 ** 20)];
+      expect(brightness(usual)).toBeGreaterThan(20);
+      expect(difference(usual, sunny)).toBeLessThan(0.2);
       expect(errors).toEqual([]);
       await page.close();
     } finally {

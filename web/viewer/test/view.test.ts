@@ -1,6 +1,7 @@
 import { DirectionalLight, Group, PointLight, SpotLight, Vector3 } from 'three';
 import { describe, expect, it } from 'vitest';
-import { exposureFor } from '../src/view/exposure.js';
+import { INTENSITY, intensityAt, intensityText } from '../src/ui/intensity.js';
+import { exposureFor, STOPS, withinStops } from '../src/view/exposure.js';
 import { findFlashlight } from '../src/view/flashlight.js';
 import { setSunAngles, sunAngles } from '../src/view/sun.js';
 
@@ -22,6 +23,40 @@ describe('exposureFor', () => {
 
   it('leaves a black picture alone', () => {
     expect(exposureFor(new Array(100).fill(0))).toBeUndefined();
+  });
+});
+
+describe('the exposures that the page offers', () => {
+  it('hold what a picture in the sun asks for, and one by moonlight', () => {
+    // White ground under 100,000 and 0.1 lx.
+    for (const illuminance of [1e5, 0.1]) {
+      const exposure = exposureFor(new Array(100).fill(illuminance / Math.PI))!;
+      expect(withinStops(exposure)).toBe(exposure);
+    }
+  });
+
+  it('are all that is ever set', () => {
+    const brightest = exposureFor(new Array(100).fill(1e12))!;
+    expect(Math.log2(withinStops(brightest))).toBe(STOPS.min);
+    expect(Math.log2(withinStops(1e9))).toBe(STOPS.max);
+  });
+});
+
+describe('intensities of the inspector', () => {
+  const text = intensityText('lx');
+
+  it('are what the light has, however faint', () => {
+    for (const intensity of [1e-8, 1e-4, 1e-3, 0.02, 1, 60, 1e5, 1e6])
+      expect(text(Math.log10(intensity))).toBe(`${intensity} lx`);
+    expect(text(Math.log10(0))).toBe('0 lx');
+  });
+
+  it('reach from off over 0.001 lx to the sun', () => {
+    expect(intensityAt(INTENSITY.min)).toBe(0);
+    expect(intensityAt(-3)).toBeCloseTo(1e-3, 12);
+    expect(intensityAt(5)).toBe(1e5);
+    expect(INTENSITY.min).toBeLessThan(-3);
+    expect(INTENSITY.max).toBeGreaterThan(Math.log10(130_000));
   });
 });
 

@@ -16,6 +16,7 @@ class FakeGrid extends Light {
 export const platform: Platform = {
   createGrid: () => new FakeGrid() as ProbeGrid,
   scaleIn: 'atlas',
+  gridExposure: { value: 1 },
   freeGrids: () => 2,
   max3DTextureSize: 256,
   patch: () => {},

@@ -1,4 +1,5 @@
 import type { Shown } from '@lumencast/three';
+import { STOPS } from '../view/exposure.js';
 import { choice, h, type Icon, iconButton, setPressed, slider } from './dom.js';
 
 /** What the dock's controls do. */
@@ -50,9 +51,7 @@ export class Dock {
       this.#toggles.set(toggle, button);
       return button;
     });
-    this.#exposure = slider('Exposure', { min: -12, max: 12, step: 0.05 }, stops, (value) =>
-      actions.exposure(value),
-    );
+    this.#exposure = slider('Exposure', { ...STOPS, step: 0.05 }, stops, (value) => actions.exposure(value));
     const auto = h(
       'button',
       {

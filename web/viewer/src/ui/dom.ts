@@ -54,14 +54,18 @@ export function setPressed(button: HTMLButtonElement, pressed: boolean): void {
   button.setAttribute('aria-pressed', String(pressed));
 }
 
-/** A slider of a label and a value; `format` says the value in words. */
+/**
+ * A slider of a label and a value; `format` says the value in words, and `onInput` may return what came of
+ * the thumb's position. A value past an end is said as it is, and stays until the thumb is moved.
+ */
 export function slider(
   label: string,
   range: { min: number; max: number; step: number },
   format: (value: number) => string,
-  onInput: (value: number) => void,
+  onInput: (value: number) => number | void,
 ): { element: HTMLElement; set: (value: number) => void } {
   const output = h('output');
+  let shown: number;
   const input = h('input', {
     type: 'range',
     min: String(range.min),
@@ -69,15 +73,17 @@ export function slider(
     step: String(range.step),
     'aria-label': label,
     oninput: () => {
-      output.value = format(input.valueAsNumber);
-      onInput(input.valueAsNumber);
+      if (input.valueAsNumber === shown) return;
+      shown = input.valueAsNumber;
+      output.value = format(onInput(shown) ?? shown);
     },
   });
   return {
     element: h('label', { class: 'slider' }, h('span', {}, label), input, output),
     set(value) {
       if (document.activeElement === input && input.matches(':active')) return;
-      input.valueAsNumber = value;
+      input.valueAsNumber = Math.min(Math.max(value, range.min), range.max);
+      shown = input.valueAsNumber;
       output.value = format(value);
     },
   };

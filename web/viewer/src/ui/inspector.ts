@@ -3,6 +3,7 @@ import { DirectionalLight, type Object3D, PointLight, SpotLight, SRGBColorSpace 
 import { setSunAngles, sunAngles } from '../view/sun.js';
 import type { Gizmo } from '../view/selection.js';
 import { h, iconButton, setPressed, slider } from './dom.js';
+import { INTENSITY, intensityAt, intensityText } from './intensity.js';
 
 export interface InspectorActions {
   /** The object is about to be changed by hand. */
@@ -49,9 +50,9 @@ export class Inspector {
   #rows(object: Object3D): HTMLElement[] {
     if (!isPunctualLight(object)) return [];
     const rows = [
-      this.#slider('Intensity', { min: -3, max: 5, step: 0.01 }, intensityText(object), {
-        get: () => Math.log10(Math.max(object.intensity, 1e-3)),
-        set: (value) => (object.intensity = value <= -3 ? 0 : 10 ** value),
+      this.#slider('Intensity', INTENSITY, intensityText(unitOf(object)), {
+        get: () => Math.log10(object.intensity),
+        set: (value) => (object.intensity = intensityAt(value)),
       }),
       this.#color(object),
     ];
@@ -89,6 +90,7 @@ export class Inspector {
     const { element, set } = slider(label, range, format, (input) => {
       if (this.#object) this.actions.touched(this.#object);
       value.set(input);
+      return value.get();
     });
     this.#refresh.push(() => set(value.get()));
     return element;
@@ -138,7 +140,6 @@ function kindOf(object: Object3D): string {
   return 'object';
 }
 
-function intensityText(light: Object3D): (value: number) => string {
-  const unit = light instanceof DirectionalLight ? 'lx' : 'cd';
-  return (value) => `${value <= -3 ? 0 : Number((10 ** value).toPrecision(2))} ${unit}`;
+function unitOf(light: Object3D): string {
+  return light instanceof DirectionalLight ? 'lx' : 'cd';
 }

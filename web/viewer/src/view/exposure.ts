@@ -1,6 +1,9 @@
 import { type Camera, FloatType, type Object3D, type Scene, WebGLRenderTarget } from 'three';
 import type { AnyRenderer } from './renderer.js';
 
+/** Exposures that the page offers, in stops: 0 is 1 / (cd/m²). A white ground at noon asks for −17. */
+export const STOPS = { min: -20, max: 14 } as const;
+
 const WIDTH = 96;
 const HEIGHT = 54;
 
@@ -13,6 +16,8 @@ export async function meter(
   scene: Scene,
   camera: Camera,
   hidden: Object3D,
+  /** What the scene's radiance is multiplied by as it is drawn. */
+  preExposure: number,
 ): Promise<number | undefined> {
   const target = new WebGLRenderTarget(WIDTH, HEIGHT, { type: FloatType });
   const visible = hidden.visible;
@@ -24,7 +29,8 @@ export async function meter(
     renderer.render(scene, camera);
     renderer.setRenderTarget(before as never);
     hidden.visible = visible;
-    return exposureFor(luminances(await read(renderer, target)));
+    const seen = luminances(await read(renderer, target));
+    return exposureFor(seen.map((value) => value / preExposure));
   } finally {
     hidden.visible = visible;
     target.dispose();
@@ -47,6 +53,11 @@ function luminances(pixels: Float32Array): number[] {
     if (Number.isFinite(value)) all.push(value);
   }
   return all;
+}
+
+/** The nearest exposure that the page offers. */
+export function withinStops(exposure: number): number {
+  return Math.min(Math.max(exposure, 2 ** STOPS.min), 2 ** STOPS.max);
 }
 
 /** Exposure for these luminances; `undefined` when (nearly) all is black. */
