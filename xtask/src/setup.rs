@@ -68,6 +68,14 @@ const PACKAGES: &[Package] = &[
         present: || runs("tc", "-V"),
     },
     Package {
+        name: "xvfb",
+        release: Release::Stable,
+        purpose: Purpose::Test,
+        why: "a display for the test of the window",
+        optional: false,
+        present: || runs("Xvfb", "-help"),
+    },
+    Package {
         name: "python3-pip",
         release: Release::Stable,
         purpose: Purpose::Test,

@@ -5,10 +5,10 @@ use std::str::FromStr;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use glam::{EulerRot, Quat, UVec2, Vec3};
+use glam::{UVec2, Vec3};
 use lumencast_gather::path_trace::Options;
 use lumencast_gather::reference::PictureSettings;
-use lumencast_scene::{Scene, View};
+use lumencast_scene::{NamedView, Scene, View};
 
 use crate::arguments::Materials;
 
@@ -89,57 +89,36 @@ impl FromStr for CameraArgument {
 /// The view of the camera asked for; of the scene's first where none was; of the whole scene where
 /// it has none.
 pub(crate) fn view(scene: &Scene, camera: Option<&CameraArgument>) -> Result<View> {
-    let cameras = scene.cameras();
-    let found = match camera {
-        Some(CameraArgument::LookAt(view)) => return Ok(*view),
-        None => match cameras.first() {
-            Some(first) => first,
-            None => return Ok(overview(scene)),
-        },
-        Some(CameraArgument::Named(name)) => {
-            let named = cameras.iter().find(|c| c.camera.name == *name || c.node_name == name);
-            let numbered = || cameras.get(name.parse::<usize>().ok()?);
-            match named.or_else(numbered) {
-                Some(camera) => camera,
-                None if cameras.is_empty() => {
-                    bail!("the scene has no cameras; give --camera EX,EY,EZ,TX,TY,TZ[,FOV]")
-                }
-                None => {
-                    let known: Vec<_> = cameras
-                        .iter()
-                        .enumerate()
-                        .map(|(i, c)| format!("{i} ({})", c.node_name))
-                        .collect();
-                    bail!("there is no camera {name:?}; there are {}", known.join(", "))
-                }
-            }
-        }
-    };
-    Ok(found.view())
+    let views = scene.views();
+    match camera {
+        Some(camera) => among(&views, camera),
+        None => Ok(views[0].view),
+    }
 }
 
-/// All of the scene, from above one of its corners.
-fn overview(scene: &Scene) -> View {
-    let bounds = scene.bounds();
-    let radius = (0.5 * (bounds.max - bounds.min).length()).max(1e-3);
-    let center = 0.5 * (bounds.min + bounds.max);
-    let fov = FIELD_OF_VIEW.to_radians();
-    let turn = Quat::from_euler(EulerRot::YXZ, 35f32.to_radians(), -25f32.to_radians(), 0.0);
-    let rotation = glam::Mat3::from_quat(turn);
-    let eye = center + rotation * Vec3::Z * (radius / (0.5 * fov).sin());
-    View {
-        world_from_camera: glam::Affine3A::from_mat3_translation(rotation, eye),
-        projection: lumencast_scene::Projection::Perspective {
-            yfov: fov,
-            aspect_ratio: None,
-            near: 0.01,
-            far: None,
-        },
+/// The view asked for, among those of a scene.
+pub(crate) fn among(views: &[NamedView], camera: &CameraArgument) -> Result<View> {
+    let name = match camera {
+        CameraArgument::LookAt(view) => return Ok(*view),
+        CameraArgument::Named(name) => name,
+    };
+    let named = views.iter().find(|v| v.name == *name || v.node_name == *name);
+    let numbered = || views.get(name.parse::<usize>().ok()?);
+    match named.or_else(numbered) {
+        Some(found) => Ok(found.view),
+        None => {
+            let known: Vec<_> =
+                views.iter().enumerate().map(|(i, v)| format!("{i} ({})", v.name)).collect();
+            bail!(
+                "there is no camera {name:?}; there are {}, and EX,EY,EZ,TX,TY,TZ[,FOV]",
+                known.join(", ")
+            )
+        }
     }
 }
 
 /// `WxH`
-fn parse_size(text: &str) -> Result<UVec2, String> {
+pub(crate) fn parse_size(text: &str) -> Result<UVec2, String> {
     const LARGEST: u32 = 16_384;
     let wrong = || format!("{text:?}: a size is given as 1280x720, each side from 1 to {LARGEST}");
     let (width, height) = text.split_once('x').ok_or_else(wrong)?;

@@ -8,7 +8,7 @@ use lumencast_codec::LightFile;
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::ProbeVolume;
-use lumencast_scene::{Snapshot, VolumeSpec};
+use lumencast_scene::{Scene, Snapshot, VolumeSpec};
 use lumencast_server::GatherOptions;
 
 use crate::{output, remote};
@@ -26,6 +26,15 @@ pub(crate) fn volumes(what: &str) -> Result<Vec<ProbeVolume>> {
     let bytes = std::fs::read(Path::new(what)).with_context(|| format!("cannot read {what}"))?;
     let read = || LightFile::read(&bytes)?.volumes();
     read().with_context(|| format!("{what} is no light field"))
+}
+
+/// Warns where a field lights no part of a scene.
+pub(crate) fn check_fits(what: &str, volumes: &[ProbeVolume], scene: &Scene) {
+    let bounds = scene.bounds();
+    let (middle, reach) = (0.5 * (bounds.min + bounds.max), 0.5 * bounds.min.distance(bounds.max));
+    if !volumes.iter().any(|volume| volume.grid.distance(middle) <= reach) {
+        eprintln!("warning: {what} lights no part of this scene; is it another scene's?");
+    }
 }
 
 /// How a field is computed.

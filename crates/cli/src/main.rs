@@ -19,6 +19,7 @@ mod remote;
 mod render;
 mod serve;
 mod token;
+mod view;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -38,6 +39,7 @@ const EXAMPLES: &str = "\
 Examples:
   lumencast serve cornell                 a built-in scene; prints the page's address
   lumencast serve sponza.glb              a scene of your own
+  lumencast view sponza.glb               in a window, without a browser
   lumencast bake sponza.glb -o sponza.light
   lumencast doctor                        when something does not work
 
@@ -52,6 +54,7 @@ const LOGGED: &str = "warn,moq_sock=error,moq_tokio=error,moq_net=error,moq_rela
 #[derive(Debug, Subcommand)]
 enum Command {
     Serve(serve::Serve),
+    View(Box<view::View>),
     Bake(bake::Bake),
     Inspect(inspect::Inspect),
     Probe(probe::Probe),
@@ -75,6 +78,7 @@ fn main() -> ExitCode {
 
     let result = match cli.command {
         Command::Serve(command) => command.run(),
+        Command::View(command) => command.run(),
         Command::Bake(command) => command.run(),
         Command::Inspect(command) => command.run(),
         Command::Probe(command) => command.run(),
@@ -90,5 +94,17 @@ fn main() -> ExitCode {
             eprintln!("error: {error:#}");
             ExitCode::FAILURE
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    /// No two arguments of a command have one name, and so on.
+    #[test]
+    fn commands_are_sound() {
+        Cli::command().debug_assert();
     }
 }

@@ -40,7 +40,7 @@ pub(crate) fn json(value: &serde_json::Value) -> Result<()> {
 pub(crate) fn check_file(path: &Path) -> Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
-    ensure!(folder.is_dir(), "{}: there is no such folder", folder.display());
+    ensure!(folder.is_dir(), "{}: there is no such folder as {}", path.display(), folder.display());
     ensure!(!path.is_dir(), "{}: is a folder", path.display());
     Ok(())
 }

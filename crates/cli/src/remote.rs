@@ -81,7 +81,11 @@ async fn region_light(
 
 /// The first frame of a track.
 async fn first(client: &Client, track: &str) -> Result<bytes::Bytes> {
-    let mut reader = client.subscribe(client.scene(), track, ReadOptions::default().with_max_frame(limits::FRAME_BYTES));
+    let mut reader = client.subscribe(
+        client.scene(),
+        track,
+        ReadOptions::default().with_max_frame(limits::FRAME_BYTES),
+    );
     let frame = reader.next().await?;
     Ok(frame.with_context(|| format!("the server has no track {track}"))?.bytes)
 }

@@ -12,6 +12,7 @@ fn help_shows_examples_and_the_version_is_told() {
     for arguments in [
         &["--help"][..],
         &["serve", "--help"],
+        &["view", "--help"],
         &["bake", "--help"],
         &["inspect", "--help"],
         &["probe", "--help"],
@@ -22,6 +23,8 @@ fn help_shows_examples_and_the_version_is_told() {
         &["bench", "tick", "--help"],
         &["bench", "rays", "--help"],
         &["bench", "paths", "--help"],
+        &["bench", "quality", "--help"],
+        &["bench", "peers", "--help"],
     ] {
         let ran = run(arguments);
         assert_eq!(ran.code, Some(0), "{arguments:?}: {ran:?}");

@@ -1,8 +1,8 @@
 //! From where a picture is seen.
 
-use glam::{Affine3A, Vec2, Vec3};
+use glam::{Affine3A, EulerRot, Mat3, Quat, Vec2, Vec3};
 
-use crate::Projection;
+use crate::{Aabb, Projection};
 
 /// A camera at its place.
 ///
@@ -17,7 +17,37 @@ pub struct View {
     pub projection: Projection,
 }
 
+/// A view with what it is called.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedView {
+    /// The camera's name, else its node's, else its number.
+    pub name: String,
+    /// The name of its node; may be empty.
+    pub node_name: String,
+    /// What it sees.
+    pub view: View,
+}
+
 impl View {
+    /// A perspective view of a whole box, from above one of its corners.
+    pub fn overview(bounds: &Aabb) -> Self {
+        const FIELD_OF_VIEW: f32 = 50.0 * std::f32::consts::PI / 180.0;
+        let radius = (0.5 * (bounds.max - bounds.min).length()).max(1e-3);
+        let center = 0.5 * (bounds.min + bounds.max);
+        let turn = Quat::from_euler(EulerRot::YXZ, 35f32.to_radians(), -25f32.to_radians(), 0.0);
+        let rotation = Mat3::from_quat(turn);
+        let eye = center + rotation * Vec3::Z * (radius / (0.5 * FIELD_OF_VIEW).sin());
+        Self {
+            world_from_camera: Affine3A::from_mat3_translation(rotation, eye),
+            projection: Projection::Perspective {
+                yfov: FIELD_OF_VIEW,
+                aspect_ratio: None,
+                near: 0.01,
+                far: None,
+            },
+        }
+    }
+
     /// A perspective view from `eye` towards `target` with +Y up where possible; `yfov` is the
     /// vertical field of view in radians, between 0 and π. `None` where eye and target coincide or
     /// a number is not finite.

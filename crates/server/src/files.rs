@@ -53,6 +53,11 @@ impl FileSet {
         self.0.contains_key(name)
     }
 
+    /// The names of all files.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.0.keys().map(String::as_str)
+    }
+
     /// What stands behind a name.
     pub(crate) fn get(&self, name: &str) -> Option<&Contents> {
         self.0.get(name)

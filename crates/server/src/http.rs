@@ -75,10 +75,14 @@ pub(crate) fn router(shared: Arc<Shared>) -> Router {
         .layer(map_response(secured))
 }
 
-/// What a page needs to know to begin.
+/// What a client needs to know to begin.
 async fn start(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
+    let files: Vec<String> = {
+        let files = shared.scene_files.read().unwrap_or_else(PoisonError::into_inner);
+        files.names().map(str::to_owned).collect()
+    };
     let start = serde_json::json!({
-        "scene": shared.scene, "root": shared.root, "broadcast": shared.scene,
+        "scene": shared.scene, "root": shared.root, "broadcast": shared.scene, "files": files,
     });
     ([(header::CONTENT_TYPE, "application/json")], start.to_string())
 }

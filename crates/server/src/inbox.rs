@@ -220,9 +220,7 @@ fn parse(bytes: &[u8]) -> Option<(u64, Result<Edit, String>)> {
     }
     match ClientEdit::decode(bytes) {
         Ok(ClientEdit { seq, edit }) => Some((seq, Ok(edit))),
-        Err((seq, error)) => {
-            Some((seq?, Err(format!("not an edit: {error}"))))
-        }
+        Err((seq, error)) => Some((seq?, Err(format!("not an edit: {error}")))),
     }
 }
 

@@ -18,6 +18,10 @@ pub(crate) const SAMPLER: wgpu::BindingType =
 pub(crate) const FILTERED: wgpu::TextureSampleType =
     wgpu::TextureSampleType::Float { filterable: true };
 
+/// A picture, read pixel by pixel.
+pub(crate) const PICTURE: wgpu::BindingType =
+    texture(wgpu::TextureSampleType::Float { filterable: false }, wgpu::TextureViewDimension::D2);
+
 const fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
     wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
 }

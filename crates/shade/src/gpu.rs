@@ -14,6 +14,7 @@ pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// A device, and what is known of its adapter.
 #[derive(Debug)]
 pub struct Gpu {
+    adapter: wgpu::Adapter,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     info: wgpu::AdapterInfo,
@@ -30,23 +31,41 @@ impl Gpu {
     /// # Errors
     /// Where there is none, or it gives no device.
     pub fn new() -> Result<Self, ShadeError> {
-        pollster::block_on(Self::open())
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+        Self::of_instance(&instance, None)
     }
 
-    async fn open() -> Result<Self, ShadeError> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    /// Of the fastest adapter that can show pictures on a surface of that instance.
+    ///
+    /// # Errors
+    /// As [`Gpu::new`].
+    pub fn for_surface(
+        instance: &wgpu::Instance,
+        surface: &wgpu::Surface<'_>,
+    ) -> Result<Self, ShadeError> {
+        Self::of_instance(instance, Some(surface))
+    }
+
+    fn of_instance(
+        instance: &wgpu::Instance,
+        surface: Option<&wgpu::Surface<'_>>,
+    ) -> Result<Self, ShadeError> {
         let options = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
+            compatible_surface: surface,
             ..Default::default()
         };
-        let adapter = instance.request_adapter(&options).await.map_err(|error| {
-            tracing::debug!(%error, "no adapter");
-            ShadeError::NoAdapter
-        })?;
-        Self::of_adapter(&adapter).await
+        let open = async {
+            let adapter = instance.request_adapter(&options).await.map_err(|error| {
+                tracing::debug!(%error, "no adapter");
+                ShadeError::NoAdapter
+            })?;
+            Self::of_adapter(adapter).await
+        };
+        pollster::block_on(open)
     }
 
-    async fn of_adapter(adapter: &wgpu::Adapter) -> Result<Self, ShadeError> {
+    async fn of_adapter(adapter: wgpu::Adapter) -> Result<Self, ShadeError> {
         let info = adapter.get_info();
         // With this feature, sample counts are those of the adapter instead of WebGPU's 1 and 4.
         let specific = wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES;
@@ -87,7 +106,22 @@ impl Gpu {
                 keep(format!("device lost: {message}"), &of_loss);
             }
         });
-        Ok(Self { device, queue, info, sample_counts, fault })
+        Ok(Self { adapter, device, queue, info, sample_counts, fault })
+    }
+
+    /// For those who draw more onto what is shown.
+    pub fn device(&self) -> &wgpu::Device {
+        &self.device
+    }
+
+    /// The device's.
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.queue
+    }
+
+    /// What the device is of.
+    pub fn adapter(&self) -> &wgpu::Adapter {
+        &self.adapter
     }
 
     /// Name of the adapter, and of its driver.
@@ -133,24 +167,27 @@ impl Gpu {
         self.check(during)
     }
 
-    /// Waits for what was copied to a buffer.
-    pub(crate) fn read(
-        &self,
-        buffer: &wgpu::Buffer,
-        during: &'static str,
-    ) -> Result<wgpu::BufferView, ShadeError> {
-        let failed = |reason: String| ShadeError::Failed { during, reason };
-        let (sender, receiver) = std::sync::mpsc::channel();
-        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            // Nobody waits any more where the renderer gave up.
-            let _ = sender.send(result);
-        });
-        self.finish(during)?;
-        receiver
-            .recv()
-            .map_err(|error| failed(error.to_string()))?
-            .map_err(|error| failed(error.to_string()))?;
-        buffer.get_mapped_range(..).map_err(|error| failed(error.to_string()))
+    /// What the device has complained about since it was last asked, without waiting for it.
+    ///
+    /// # Errors
+    /// Where it was lost, or has failed otherwise.
+    pub fn health(&self) -> Result<(), ShadeError> {
+        self.poll("drawing")
+    }
+
+    /// Lets callbacks of what is done be called, without waiting.
+    pub(crate) fn poll(&self, during: &'static str) -> Result<(), ShadeError> {
+        self.device
+            .poll(wgpu::PollType::Poll)
+            .map_err(|error| ShadeError::Failed { during, reason: error.to_string() })?;
+        self.check(during)
+    }
+
+    pub(crate) fn shader(&self, label: &str, source: String) -> wgpu::ShaderModule {
+        self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        })
     }
 
     /// A buffer with contents; of at least `least` bytes, since bindings may not be empty.

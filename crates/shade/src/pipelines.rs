@@ -2,7 +2,7 @@
 
 use lumencast_shaders::{Shading, background, depth, forward};
 
-use crate::gpu::{COLOR, DEPTH};
+use crate::gpu::{COLOR, DEPTH, Gpu};
 use crate::materials::Surface;
 use crate::settings::Transparency;
 use crate::{geometry, materials};
@@ -58,10 +58,11 @@ fn pass_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 impl Layouts {
     /// `light` and `field`: the bindings of groups 1 and 2.
     pub(crate) fn new(
-        device: &wgpu::Device,
+        gpu: &Gpu,
         light: &wgpu::BindGroupLayout,
         field: &wgpu::BindGroupLayout,
     ) -> Self {
+        let device = &gpu.device;
         let pass = pass_layout(device);
         let material = materials::group_layout(device);
         let layout = |label, groups: &[Option<&wgpu::BindGroupLayout>]| {
@@ -73,7 +74,7 @@ impl Layouts {
         };
         let forward = layout("forward", &[Some(&pass), Some(light), Some(field), Some(&material)]);
         let background = layout("background", &[Some(&pass), Some(light)]);
-        let module = shader(device, "depth", depth());
+        let module = gpu.shader("depth", depth());
         let solid = layout("depth", &[Some(&pass)]);
         let masked = layout("masked depth", &[Some(&pass), None, None, Some(&material)]);
         let solid_depth = depth_pipeline(device, &solid, &module, "depth_vertex", None);
@@ -96,9 +97,10 @@ impl Layouts {
 }
 
 impl Pipelines {
-    pub(crate) fn new(device: &wgpu::Device, layouts: &Layouts, variant: Variant) -> Self {
-        let module = shader(device, "forward", forward(variant.shading));
-        let sky = shader(device, "background", background());
+    pub(crate) fn new(gpu: &Gpu, layouts: &Layouts, variant: Variant) -> Self {
+        let device = &gpu.device;
+        let module = gpu.shader("forward", forward(variant.shading));
+        let sky = gpu.shader("background", background());
         let is_sorted = variant.transparency == Transparency::Sorted;
         Self {
             variant,
@@ -130,13 +132,6 @@ impl Pipelines {
             Surface::Blended => &self.blended,
         }
     }
-}
-
-fn shader(device: &wgpu::Device, label: &str, source: String) -> wgpu::ShaderModule {
-    device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(label),
-        source: wgpu::ShaderSource::Wgsl(source.into()),
-    })
 }
 
 fn vertex<'a>(

@@ -15,10 +15,11 @@ use crate::lights::GpuLights;
 use crate::materials::Surface;
 use crate::pipelines::{Layouts, Pipelines, Variant};
 use crate::scene::{Call, GpuScene};
+use crate::screen::{Screen, Show};
 use crate::settings::{Lighting, Materials, Settings, Transparency};
 use crate::shadows::ShadowPlan;
-use crate::target::{Copied, Target, depth_attachment};
-use crate::timing::Timing;
+use crate::target::{Target, depth_attachment};
+use crate::timing::{PassTimes, Timing};
 
 /// How far patterns turn from one frame of a picture to the next: the golden section fills the circle
 /// evenly for any number.
@@ -74,21 +75,22 @@ pub struct Drawn {
     pub time: Option<PassTimes>,
 }
 
-/// Seconds on the device, by pass.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PassTimes {
-    /// Shadow maps: drawn once for all views, and kept while neither scene nor cascades change.
-    pub shadows: f64,
-    /// Surfaces and what lies behind them, of all views.
-    pub pictures: f64,
+impl Drawn {
+    fn of_plan(&mut self, plan: &ShadowPlan) {
+        self.shadow_maps = plan.views.len();
+        self.shadow_resolution = plan.resolution;
+        self.lights_without_shadow = plan.left_out;
+    }
 }
 
-/// A frame on its way back.
-struct Frame {
-    copies: Vec<Copied>,
-    timing: Option<Timing>,
-    /// How many of the timed passes drew shadow maps.
-    shadow_maps: usize,
+/// What a frame is of.
+#[derive(Clone, Copy)]
+struct FrameSettings<'a> {
+    snapshot: &'a Snapshot,
+    plan: &'a ShadowPlan,
+    settings: &'a Settings,
+    /// Among the frames of a picture.
+    number: u32,
 }
 
 /// What the passes of a frame share: group 0, with bytes from one pass's view to the next's.
@@ -114,7 +116,7 @@ impl Renderer {
     pub fn new(gpu: Gpu, settings: &Settings) -> Self {
         let (lights, field) = (GpuLights::new(&gpu), GpuField::new(&gpu));
         Self {
-            layouts: Layouts::new(&gpu.device, &lights.layout, &field.layout),
+            layouts: Layouts::new(&gpu, &lights.layout, &field.layout),
             scene: GpuScene::new(&gpu, settings.anisotropy),
             lights,
             field,
@@ -180,7 +182,7 @@ impl Renderer {
         let mut pictures = vec![vec![Vec3::ZERO; pixels]; views.len()];
         let weight = 1.0 / (settings.pre_exposure * frames as f32);
         let mut drawn = Drawn { frames, samples, ..Drawn::default() };
-        let Some((snapshot, _)) = self.shown.clone() else { return Ok((pictures, drawn)) };
+        let Some(snapshot) = self.snapshot() else { return Ok((pictures, drawn)) };
         let camera = |view: &View, moved| Camera::new(view, settings.size, moved);
         // The same for all frames, so that its maps are drawn once.
         let still: Vec<Camera> = views.iter().map(|view| camera(view, Vec2::ZERO)).collect();
@@ -190,23 +192,64 @@ impl Renderer {
             let moved = jitter(number, frames) / samples as f32;
             let cameras: Vec<Camera> = views.iter().map(|view| camera(view, moved)).collect();
             let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-            let frame = self.frame(&mut encoder, &snapshot, &cameras, &plan, settings, number);
+            let mut copies = Vec::with_capacity(views.len());
+            let frame = FrameSettings { snapshot: &snapshot, plan: &plan, settings, number };
+            let timing = self.frame(&mut encoder, frame, &cameras, |gpu, encoder, target| {
+                copies.push(target.copy(gpu, encoder));
+            });
             self.gpu.queue.submit([encoder.finish()]);
-            for (picture, copy) in pictures.iter_mut().zip(&frame.copies) {
+            for (picture, copy) in pictures.iter_mut().zip(copies) {
                 copy.add_to(&self.gpu, picture, weight)?;
             }
-            if let Some(timing) = &frame.timing {
-                let seconds = timing.seconds(&self.gpu)?;
-                let (shadows, views) = seconds.split_at(frame.shadow_maps);
-                let time = drawn.time.get_or_insert_default();
-                time.shadows += shadows.iter().sum::<f64>();
-                time.pictures += views.iter().sum::<f64>();
+            if let Some(timing) = timing {
+                *drawn.time.get_or_insert_default() += timing.submitted().wait(&self.gpu)?;
             }
         }
-        drawn.shadow_maps = plan.views.len();
-        drawn.shadow_resolution = plan.resolution;
-        drawn.lights_without_shadow = plan.left_out;
+        drawn.of_plan(&plan);
         Ok((pictures, drawn))
+    }
+
+    /// Draws a view and shows it on a texture of the settings' size, without waiting for it. Of the
+    /// samples, no more are drawn than the adapter multisamples at once. What the picture turned out
+    /// to be, and what it took, [`Screen::measured`] tells later.
+    ///
+    /// # Errors
+    /// Where the device has failed or the size is none that it draws.
+    pub fn show(
+        &mut self,
+        view: &View,
+        settings: &Settings,
+        screen: &mut Screen,
+        show: Show,
+        onto: &wgpu::TextureView,
+    ) -> Result<Drawn, ShadeError> {
+        self.gpu.check_size(settings.size)?;
+        self.gpu.check("showing a picture")?;
+        let samples = self.gpu.samples_at_once(settings.samples.max(1));
+        self.prepare(settings, samples);
+        let mut drawn = Drawn { frames: 1, samples, ..Drawn::default() };
+        let Some(snapshot) = self.snapshot() else { return Ok(drawn) };
+        let cameras = [Camera::new(view, settings.size, Vec2::ZERO)];
+        let plan = self.shadow_plan(&snapshot, &cameras, settings);
+        drawn.of_plan(&plan);
+
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let frame = FrameSettings { snapshot: &snapshot, plan: &plan, settings, number: 0 };
+        let mut histogram = None;
+        let timing = self.frame(&mut encoder, frame, &cameras, |gpu, encoder, target| {
+            let picture = target.picture();
+            screen.draw(gpu, encoder, picture, settings.pre_exposure, show, onto);
+            histogram = screen.measure(gpu, encoder, picture);
+        });
+        self.gpu.queue.submit([encoder.finish()]);
+        if let Some(histogram) = histogram {
+            screen.submitted(timing.map(Timing::submitted), histogram, settings.pre_exposure);
+        }
+        Ok(drawn)
+    }
+
+    fn snapshot(&self) -> Option<Arc<Snapshot>> {
+        self.shown.as_ref().map(|(snapshot, _)| snapshot.clone())
     }
 
     /// Makes ready what the settings ask for.
@@ -218,7 +261,7 @@ impl Renderer {
             transparency: settings.transparency,
         };
         if self.pipelines.as_ref().is_none_or(|p| p.variant != variant) {
-            self.pipelines = Some(Pipelines::new(&self.gpu.device, &self.layouts, variant));
+            self.pipelines = Some(Pipelines::new(&self.gpu, &self.layouts, variant));
         }
         if self.target.as_ref().is_none_or(|target| !target.fits(settings.size, samples)) {
             self.target = Some(Target::new(&self.gpu, settings.size, samples));
@@ -235,15 +278,14 @@ impl Renderer {
     }
 
     /// Draws one frame of each camera: shadow maps, then surfaces, then what lies behind them.
+    /// `taken` is called after each camera's commands, before the next one's overwrite the picture.
     fn frame(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
-        snapshot: &Snapshot,
+        FrameSettings { snapshot, plan, settings, number }: FrameSettings<'_>,
         cameras: &[Camera],
-        plan: &ShadowPlan,
-        settings: &Settings,
-        frame: u32,
-    ) -> Frame {
+        mut taken: impl FnMut(&Gpu, &mut wgpu::CommandEncoder, &Target),
+    ) -> Option<Timing> {
         let redraws = self.drawn.as_ref() != Some(plan);
 
         let mut visible = Vec::new();
@@ -253,7 +295,7 @@ impl Renderer {
         };
         let camera_calls: Vec<Vec<Call>> =
             cameras.iter().map(|c| self.seen(c, settings.transparency, &mut visible)).collect();
-        let turn = GOLDEN * frame as f32;
+        let turn = GOLDEN * number as f32;
         let shadows = if redraws { plan.views.as_slice() } else { &[] };
         let views: Vec<layout::View> = shadows
             .iter()
@@ -263,26 +305,27 @@ impl Renderer {
             })
             .chain(cameras.iter().map(|camera| camera.layout(turn)))
             .collect();
-        let passes = self.passes(&views, &visible);
+        let passes = self.passes(&views, shadows.len(), &visible);
 
         if redraws {
             let layers = self.lights.shadow_maps(&self.gpu, plan);
-            for ((layer, calls), number) in layers.iter().zip(&shadow_calls).zip(0..) {
-                self.draw_shadow_map(encoder, &passes, number, layer, calls);
+            for ((layer, calls), pass) in layers.iter().zip(&shadow_calls).zip(0..) {
+                self.draw_shadow_map(encoder, &passes, pass, layer, calls);
             }
             self.drawn = Some(plan.clone());
         }
-        let frame = frame_layout(settings, self.pipelines.as_ref(), frame);
+        let frame = frame_layout(settings, self.pipelines.as_ref(), number);
         let light = self.lights.group(&self.gpu, snapshot, plan, frame);
-        let mut copies = Vec::with_capacity(cameras.len());
-        for (calls, number) in camera_calls.iter().zip(shadows.len() as u32..) {
-            self.draw_picture(encoder, &passes, number, calls, &light, settings.lighting);
-            copies.extend(self.target.as_ref().map(|target| target.copy(&self.gpu, encoder)));
+        for (calls, pass) in camera_calls.iter().zip(shadows.len() as u32..) {
+            self.draw_picture(encoder, &passes, pass, calls, &light, settings.lighting);
+            if let Some(target) = &self.target {
+                taken(&self.gpu, encoder, target);
+            }
         }
         if let Some(timing) = &passes.timing {
             timing.resolve(encoder);
         }
-        Frame { copies, timing: passes.timing, shadow_maps: shadows.len() }
+        passes.timing
     }
 
     fn shadow_plan(
@@ -326,9 +369,10 @@ impl Renderer {
         }
     }
 
-    /// A pass a view; `visible`: the instances that they draw.
-    fn passes(&self, views: &[layout::View], visible: &[u32]) -> Passes {
-        let timing = Timing::new(&self.gpu, views.len());
+    /// A pass a view, the first `shadow_maps` for shadow maps; `visible`: the instances that they
+    /// draw.
+    fn passes(&self, views: &[layout::View], shadow_maps: usize, visible: &[u32]) -> Passes {
+        let timing = Timing::new(&self.gpu, views.len(), shadow_maps);
         let alignment = self.gpu.device.limits().min_uniform_buffer_offset_alignment;
         let size = size_of::<layout::View>();
         let stride = (size as u32).next_multiple_of(alignment);

@@ -5,6 +5,7 @@ use half::f16;
 
 use crate::ShadeError;
 use crate::gpu::{COLOR, DEPTH, Gpu};
+use crate::readback::Readback;
 
 /// Rows that are copied to a buffer begin at multiples of so many bytes.
 const ROW_ALIGNMENT: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
@@ -38,7 +39,8 @@ impl Target {
             })
         };
         let attached = wgpu::TextureUsages::RENDER_ATTACHMENT;
-        let resolved = texture("picture", COLOR, 1, attached | wgpu::TextureUsages::COPY_SRC);
+        let read = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::TEXTURE_BINDING;
+        let resolved = texture("picture", COLOR, 1, attached | read);
         let view =
             |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let resolved_view = view(&resolved);
@@ -79,15 +81,15 @@ impl Target {
         })
     }
 
+    /// The picture: linear, pre-exposed.
+    pub(crate) fn picture(&self) -> &wgpu::TextureView {
+        &self.resolved_view
+    }
+
     /// Copies the picture to where it can be read.
     pub(crate) fn copy(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) -> Copied {
         let row = (PIXEL * self.size.x).next_multiple_of(ROW_ALIGNMENT);
-        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("picture"),
-            size: u64::from(row) * u64::from(self.size.y),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
+        let buffer = Readback::buffer(gpu, "picture", u64::from(row) * u64::from(self.size.y));
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,
             bytes_per_row: Some(row),
@@ -118,7 +120,7 @@ fn extent(size: UVec2) -> wgpu::Extent3d {
     wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 }
 }
 
-/// A picture on its way back.
+/// A copy of a picture.
 #[derive(Debug)]
 pub(crate) struct Copied {
     buffer: wgpu::Buffer,
@@ -127,14 +129,10 @@ pub(crate) struct Copied {
 }
 
 impl Copied {
-    /// Waits for the picture, and adds it times `weight` to `sum`.
-    pub(crate) fn add_to(
-        &self,
-        gpu: &Gpu,
-        sum: &mut [Vec3],
-        weight: f32,
-    ) -> Result<(), ShadeError> {
-        let bytes = gpu.read(&self.buffer, "reading a picture back")?;
+    /// Waits for the picture, whose commands have been submitted, and adds it times `weight` to
+    /// `sum`.
+    pub(crate) fn add_to(self, gpu: &Gpu, sum: &mut [Vec3], weight: f32) -> Result<(), ShadeError> {
+        let bytes = Readback::begin(self.buffer).wait(gpu, "reading a picture back")?;
         let rows = bytes.chunks_exact(self.row as usize);
         for (own, row) in sum.chunks_exact_mut(self.size.x as usize).zip(rows) {
             for (pixel, halves) in own.iter_mut().zip(row.chunks_exact(PIXEL as usize)) {

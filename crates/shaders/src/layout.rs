@@ -153,6 +153,40 @@ pub struct Material {
     pub transmission_map: Map,
 }
 
+/// How a picture is shown. Group 0, binding 0 of [`crate::screen`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Screen {
+    pub factor: f32,
+    pub tone_map: u32,
+    pub step: f32,
+    pub _pad: u32,
+}
+
+/// Numbers of [`Screen::tone_map`].
+pub mod tone {
+    /// `TONE_GAMMA` of the shader, and so on.
+    pub const GAMMA: u32 = 0;
+    /// `TONE_SRGB`.
+    pub const SRGB: u32 = 1;
+    /// `TONE_REINHARD`.
+    pub const REINHARD: u32 = 2;
+    /// `TONE_FILMIC`.
+    pub const FILMIC: u32 = 3;
+    /// `TONE_NEUTRAL`.
+    pub const NEUTRAL: u32 = 4;
+}
+
+/// The bins of [`crate::meter`].
+pub mod meter {
+    /// How many.
+    pub const BINS: usize = 512;
+    /// Bin 1 begins at 2 to the power of this; bin 0 holds what is darker.
+    pub const LEAST: f32 = -24.0;
+    /// Bins that double the luminance.
+    pub const BINS_A_STOP: f32 = 12.0;
+}
+
 /// Bits of [`Frame::parts`].
 pub mod parts {
     /// Emission and environment, as the camera sees them.

@@ -3,7 +3,7 @@
 
 use std::mem::{offset_of, size_of};
 
-use lumencast_shaders::{Shading, background, depth, forward, layout};
+use lumencast_shaders::{Shading, background, depth, forward, layout, meter, screen};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{Module, TypeInner};
 
@@ -24,6 +24,8 @@ fn every_shader_is_valid() {
         ("forward, by samples", forward(Shading::Samples), 2),
         ("depth", depth(), 3),
         ("background", background(), 2),
+        ("screen", screen(), 2),
+        ("meter", meter(), 1),
     ] {
         assert_eq!(compiled(name, &source).entry_points.len(), entries, "{name}");
     }
@@ -60,7 +62,7 @@ macro_rules! same {
 
 #[test]
 fn layouts_agree() {
-    let modules = [compiled("forward", &forward(Shading::Pixels))];
+    let modules = [compiled("forward", &forward(Shading::Pixels)), compiled("screen", &screen())];
     let m = &modules;
     same!(m, View { clip_from_world, world_from_clip, eye, perspective, forward, turn });
     same!(m, Instance { world_from_object, normal_from_object, mirrors, _pad0, _pad1, _pad2 });
@@ -110,6 +112,7 @@ fn layouts_agree() {
     same!(m, Field { count, offset_policy, offset_metres, _pad });
     same!(m, Volume { cell_from_world, spacing, scale, resolution, texels, origin, _pad });
     same!(m, Map { row0, row1 });
+    same!(m, Screen { factor, tone_map, step, _pad });
     same!(
         m,
         Material {
@@ -148,4 +151,36 @@ fn a_moved_member_is_noticed() {
     let moved = shader.replace(sound, moved);
     let modules = [compiled("moved", &moved)];
     same!(&modules, Field { count, offset_policy, offset_metres, _pad });
+}
+
+/// Numbers that shaders and Rust both name.
+#[test]
+fn constants_agree() {
+    use layout::{meter as bins, tone};
+    let screen = compiled("screen", &screen());
+    let meter = compiled("meter", &meter());
+    let value = |module: &Module, name: &str| {
+        let (_, constant) = module
+            .constants
+            .iter()
+            .find(|(_, constant)| constant.name.as_deref() == Some(name))
+            .unwrap_or_else(|| panic!("the shader has no constant {name}"));
+        match module.global_expressions[constant.init] {
+            naga::Expression::Literal(naga::Literal::U32(n)) => f64::from(n),
+            naga::Expression::Literal(naga::Literal::F32(x)) => f64::from(x),
+            ref other => panic!("{name} is {other:?}"),
+        }
+    };
+    for (name, number) in [
+        ("TONE_GAMMA", tone::GAMMA),
+        ("TONE_SRGB", tone::SRGB),
+        ("TONE_REINHARD", tone::REINHARD),
+        ("TONE_FILMIC", tone::FILMIC),
+        ("TONE_NEUTRAL", tone::NEUTRAL),
+    ] {
+        assert_eq!(value(&screen, name), f64::from(number), "{name}");
+    }
+    assert_eq!(value(&meter, "METER_BINS"), bins::BINS as f64);
+    assert_eq!(value(&meter, "METER_LEAST"), f64::from(bins::LEAST));
+    assert_eq!(value(&meter, "METER_BINS_A_STOP"), f64::from(bins::BINS_A_STOP));
 }

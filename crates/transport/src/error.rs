@@ -69,6 +69,14 @@ pub enum Error {
         /// The limit in bytes.
         limit: usize,
     },
+    /// A file that cannot be fetched.
+    #[error("cannot load {url}: {reason}")]
+    Fetch {
+        /// Its address.
+        url: String,
+        /// Why not.
+        reason: String,
+    },
     /// A signing key or token that cannot be made or read.
     #[error("access key: {0}")]
     Key(String),

@@ -143,12 +143,7 @@ impl Render {
     fn volumes(&self, scene: &mut Scene) -> Result<Vec<ProbeVolume>> {
         if let Some(light) = &self.raster.light {
             let volumes = light_source::volumes(light)?;
-            let bounds = scene.bounds();
-            let (middle, reach) =
-                (0.5 * (bounds.min + bounds.max), 0.5 * bounds.min.distance(bounds.max));
-            if !volumes.iter().any(|volume| volume.grid.distance(middle) <= reach) {
-                eprintln!("warning: {light} lights no part of this scene; is it another scene's?");
-            }
+            light_source::check_fits(light, &volumes, scene);
             return Ok(volumes);
         }
         let specs = self.scene.volumes(scene)?;

@@ -48,7 +48,13 @@ impl Ran {
 /// Runs the program to its end.
 #[track_caller]
 pub fn run(arguments: &[&str]) -> Ran {
-    let mut program = Program::start(arguments);
+    run_with(arguments, &[])
+}
+
+/// Runs the program to its end, with environment variables of its own.
+#[track_caller]
+pub fn run_with(arguments: &[&str], environment: &[(&str, &str)]) -> Ran {
+    let mut program = Program::start_with(arguments, environment);
     let stdout = program.read(Pipe::Stdout);
     let stderr = program.read(Pipe::Stderr);
     let status = program.wait();
@@ -69,10 +75,15 @@ pub struct Program(Child);
 
 impl Program {
     pub fn start(arguments: &[&str]) -> Self {
+        Self::start_with(arguments, &[])
+    }
+
+    pub fn start_with(arguments: &[&str], environment: &[(&str, &str)]) -> Self {
         let child = Command::new(env!("CARGO_BIN_EXE_lumencast"))
             .args(arguments)
             .env_remove("RUST_LOG")
             .env_remove("LUMENCAST_PAGE")
+            .envs(environment.iter().copied())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

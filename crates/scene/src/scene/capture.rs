@@ -128,12 +128,7 @@ impl Scene {
 }
 
 impl Deformed {
-    fn vertices(
-        &mut self,
-        id: NodeId,
-        mesh: &Arc<Mesh>,
-        cause: Cause,
-    ) -> Arc<Vec<Vertices>> {
+    fn vertices(&mut self, id: NodeId, mesh: &Arc<Mesh>, cause: Cause) -> Arc<Vec<Vertices>> {
         if let Some(kept) = self.0.get_mut(&id)
             && Arc::ptr_eq(&kept.mesh, mesh)
             && kept.cause == cause

@@ -298,8 +298,10 @@ impl Scene {
         self.nodes.attach(id, wrapper);
     }
 
-    /// The scene as its file has it, at the same time, without reading anything again.
-    pub(super) fn pristine(&self) -> Self {
+    /// The scene as its file has it, `time` seconds after its beginning, without reading anything
+    /// again.
+    #[must_use]
+    pub fn pristine(&self, time: f64) -> Self {
         let main = &self.models[0];
         let mut scene = Self::empty(self.name.clone(), self.folder.clone(), self.budget.clone());
         scene.library =
@@ -310,7 +312,7 @@ impl Scene {
         main.asset.roots.iter().for_each(|root| scene.nodes.add_root(NodeId(*root)));
         scene.environment = main.asset.settings.environment.clone().unwrap_or_default();
         scene.volumes.clone_from(&self.volumes);
-        scene.time = self.time;
+        scene.time = time;
         scene.play();
         scene
     }

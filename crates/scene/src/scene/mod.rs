@@ -24,7 +24,7 @@ use crate::limits::Budget;
 use crate::trs::Trs;
 use crate::{
     Aabb, AnimationId, Environment, FileContents, HdrImage, Instance, Light, Material, Mesh,
-    MeshId, NodeId, Snapshot, Transform, View, VolumeSpec,
+    MeshId, NamedView, NodeId, Snapshot, Transform, View, VolumeSpec,
 };
 
 /// A scene: what its file says, what edits have made of it, and its time.
@@ -222,6 +222,23 @@ impl Scene {
             Some(PlacedCamera { node, node_name: &n.name, camera, world_from_camera })
         });
         camera.collect()
+    }
+
+    /// Views of the scene: those of its cameras, in order, and at last one of all of it.
+    pub fn views(&self) -> Vec<NamedView> {
+        let of_camera = |(number, placed): (usize, PlacedCamera<'_>)| {
+            let names = [placed.camera.name.as_str(), placed.node_name];
+            let name = names.into_iter().find(|name| !name.is_empty());
+            NamedView {
+                name: name.map_or_else(|| format!("camera {number}"), str::to_owned),
+                node_name: placed.node_name.to_owned(),
+                view: placed.view(),
+            }
+        };
+        let mut views: Vec<_> = self.cameras().into_iter().enumerate().map(of_camera).collect();
+        let view = View::overview(&self.bounds());
+        views.push(NamedView { name: "overview".into(), node_name: String::new(), view });
+        views
     }
 
     /// The animations and how they stand.

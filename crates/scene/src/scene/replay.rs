@@ -15,7 +15,7 @@ impl Scene {
     pub fn edits_since_load(&self) -> Vec<Edit> {
         let mut edits = self.structure();
         edits.extend(self.playbacks());
-        let mut replica = self.pristine();
+        let mut replica = self.pristine(self.time);
         for edit in &edits {
             if let Err(error) = replica.replay(edit) {
                 // Tests show that this does not happen; the differences below then say the rest.

@@ -180,7 +180,8 @@ fn mirrored_skins_keep_their_front() {
             let p = |i: usize| to_world.transform_point3(vertices.positions[i]);
             let winding = to_world.matrix3.determinant().signum();
             let face = winding * (p(1) - p(0)).cross(p(2) - p(0)).normalize();
-            let normal = to_world.inverse().matrix3.transpose() * glam::Vec3A::from(vertices.normals[0]);
+            let normal =
+                to_world.inverse().matrix3.transpose() * glam::Vec3A::from(vertices.normals[0]);
             (p(1), p(2), face, Vec3::from(normal).normalize())
         })
         .collect();

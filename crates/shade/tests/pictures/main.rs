@@ -5,3 +5,4 @@ mod bad_input;
 mod common;
 mod direct_light;
 mod indirect_light;
+mod screen;

@@ -1,0 +1,204 @@
+//! `lumencast view`: a scene and its light in a window.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use glam::UVec2;
+use lumencast_client::{Session, SessionOptions, download};
+use lumencast_light::LightField;
+use lumencast_picture::ToneMap;
+use lumencast_scene::Scene;
+use lumencast_server::{Server, ServerConfig};
+use lumencast_shade::Settings;
+use lumencast_window::{Controls, Live, Options, Still, World};
+use tokio::runtime::Runtime;
+use tokio::sync::oneshot;
+use tokio::task::JoinHandle;
+
+use crate::arguments::{Exposure, GatherArguments, SceneArguments, TickArguments, parse_offset};
+use crate::camera::{self, CameraArgument, parse_size};
+use crate::light_source::{self, is_address};
+use crate::output;
+
+/// How long threads may take to end once the window is closed.
+const GRACE: Duration = Duration::from_secs(2);
+
+/// Shows a scene and its light in a window.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  lumencast view cornell                                  computes the light here, live
+  lumencast view http://127.0.0.1:4443/sponza             a server's scene and light
+  lumencast view sponza.glb --light sponza.light          a saved light field
+  lumencast view sponza.glb --light http://10.0.0.2:4443/sponza   the scene from here
+  lumencast view cornell --screenshot cornell.png         takes one picture and ends
+
+Drag turns the camera, the right button moves it sideways, the wheel brings it nearer, WASD and QE
+walk. What is drawn, exposure, tone map and cameras are in the panel (H hides it), with what the frame took
+and how old the light is. P saves a picture in the current folder.")]
+pub(crate) struct View {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// The light: a file of `lumencast bake`, or the address of a server's scene. Computed here, live,
+    /// where it is not given.
+    #[arg(long, value_name = "FILE|URL")]
+    light: Option<String>,
+    /// A camera of the scene by name or number, or eye, target and vertical field of view in
+    /// degrees; the scene's first camera unless given.
+    #[arg(long, value_name = "NAME|INDEX|EYE,TARGET[,FOV]", allow_hyphen_values = true)]
+    camera: Option<CameraArgument>,
+    /// Width and height, pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
+    size: UVec2,
+    /// Samples a pixel, 1, 2, 4 or 8, as far as the adapter has them at once.
+    #[arg(long, value_name = "N", default_value_t = 4,
+          value_parser = clap::value_parser!(u32).range(1..=8))]
+    multisampling: u32,
+    /// Factor on radiance: a number, or auto: 1 over the 99th percentile of luminance, followed.
+    #[arg(long, value_name = "auto|NUMBER", default_value = "auto")]
+    exposure: Exposure,
+    /// Tone map: gamma, srgb, reinhard, filmic or neutral.
+    #[arg(long, value_name = "NAME", default_value_t = ToneMap::Neutral)]
+    tone_map: ToneMap,
+    /// Where in front of a surface light is read: none, half-cell or metres.
+    #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
+    offset: lumencast_light::OffsetPolicy,
+    /// Saves a picture as soon as there is light, and ends.
+    #[arg(long, value_name = "FILE.png")]
+    screenshot: Option<PathBuf>,
+    #[command(flatten)]
+    gather: GatherArguments,
+    #[command(flatten)]
+    tick: TickArguments,
+}
+
+impl View {
+    pub(crate) fn run(self) -> Result<()> {
+        if let Some(file) = &self.screenshot {
+            let is_png = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
+            ensure!(is_png, "{}: screenshots are written as .png", file.display());
+            output::check_file(file)?;
+        }
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(2)
+            .enable_all()
+            .build()
+            .context("cannot start the network threads")?;
+        let mut server = None;
+        let shown = match &self.light {
+            None if is_address(&self.scene.source.scene) => {
+                self.of_server(&runtime, &self.scene.source.scene)
+            }
+            None => self.here(&runtime).map(|(world, running)| {
+                server = Some(running);
+                world
+            }),
+            Some(url) if is_address(url) => {
+                let scene = self.scene.source.open()?;
+                runtime.block_on(connect(url)).map(|session| world(session, scene))
+            }
+            Some(file) => self.saved(Path::new(file)),
+        };
+        let opened = shown.and_then(|world| {
+            let options = self.options(&*world)?;
+            Ok(lumencast_window::open(world, options)?)
+        });
+        let ended = server.map_or(Ok(()), |server| runtime.block_on(server.end()));
+        runtime.shutdown_timeout(GRACE);
+        opened.and(ended)
+    }
+
+    fn options(&self, world: &dyn World) -> Result<Options> {
+        let view = match &self.camera {
+            Some(camera) => Some(camera::among(world.views(), camera)?),
+            None => None,
+        };
+        let settings = Settings { samples: self.multisampling, ..Settings::default() };
+        let controls = Controls {
+            settings,
+            offset: self.offset,
+            tone_map: self.tone_map,
+            exposure: lumencast_window::Exposure::new(self.exposure.0),
+            panel: true,
+        };
+        Ok(Options {
+            size: self.size,
+            view,
+            controls,
+            screenshots: PathBuf::from("."),
+            once: self.screenshot.clone(),
+        })
+    }
+
+    /// A scene under a saved field.
+    fn saved(&self, file: &Path) -> Result<Box<dyn World>> {
+        let scene = self.scene.source.open()?;
+        let name = file.display().to_string();
+        let light = LightField::new(light_source::volumes(&name)?);
+        light_source::check_fits(&name, light.volumes(), &scene);
+        Ok(Box::new(Still::new(scene, light, name)))
+    }
+
+    /// A server's scene, downloaded from it.
+    fn of_server(&self, runtime: &Runtime, url: &str) -> Result<Box<dyn World>> {
+        let session = runtime.block_on(connect(url))?;
+        let bar = output::bar(0, "Loading the scene");
+        let files = runtime.block_on(download(url, |done, all| {
+            bar.set_length(all as u64);
+            bar.set_position(done as u64);
+        }))?;
+        bar.finish_and_clear();
+        let scene = Scene::load(files.root())?;
+        Ok(world(session, scene))
+    }
+
+    /// A scene whose light is computed here, by a server of its own.
+    fn here(&self, runtime: &Runtime) -> Result<(Box<dyn World>, Running)> {
+        let spinner = output::spinner(format!("Loading {}", self.scene.source.scene));
+        let scene = self.scene.source.open()?;
+        let replica = scene.pristine(0.0);
+        let loopback = std::net::SocketAddr::from(([127, 0, 0, 1], 0));
+        let mut config = ServerConfig::new(lumencast_transport::ServerConfig::new(loopback));
+        config.tick = self.tick.options(&scene, &self.scene, &self.gather)?;
+        let gatherer = self.gather.gatherer()?;
+        let (address, running) = runtime.block_on(async {
+            let server = Server::bind(scene, gatherer, config).await?;
+            let address = format!("http://{}/{}", server.local_addr(), server.scene_name());
+            let (stop, stopped) = oneshot::channel::<()>();
+            let ended = tokio::spawn(server.run(async {
+                // Either way the window is gone.
+                let _ = stopped.await;
+            }));
+            anyhow::Ok((address, Running { stop, ended }))
+        })?;
+        let session = runtime.block_on(connect(&address));
+        spinner.finish_and_clear();
+        Ok((world(session?, replica), running))
+    }
+}
+
+/// A server that computes the window's light.
+struct Running {
+    stop: oneshot::Sender<()>,
+    ended: JoinHandle<Result<(), lumencast_server::ServerError>>,
+}
+
+impl Running {
+    /// Ends it.
+    async fn end(self) -> Result<()> {
+        // It hears nothing where it has ended already.
+        let _ = self.stop.send(());
+        self.ended.await.context("the server")??;
+        Ok(())
+    }
+}
+
+async fn connect(url: &str) -> Result<Session> {
+    Ok(Session::connect(url, SessionOptions::default()).await?)
+}
+
+fn world(session: Session, scene: Scene) -> Box<dyn World> {
+    Box::new(Live::new(session, scene))
+}

@@ -1,0 +1,89 @@
+//! `lumencast view`: a window, on a display without a screen.
+
+mod common;
+
+use std::io::{BufRead as _, BufReader};
+use std::process::{Child, Command, Stdio};
+
+use common::{Folder, Serving, run, run_with};
+use lumencast_picture::Loaded;
+
+/// An X server without a screen, until it is dropped. `cargo xtask test` installs it.
+struct Display {
+    server: Child,
+    name: String,
+}
+
+impl Display {
+    fn new() -> Self {
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "800x600x24", "-nolisten", "tcp"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb (Debian: apt-get install xvfb)");
+        let mut number = String::new();
+        let stdout = server.stdout.take().expect("its output");
+        BufReader::new(stdout).read_line(&mut number).expect("the number of its display");
+        Self { server, name: format!(":{}", number.trim()) }
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// Pixels of a picture that are red and green: light that came from the walls.
+fn colored(picture: &std::path::Path) -> (usize, usize) {
+    let picture = Loaded::read(picture).expect("a picture").linear();
+    assert_eq!((picture.width(), picture.height()), (320, 200));
+    let count = |more: usize, less: usize| {
+        picture.pixels().iter().filter(|p| p[more] > 0.02 && p[more] > 2.0 * p[less]).count()
+    };
+    (count(0, 1), count(1, 0))
+}
+
+/// From a saved field, from a server in the same program, and from another server.
+#[test]
+fn shows_a_field_and_a_server() {
+    let display = Display::new();
+    let environment = [("DISPLAY", display.name.as_str())];
+    let folder = Folder::new("view");
+    let field = folder.0.join("cornell.light");
+    let field = field.to_str().expect("text");
+    let baked = run(&["bake", "cornell", "--volume", "3x3x3", "--samples", "64", "-o", field]);
+    assert_eq!(baked.code, Some(0), "{baked:?}");
+    let server = Serving::start("cornell", &["--volume", "3x3x3"]);
+    let url = format!("http://{}/cornell", server.address);
+    for (name, what) in [
+        ("saved", &["cornell", "--light", field][..]),
+        ("here", &["cornell", "--volume", "3x3x3"]),
+        ("server", &[&url]),
+    ] {
+        let picture = folder.0.join(format!("{name}.png"));
+        let shot = picture.to_str().expect("text");
+        let own = ["--size", "320x200", "--multisampling", "1", "--screenshot", shot];
+        let arguments: Vec<&str> =
+            ["view"].into_iter().chain(what.iter().copied()).chain(own).collect();
+        let ran = run_with(&arguments, &environment);
+        assert_eq!(ran.code, Some(0), "{name}: {ran:?}");
+        let (red, green) = colored(&picture);
+        assert!(red > 1000 && green > 1000, "{name}: {red} red and {green} green pixels");
+    }
+}
+
+#[test]
+fn says_what_is_missing() {
+    let folder = Folder::new("view-missing");
+    let nowhere = [("DISPLAY", ""), ("WAYLAND_DISPLAY", "")];
+    run_with(&["view", "cornell", "--volume", "1x1x1"], &nowhere)
+        .failed_saying(&["DISPLAY", "lumencast render"]);
+    let wrong = folder.0.join("shot.jpg");
+    run(&["view", "cornell", "--screenshot", wrong.to_str().expect("text")])
+        .failed_saying(&["shot.jpg", ".png"]);
+    run(&["view", "http://127.0.0.1:9/cornell"]).failed_saying(&["cannot connect"]);
+}

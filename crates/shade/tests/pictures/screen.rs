@@ -1,0 +1,152 @@
+//! Pictures shown on the device: the same codes as the processor's tone maps give, and measured.
+
+use crate::common::{SIZE, renderer};
+use glam::{UVec2, Vec3};
+use lumencast_light::{LightField, OffsetPolicy};
+use lumencast_picture::{Picture, ToneMap, exposure};
+use lumencast_scene::{Environment, Scene, View};
+use lumencast_shade::{Gpu, Measured, Renderer, Screen, Settings, ShadeError, Show, wgpu};
+use lumencast_testkit::scenes::Stage;
+
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// A texture that is shown on in place of a window's, and its codes.
+struct Shown {
+    texture: wgpu::Texture,
+    size: UVec2,
+}
+
+impl Shown {
+    fn new(gpu: &Gpu, size: UVec2) -> Self {
+        let texture = gpu.device().create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        Self { texture, size }
+    }
+
+    fn view(&self) -> wgpu::TextureView {
+        self.texture.create_view(&Default::default())
+    }
+
+    fn codes(&self, gpu: &Gpu) -> Vec<[u8; 3]> {
+        let row = (4 * self.size.x).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = gpu.device().create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: u64::from(row * self.size.y),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = gpu.device().create_command_encoder(&Default::default());
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(row),
+            rows_per_image: None,
+        };
+        encoder.copy_texture_to_buffer(
+            self.texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
+            self.texture.size(),
+        );
+        gpu.queue().submit([encoder.finish()]);
+        buffer.map_async(wgpu::MapMode::Read, .., |mapped| mapped.unwrap());
+        gpu.device().poll(wgpu::PollType::wait_indefinitely()).unwrap();
+        let bytes = buffer.get_mapped_range(..).unwrap();
+        let row_codes = |row: &[u8]| -> Vec<[u8; 3]> {
+            let pixels = row.chunks_exact(4).take(self.size.x as usize);
+            pixels.map(|p| [p[0], p[1], p[2]]).collect()
+        };
+        bytes.chunks_exact(row as usize).flat_map(row_codes).collect()
+    }
+}
+
+/// Shows a frame, and waits for what is measured of it.
+fn show(
+    renderer: &mut Renderer,
+    screen: &mut Screen,
+    view: &View,
+    settings: &Settings,
+    how: Show,
+) -> (Vec<[u8; 3]>, Measured) {
+    let shown = Shown::new(renderer.gpu(), settings.size);
+    renderer.show(view, settings, screen, how, &shown.view()).unwrap();
+    let codes = shown.codes(renderer.gpu());
+    let measured = screen.measured(renderer.gpu()).unwrap().expect("the frame is done");
+    assert_eq!(screen.measured(renderer.gpu()).unwrap(), None, "once");
+    (codes, measured)
+}
+
+#[test]
+fn codes_and_exposure_are_the_processors() {
+    let mut scene = Scene::open("cornell").unwrap();
+    let view = scene.views()[0].view;
+    let settings = Settings { size: SIZE, samples: 1, ..Settings::default() };
+    let mut renderer = renderer(&scene.snapshot(), &settings);
+    renderer.set_light(&LightField::default(), OffsetPolicy::HalfCell).unwrap();
+    let picture = renderer.pictures(&[view], &settings).unwrap().remove(0);
+    let picture = Picture::new(SIZE.x, SIZE.y, picture).unwrap();
+    let best = exposure(&picture);
+    let mut screen = Screen::new(renderer.gpu(), FORMAT);
+    for tone_map in ToneMap::ALL {
+        for brighter in [1.0, 8.0] {
+            let settings = Settings { pre_exposure: 0.5 * best, ..settings };
+            let how = Show { exposure: best * brighter, tone_map };
+            let (codes, measured) = show(&mut renderer, &mut screen, &view, &settings, how);
+            for (code, linear) in codes.iter().zip(picture.pixels()) {
+                let expected = 255.0 * tone_map.encode(*linear * how.exposure);
+                let got = Vec3::from(code.map(f32::from));
+                // Half a code of rounding at random, half a code of rounding, and for half floats
+                // and the device's powers a tenth.
+                let most = 1.1;
+                let off = (got - expected).abs().max_element();
+                assert!(off <= most, "{tone_map}: {got} for {expected}");
+                assert!(*linear != Vec3::ZERO || *code == [0; 3], "black stays black");
+            }
+            let measured = measured.exposure.expect("there is light");
+            assert!((measured / best).log2().abs() < 1.0 / 12.0, "{measured} for {best}");
+        }
+    }
+}
+
+#[test]
+fn nothing_is_measured_of_black_pictures() {
+    let mut stage = Stage::default();
+    let view = View::look_at(Vec3::Z, Vec3::ZERO, 1.0).unwrap();
+    let settings = Settings { size: UVec2::new(33, 17), ..Settings::default() };
+    let mut renderer = renderer(&stage.snapshot(), &settings);
+    let mut screen = Screen::new(renderer.gpu(), FORMAT);
+    let how = Show { exposure: 1.0, tone_map: ToneMap::Srgb };
+    let (codes, measured) = show(&mut renderer, &mut screen, &view, &settings, how);
+    assert!(codes.iter().all(|code| *code == [0; 3]));
+    assert_eq!(measured.exposure, None);
+
+    stage.environment(Environment::Constant { radiance: Vec3::splat(1e5) });
+    renderer.set_scene(&stage.snapshot());
+    let settings = Settings { pre_exposure: 1e-5, ..settings };
+    let how = Show { exposure: 1e-5, ..how };
+    let (codes, measured) = show(&mut renderer, &mut screen, &view, &settings, how);
+    assert!(codes.iter().all(|code| code.iter().all(|c| *c >= 254)));
+    let measured = measured.exposure.expect("white");
+    assert!((1e5 * measured - 1.0).abs() < 0.06, "{measured}");
+}
+
+/// A device that is lost says so, without a panic; another one goes on.
+#[test]
+fn lost_devices_are_told() {
+    let mut scene = Scene::open("cornell").unwrap();
+    let view = scene.views()[0].view;
+    let settings = Settings { size: SIZE, samples: 1, ..Settings::default() };
+    let mut first = renderer(&scene.snapshot(), &settings);
+    let before = first.pictures(&[view], &settings).unwrap();
+    first.gpu().device().destroy();
+    let error = first.pictures(&[view], &settings).unwrap_err();
+    assert!(matches!(error, ShadeError::Failed { .. }), "{error}");
+    let mut second = renderer(&scene.snapshot(), &settings);
+    assert_eq!(second.pictures(&[view], &settings).unwrap(), before);
+}

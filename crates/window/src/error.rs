@@ -1,0 +1,31 @@
+//! What can go wrong.
+
+use lumencast_picture::PictureError;
+use lumencast_shade::ShadeError;
+use thiserror::Error;
+
+/// Why a window closed.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WindowError {
+    /// Nothing can be drawn.
+    #[error(transparent)]
+    Shade(#[from] ShadeError),
+    /// A picture cannot be saved.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// There is no display to open a window on.
+    #[error(
+        "no window can be opened: {0}. Is there a display (DISPLAY or WAYLAND_DISPLAY)? Without one, \
+         lumencast render --lighting field draws pictures"
+    )]
+    Display(String),
+    /// The adapter cannot show pictures in a window.
+    #[error("{adapter} cannot show pictures in this window: {reason}")]
+    Surface {
+        /// Its name.
+        adapter: String,
+        /// What it says.
+        reason: String,
+    },
+}
