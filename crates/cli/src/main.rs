@@ -49,7 +49,7 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.";
 /// What is logged unless RUST_LOG says otherwise. The transport's libraries warn of much that is no
 /// fault here: a client that leaves, small socket buffers, addresses without a name.
 const LOGGED: &str = "warn,moq_sock=error,moq_tokio=error,moq_net=error,moq_relay=off,\
-     web_transport_moq=error";
+     web_transport_moq=error,winit=error";
 
 #[derive(Debug, Subcommand)]
 enum Command {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use egui::{Align2, Color32, Panel, PlatformOutput, RawInput, Sense, Ui};
+use egui::{Color32, Panel, PlatformOutput, RawInput, Rect, Sense, Ui};
 use egui_wgpu::ScreenDescriptor;
 use glam::UVec2;
 use lumencast_light::OffsetPolicy;
@@ -186,17 +186,7 @@ impl Stage {
         let picture = ui.available_rect_before_wrap();
         let response = ui.interact(picture, ui.scope_id().with("picture"), Sense::click_and_drag());
         camera.steer(&response, seconds as f32);
-        for (i, notice) in facts.notices.iter().enumerate() {
-            let at = picture.left_top() + egui::vec2(12.0, 12.0 + 28.0 * i as f32);
-            let text = ui.painter().layout_no_wrap(
-                notice.clone(),
-                egui::FontId::proportional(15.0),
-                Color32::WHITE,
-            );
-            let around = Align2::LEFT_TOP.anchor_size(at, text.size()).expand(6.0);
-            ui.painter().rect_filled(around, 4.0, Color32::from_black_alpha(180));
-            ui.painter().galley(at, text, Color32::WHITE);
-        }
+        show_notices(ui, picture, &facts.notices);
         asked
     }
 
@@ -328,6 +318,22 @@ impl Stage {
         };
         self.saved = Some((told, now));
         Ok(())
+    }
+}
+
+/// Writes notices over the upper left of the picture.
+fn show_notices(ui: &Ui, picture: Rect, notices: &[String]) {
+    const MARGIN: f32 = 12.0;
+    const PADDING: f32 = 6.0;
+    let mut at = picture.left_top() + egui::Vec2::splat(MARGIN);
+    let width = (picture.width() - 2.0 * MARGIN).max(0.0);
+    for notice in notices {
+        let font = egui::FontId::proportional(15.0);
+        let text = ui.painter().layout(notice.clone(), font, Color32::WHITE, width);
+        let around = Rect::from_min_size(at, text.size()).expand(PADDING);
+        ui.painter().rect_filled(around, 4.0, Color32::from_black_alpha(180));
+        ui.painter().galley(at, text, Color32::WHITE);
+        at.y = around.bottom() + MARGIN;
     }
 }
 
