@@ -155,6 +155,24 @@ pub struct MaterialChange {
     /// Emitted radiance, cd/m².
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub emissive: Option<Vec3>,
+    /// 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transmission: Option<f32>,
+    /// Index of refraction, 1 or more; 0 means infinite.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ior: Option<f32>,
+    /// 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub specular: Option<f32>,
+    /// Linear, each channel 0 to 10⁹.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub specular_color: Option<Vec3>,
+    /// Finite; below 0 turns the normal map's x and y around.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal_scale: Option<f32>,
+    /// Masked materials only: 0 or more; above 1 nothing is covered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alpha_cutoff: Option<f32>,
 }
 
 /// Playback of an animation.

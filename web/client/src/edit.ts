@@ -74,6 +74,18 @@ export interface MaterialChange {
   roughness?: number;
   /** Emitted radiance, cd/m². */
   emissive?: Vec3;
+  /** 0 to 1. */
+  transmission?: number;
+  /** Index of refraction, 1 or more; 0 means infinite. */
+  ior?: number;
+  /** 0 to 1. */
+  specular?: number;
+  /** Linear, each channel 0 to 10⁹. */
+  specular_color?: Vec3;
+  /** Below 0 turns the normal map's x and y around. */
+  normal_scale?: number;
+  /** Masked materials only: 0 or more; above 1 nothing is covered. */
+  alpha_cutoff?: number;
 }
 
 /** Playback of an animation. */

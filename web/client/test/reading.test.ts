@@ -1,7 +1,10 @@
-import { describe, expect, it } from 'vitest';
+import { describe, expect, it, vi } from 'vitest';
 
 import type { Vec3 } from '../src/edit.js';
 import { byDistance, catalogOf, World } from './support/region-server.js';
+
+// Minutes of a simulated connection to a thousand regions.
+vi.setConfig({ testTimeout: 60_000 });
 
 /** Tracks that may be read at once, and of these those of regions that are always read where some wait. */
 const MOST = 80;

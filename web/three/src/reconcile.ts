@@ -1,4 +1,5 @@
 import type { Edit, LightSpec } from '@lumencast/client';
+import { MATERIAL_PARTS } from './materials.js';
 
 /** One value of the scene that edits set: `node/3/translation`, `light/5/intensity`, … */
 export interface Assignment {
@@ -145,7 +146,7 @@ export function assignments(edit: Edit): Assignment[] {
       // Its node stays; and a light less would recompile every shader.
       return [{ key: `light/${edit.node}/intensity`, value: 0 }];
     case 'set_material':
-      return parts(`material/${edit.material}`, edit, ['base_color', 'metallic', 'roughness', 'emissive']);
+      return parts(`material/${edit.material}`, edit, MATERIAL_PARTS);
     case 'set_animation':
       return parts(`animation/${edit.animation}`, edit, ['time', 'speed', 'playing']);
     case 'set_environment':

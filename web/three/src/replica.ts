@@ -1,11 +1,19 @@
-import type { Edit, Environment, Light, Playback, Session, Transform } from '@lumencast/client';
+import type {
+  Edit,
+  Environment,
+  Light,
+  MaterialChange,
+  Playback,
+  Session,
+  Transform,
+} from '@lumencast/client';
 import { Group, type Object3D, type Scene } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { Animations } from './animations.js';
 import { Content } from './content.js';
 import { showEnvironment } from './environment.js';
 import { createLight, lightSpec, setLight } from './lights.js';
-import { materialPart, setMaterialPart } from './materials.js';
+import { lacksPhysical, materialPart, setMaterialPart } from './materials.js';
 import { Models } from './models.js';
 import { LIGHT_PARTS, Reconciler, type Values } from './reconcile.js';
 
@@ -38,6 +46,8 @@ export class Replica implements Values {
   readonly #adopted = new Map<number, Object3D>();
   /** Own objects that wait for the number of their node, in the order of their edits. */
   readonly #adopting: { object: Object3D; resolve: (node: number) => void }[] = [];
+  /** Materials of which it was said that they cannot show what edits set. */
+  readonly #notPhysical = new Set<number>();
   #environment: Environment | undefined;
   #environmentTurn = 0;
 
@@ -150,7 +160,7 @@ export class Replica implements Values {
         return light && lightSpec(light)[part as keyof ReturnType<typeof lightSpec>];
       }
       case 'material':
-        return materialPart(this.content.materials(number)[0], part);
+        return materialPart(this.content.materials(number)[0], part as keyof MaterialChange);
       case 'animation':
         // Its time runs by itself: there is no value to go back to.
         return part === 'time' ? undefined : this.#animations.playback(number)?.[part as keyof Playback];
@@ -171,7 +181,7 @@ export class Replica implements Values {
         return;
       }
       case 'material':
-        return this.content.materials(number).forEach((material) => setMaterialPart(material, part, value));
+        return this.#setMaterial(number, part as keyof MaterialChange, value);
       case 'animation':
         return this.#animations.set(
           number,
@@ -181,6 +191,16 @@ export class Replica implements Values {
       default:
         this.#showEnvironment(value as Environment);
     }
+  }
+
+  #setMaterial(number: number, part: keyof MaterialChange, value: unknown): void {
+    const materials = this.content.materials(number);
+    for (const material of materials) setMaterialPart(material, part, value);
+    if (this.#notPhysical.has(number) || !materials.some((m) => lacksPhysical(m, part))) return;
+    this.#notPhysical.add(number);
+    this.events.warning(
+      `material ${number} cannot show ${part}: it was not loaded as a MeshPhysicalMaterial`,
+    );
   }
 
   #showEnvironment(environment: Environment): void {

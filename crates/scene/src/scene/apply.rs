@@ -13,8 +13,8 @@ use crate::error::Fault;
 use crate::limits;
 use crate::trs::{Trs, is_in_world, is_invertible};
 use crate::{
-    AnimationId, Edit, Environment, InstanceSource, Light, LightKind, LightSpec, MaterialChange,
-    MaterialId, MeshId, NodeId, Playback, Transform,
+    AlphaMode, AnimationId, Edit, Environment, InstanceSource, Light, LightKind, LightSpec,
+    Material, MaterialChange, MaterialId, MeshId, NodeId, Playback, Transform,
 };
 
 /// Why an edit is refused. The text is meant for the one who sent it.
@@ -290,7 +290,7 @@ impl Scene {
     fn set_material(&mut self, id: MaterialId, change: &MaterialChange) -> Result<(), EditError> {
         let material =
             self.materials.get_mut(id.0 as usize).ok_or(EditError::UnknownMaterial(id))?;
-        check_material(change).map_err(|why| {
+        check_material(material, change).map_err(|why| {
             let what = format!("material {id} {:?}", material.name);
             EditError::Senseless { what, why: why.into() }
         })?;
@@ -298,6 +298,14 @@ impl Scene {
         material.metallic = change.metallic.unwrap_or(material.metallic);
         material.roughness = change.roughness.unwrap_or(material.roughness);
         material.emissive = change.emissive.unwrap_or(material.emissive);
+        material.transmission = change.transmission.unwrap_or(material.transmission);
+        material.ior = change.ior.unwrap_or(material.ior);
+        material.specular = change.specular.unwrap_or(material.specular);
+        material.specular_color = change.specular_color.unwrap_or(material.specular_color);
+        material.normal_scale = change.normal_scale.unwrap_or(material.normal_scale);
+        if let Some(cutoff) = change.alpha_cutoff {
+            material.alpha_mode = AlphaMode::Mask(cutoff);
+        }
         self.shared_materials = None;
         Ok(())
     }
@@ -364,7 +372,7 @@ fn changed_light(mut light: Light, spec: &LightSpec) -> Result<Light, &'static s
     Ok(light)
 }
 
-fn check_material(change: &MaterialChange) -> Result<(), &'static str> {
+fn check_material(material: &Material, change: &MaterialChange) -> Result<(), &'static str> {
     let is_share = |v: f32| (0.0..=1.0).contains(&v);
     let all_shares = |c: Vec4| c.to_array().into_iter().all(is_share);
     if !change.base_color.is_none_or(all_shares) {
@@ -376,6 +384,30 @@ fn check_material(change: &MaterialChange) -> Result<(), &'static str> {
     let is_light = |v: Vec3| v.cmpge(Vec3::ZERO).all() && v.max_element() <= limits::LIGHT;
     if !change.emissive.is_none_or(is_light) {
         return Err("its emission is finite and not negative");
+    }
+    if !change.transmission.is_none_or(is_share) {
+        return Err("its transmission is 0 to 1");
+    }
+    if !change.ior.is_none_or(|n| n == 0.0 || (n >= 1.0 && n.is_finite())) {
+        return Err("its ior is finite and 1 or more, or 0");
+    }
+    if !change.specular.is_none_or(is_share) {
+        return Err("its specular strength is 0 to 1");
+    }
+    let is_tint = |v: Vec3| v.cmpge(Vec3::ZERO).all() && v.max_element() <= limits::EXTENT;
+    if !change.specular_color.is_none_or(is_tint) {
+        return Err("channels of its specular colour are 0 to 1e9");
+    }
+    if !change.normal_scale.is_none_or(f32::is_finite) {
+        return Err("its normal scale is finite");
+    }
+    if let Some(cutoff) = change.alpha_cutoff {
+        if !matches!(material.alpha_mode, AlphaMode::Mask(_)) {
+            return Err("only masked materials have an alpha cutoff");
+        }
+        if !(cutoff >= 0.0 && cutoff.is_finite()) {
+            return Err("its alpha cutoff is finite and 0 or more");
+        }
     }
     Ok(())
 }

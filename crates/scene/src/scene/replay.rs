@@ -4,8 +4,8 @@ use super::nodes::Node;
 use super::{Model, Scene};
 use crate::trs::Trs;
 use crate::{
-    AnimationId, Edit, InstanceSource, Light, LightKind, LightSpec, Material, MaterialChange,
-    MaterialId, NodeId, Playback, Transform,
+    AlphaMode, AnimationId, Edit, InstanceSource, Light, LightKind, LightSpec, Material,
+    MaterialChange, MaterialId, NodeId, Playback, Transform,
 };
 
 impl Scene {
@@ -203,6 +203,19 @@ fn material_change(material: MaterialId, old: &Material, new: &Material) -> Opti
         metallic: differing(old.metallic, new.metallic),
         roughness: differing(old.roughness, new.roughness),
         emissive: differing(old.emissive, new.emissive),
+        transmission: differing(old.transmission, new.transmission),
+        ior: differing(old.ior, new.ior),
+        specular: differing(old.specular, new.specular),
+        specular_color: differing(old.specular_color, new.specular_color),
+        normal_scale: differing(old.normal_scale, new.normal_scale),
+        alpha_cutoff: differing(cutoff(old), cutoff(new)).flatten(),
     };
     (change != MaterialChange::default()).then_some(Edit::SetMaterial { material, change })
+}
+
+fn cutoff(material: &Material) -> Option<f32> {
+    match material.alpha_mode {
+        AlphaMode::Mask(cutoff) => Some(cutoff),
+        AlphaMode::Opaque | AlphaMode::Blend => None,
+    }
 }

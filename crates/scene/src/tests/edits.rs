@@ -5,11 +5,12 @@ use serde_json::json;
 
 use super::{assert_same, load, triangle};
 use crate::{
-    AnimationId, Edit, Environment, InstanceSource, Light, LightKind, LightSpec, MaterialChange,
-    MaterialId, MeshId, NodeId, Playback, Scene, Transform,
+    AlphaMode, AnimationId, Edit, Environment, InstanceSource, Light, LightKind, LightSpec,
+    MaterialChange, MaterialId, MeshId, NodeId, Playback, Scene, Transform,
 };
 
-/// A triangle (node 0), a lamp (1), a spot light (2), a group (3) with a triangle (4) in it.
+/// A triangle (node 0), a lamp (1), a spot light (2), a group (3) with a triangle (4) in it; a masked
+/// material (0) and the default one (1).
 fn scene() -> Scene {
     let mut w = triangle();
     w.light(json!({ "type": "point", "intensity": 2.0 }), json!({ "name": "lamp" }));
@@ -17,6 +18,7 @@ fn scene() -> Scene {
     w.light(json!({ "type": "spot", "spot": spot }), json!({ "name": "spot" }));
     w.node(json!({ "name": "group", "children": [4] }));
     w.node(json!({ "mesh": 0 }));
+    w.add("materials", json!({ "name": "net", "alphaMode": "MASK" }));
     w.animation(
         "turn",
         (4, "rotation"),
@@ -155,6 +157,46 @@ fn materials_change() {
     assert_eq!(before.materials[0].emissive, Vec3::ZERO, "earlier snapshots stay as they are");
 }
 
+#[test]
+fn every_factor_of_a_material_changes_and_is_told_to_late_joiners() {
+    let mut scene = scene();
+    let change = MaterialChange {
+        base_color: Some(Vec4::new(0.1, 0.2, 0.3, 0.4)),
+        metallic: Some(0.5),
+        roughness: Some(0.6),
+        emissive: Some(Vec3::new(1.0, 2.0, 3.0)),
+        transmission: Some(0.7),
+        ior: Some(1.33),
+        specular: Some(0.8),
+        specular_color: Some(Vec3::new(0.9, 1.0, 2.0)),
+        normal_scale: Some(-0.25),
+        alpha_cutoff: Some(0.35),
+    };
+    let edit = Edit::SetMaterial { material: MaterialId(0), change };
+    scene.apply(&edit).expect("changed");
+    let m = &scene.snapshot().materials[0];
+    assert_eq!(m.base_color, Vec4::new(0.1, 0.2, 0.3, 0.4));
+    assert_eq!((m.metallic, m.roughness, m.emissive), (0.5, 0.6, Vec3::new(1.0, 2.0, 3.0)));
+    assert_eq!((m.transmission, m.ior, m.specular), (0.7, 1.33, 0.8));
+    assert_eq!((m.specular_color, m.normal_scale), (Vec3::new(0.9, 1.0, 2.0), -0.25));
+    assert_eq!(m.alpha_mode, AlphaMode::Mask(0.35));
+    assert_eq!(scene.edits_since_load(), [edit]);
+}
+
+#[test]
+fn factors_at_the_ends_of_their_ranges_are_taken() {
+    let plain = MaterialChange::default();
+    for change in [
+        MaterialChange { transmission: Some(0.0), specular: Some(0.0), ior: Some(0.0), ..plain },
+        MaterialChange { transmission: Some(1.0), specular: Some(1.0), ior: Some(1.0), ..plain },
+        MaterialChange { specular_color: Some(Vec3::ZERO), alpha_cutoff: Some(0.0), ..plain },
+        MaterialChange { specular_color: Some(Vec3::splat(1e9)), ..plain },
+        MaterialChange { alpha_cutoff: Some(1.5), normal_scale: Some(0.0), ..plain },
+    ] {
+        scene().apply(&Edit::SetMaterial { material: MaterialId(0), change }).expect("in range");
+    }
+}
+
 /// Every edit that makes no sense, and a part of the reason that is to be given.
 fn senseless() -> Vec<(Edit, &'static str)> {
     let (nan, inf) = (f32::NAN, f32::INFINITY);
@@ -166,6 +208,7 @@ fn senseless() -> Vec<(Edit, &'static str)> {
     let spec = LightSpec::default();
     let add = |light| Edit::AddLight { node: None, light, parent: None, transform: none };
     let paint = |change| Edit::SetMaterial { material: MaterialId(0), change };
+    let paint_opaque = |change| Edit::SetMaterial { material: MaterialId(1), change };
     let plain = MaterialChange::default();
     let instance = |source, parent: Option<u32>| Edit::AddInstance {
         node: None,
@@ -212,6 +255,42 @@ fn senseless() -> Vec<(Edit, &'static str)> {
         (paint(MaterialChange { base_color: Some(Vec4::splat(1.5)), ..plain }), "0 to 1"),
         (paint(MaterialChange { roughness: Some(-0.1), ..plain }), "0 to 1"),
         (paint(MaterialChange { emissive: Some(Vec3::splat(-1.0)), ..plain }), "emission"),
+        (
+            paint(MaterialChange { transmission: Some(1.1), roughness: Some(0.5), ..plain }),
+            "material 0 \"net\": its transmission is 0 to 1",
+        ),
+        (paint(MaterialChange { transmission: Some(nan), ..plain }), "transmission"),
+        (
+            paint(MaterialChange { ior: Some(0.9), ..plain }),
+            "its ior is finite and 1 or more, or 0",
+        ),
+        (paint(MaterialChange { ior: Some(-1.0), ..plain }), "ior"),
+        (paint(MaterialChange { ior: Some(inf), ..plain }), "ior"),
+        (paint(MaterialChange { specular: Some(-0.1), ..plain }), "specular strength is 0 to 1"),
+        (paint(MaterialChange { specular: Some(nan), ..plain }), "specular strength"),
+        (
+            paint(MaterialChange { specular_color: Some(Vec3::new(0., 0., -0.1)), ..plain }),
+            "its specular colour are 0 to 1e9",
+        ),
+        (
+            paint(MaterialChange { specular_color: Some(Vec3::new(inf, 0., 0.)), ..plain }),
+            "specular colour",
+        ),
+        (
+            paint(MaterialChange { specular_color: Some(Vec3::new(0., nan, 0.)), ..plain }),
+            "specular colour",
+        ),
+        (paint(MaterialChange { normal_scale: Some(inf), ..plain }), "its normal scale is finite"),
+        (paint(MaterialChange { normal_scale: Some(nan), ..plain }), "normal scale"),
+        (
+            paint(MaterialChange { alpha_cutoff: Some(-0.1), ..plain }),
+            "its alpha cutoff is finite and 0 or more",
+        ),
+        (paint(MaterialChange { alpha_cutoff: Some(inf), ..plain }), "alpha cutoff"),
+        (
+            paint_opaque(MaterialChange { alpha_cutoff: Some(0.5), metallic: Some(0.0), ..plain }),
+            "only masked materials have an alpha cutoff",
+        ),
         (Edit::SetMaterial { material: MaterialId(9), change: plain }, "material 9 does not"),
         (instance(InstanceSource::Mesh(MeshId(9)), None), "mesh 9 does not exist"),
         (instance(InstanceSource::Mesh(MeshId(0)), Some(50)), "node 50 does not exist"),

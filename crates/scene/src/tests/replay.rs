@@ -94,7 +94,14 @@ impl Random {
                 let change = MaterialChange {
                     base_color: self.maybe(Vec4::splat(unit)),
                     roughness: self.maybe(unit),
-                    ..MaterialChange::default()
+                    metallic: self.maybe(vector.x),
+                    emissive: self.maybe(vector * 9.0),
+                    transmission: self.maybe(vector.y),
+                    ior: self.maybe(1.0 + unit),
+                    specular: self.maybe(vector.z),
+                    specular_color: self.maybe(vector * 2.0),
+                    normal_scale: self.maybe(unit - 0.5),
+                    alpha_cutoff: self.maybe(unit).filter(|_| vector.x < 0.5),
                 };
                 Edit::SetMaterial { material: MaterialId(self.below(10)), change }
             }
@@ -120,7 +127,7 @@ fn file() -> Writer {
         "attributes": { "POSITION": positions }, "targets": [{ "POSITION": positions }], "material": 0,
     });
     w.add("meshes", json!({ "primitives": [primitive] }));
-    w.diffuse("paint", [0.5, 0.5, 0.5]);
+    w.add("materials", json!({ "name": "paint", "alphaMode": "MASK" }));
     w.node(json!({ "mesh": 1, "children": [2], "translation": [0.1, 0.2, 0.3] }));
     w.light(json!({ "type": "point" }), json!({ "name": "lamp" }));
     w.animation("wave", (1, "weights"), "LINEAR", &[0.0, 0.7], ("SCALAR", &[0.0, 1.0]));

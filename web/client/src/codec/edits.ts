@@ -1,4 +1,13 @@
-import type { Edit, Environment, InstanceSource, Light, LightSpec, Transform, Vec3 } from '../edit.js';
+import type {
+  Edit,
+  Environment,
+  InstanceSource,
+  Light,
+  LightSpec,
+  MaterialChange,
+  Transform,
+  Vec3,
+} from '../edit.js';
 import { WireError } from '../wire-error.js';
 import { isObject, type Json, number, object, text, vec3, vec4, whole } from './json.js';
 
@@ -85,6 +94,19 @@ const environment: Read<Environment> = (value, what) => {
   }
 };
 
+const materialParts: Readers<MaterialChange> = {
+  base_color: vec4,
+  metallic: real,
+  roughness: real,
+  emissive: vector,
+  transmission: real,
+  ior: real,
+  specular: real,
+  specular_color: vector,
+  normal_scale: real,
+  alpha_cutoff: real,
+};
+
 const created = { node: id, parent: id, transform };
 const node = (json: Json) => id(json.node, 'node');
 
@@ -107,7 +129,7 @@ const EDITS: { readonly [name: string]: (json: Json) => Edit } = {
   set_material: (json) => ({
     edit: 'set_material',
     material: id(json.material, 'material'),
-    ...some(json, { base_color: vec4, metallic: real, roughness: real, emissive: vector }),
+    ...some(json, materialParts),
   }),
   set_animation: (json) => ({
     edit: 'set_animation',
