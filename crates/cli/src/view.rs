@@ -56,7 +56,7 @@ pub(crate) struct View {
     #[arg(long, value_name = "N", default_value_t = 4,
           value_parser = clap::value_parser!(u32).range(1..=8))]
     multisampling: u32,
-    /// Factor on radiance: a number, or auto: 1 over the 99th percentile of luminance, followed.
+    /// Factor on radiance: a number, or auto: what is seen comes to middle grey, without burning out.
     #[arg(long, value_name = "auto|NUMBER", default_value = "auto")]
     exposure: Exposure,
     /// Tone map: gamma, srgb, reinhard, filmic or neutral.

@@ -26,6 +26,11 @@ pub struct Material {
     pub normal_texture: Option<TextureRef>,
     /// Scale of the normal map's x and y.
     pub normal_scale: f32,
+    /// Share of indirect light that arrives in R, linear. For clients that rasterise: a path tracer
+    /// finds occlusion by itself.
+    pub occlusion_texture: Option<TextureRef>,
+    /// How far the occlusion map is believed, 0 to 1: of indirect light, 1 + strength · (R − 1) arrives.
+    pub occlusion_strength: f32,
     /// Emitted radiance in cd/m²: factor times strength.
     pub emissive: Vec3,
     /// sRGB.
@@ -63,6 +68,8 @@ impl Default for Material {
             metallic_roughness_texture: None,
             normal_texture: None,
             normal_scale: 1.0,
+            occlusion_texture: None,
+            occlusion_strength: 1.0,
             emissive: Vec3::ZERO,
             emissive_texture: None,
             alpha_mode: AlphaMode::Opaque,

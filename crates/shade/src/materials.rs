@@ -28,7 +28,7 @@ pub(crate) struct GpuMaterial {
 }
 
 /// How many textures a material has.
-const MAPS: usize = 7;
+const MAPS: usize = 8;
 
 /// The bindings of group 3: numbers, then a texture and a sampler for each map.
 pub(crate) fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
@@ -97,6 +97,7 @@ fn maps(m: &Material) -> [(Option<&TextureRef>, Coding); MAPS] {
         (m.specular_texture.as_ref(), Coding::Linear),
         (m.specular_color_texture.as_ref(), Coding::Srgb),
         (m.transmission_texture.as_ref(), Coding::Linear),
+        (m.occlusion_texture.as_ref(), Coding::Linear),
     ]
 }
 
@@ -110,6 +111,7 @@ fn numbers(m: &Material, model: Materials) -> layout::Material {
         specular_map,
         specular_color_map,
         transmission_map,
+        occlusion_map,
     ] = maps(m).map(|(texture, _)| map(texture));
     layout::Material {
         base_color: m.base_color,
@@ -121,6 +123,7 @@ fn numbers(m: &Material, model: Materials) -> layout::Material {
         ior: m.ior,
         specular: m.specular,
         normal_scale: m.normal_scale,
+        occlusion_strength: m.occlusion_strength,
         cutoff: match m.alpha_mode {
             AlphaMode::Mask(cutoff) => cutoff,
             AlphaMode::Opaque | AlphaMode::Blend => 0.0,
@@ -129,7 +132,7 @@ fn numbers(m: &Material, model: Materials) -> layout::Material {
             | bit(m.unlit, material::UNLIT)
             | bit(m.alpha_mode == AlphaMode::Blend, material::BLEND)
             | bit(model == Materials::Lambert, material::LAMBERT),
-        _pad: [0; 2],
+        _pad: 0,
         base_color_map,
         metallic_roughness_map,
         normal_map,
@@ -137,6 +140,7 @@ fn numbers(m: &Material, model: Materials) -> layout::Material {
         specular_map,
         specular_color_map,
         transmission_map,
+        occlusion_map,
     }
 }
 

@@ -88,22 +88,41 @@ impl Meter {
     }
 }
 
-/// The luminance below which so large a share of the pixels lies, to a 24th of a stop; `None` where
-/// nothing is as bright as the second bin.
-pub(crate) fn percentile(histogram: &[u32], share: f64) -> Option<f32> {
-    let total: u64 = histogram.iter().map(|n| u64::from(*n)).sum();
-    let rank = share * total as f64;
-    let mut below = 0.0;
-    for (bin, count) in histogram.iter().enumerate() {
+/// What the middle of a picture's luminances becomes.
+const MIDDLE_GREY: f64 = 0.2;
+/// The pixels that count as its middle, of those that are lit.
+const MIDDLE: std::ops::Range<f64> = 0.1..0.95;
+/// So large a share of the lit pixels is to stay below [`BURNT`].
+const KEPT: f64 = 0.97;
+/// Three times white.
+const BURNT: f64 = 3.0;
+/// A picture of which less is lit says nothing.
+const LEAST_LIT: f64 = 0.02;
+
+/// The exposure that suits a picture: the middle of its luminances becomes middle grey, unless that
+/// would burn out more than a few per cent of it. To a part of a bin; `None` where (nearly) all is
+/// black.
+pub(crate) fn exposure(histogram: &[u32]) -> Option<f32> {
+    let all: f64 = histogram.iter().map(|n| f64::from(*n)).sum();
+    let lit = all - histogram.first().map_or(0.0, |n| f64::from(*n));
+    if lit <= LEAST_LIT * all {
+        return None;
+    }
+    let middle = MIDDLE.start * lit..MIDDLE.end * lit;
+    let (mut below, mut sum, mut bright) = (0.0, 0.0, 0.0);
+    for (bin, count) in histogram.iter().enumerate().skip(1) {
         let count = f64::from(*count);
-        if count > 0.0 && below + count >= rank {
-            let within = ((rank - below) / count) as f32;
-            let stops = LEAST + (bin as f32 - 1.0 + within) / BINS_A_STOP;
-            return (bin > 0).then(|| stops.exp2());
+        // Of its middle.
+        let stops = f64::from(LEAST) + (bin as f64 - 0.5) / f64::from(BINS_A_STOP);
+        let counted = (below + count).min(middle.end) - below.max(middle.start);
+        sum += stops * counted.max(0.0);
+        if below <= KEPT * lit && count > 0.0 {
+            bright = stops;
         }
         below += count;
     }
-    None
+    let average = (sum / (middle.end - middle.start)).exp2();
+    Some((MIDDLE_GREY / average).min(BURNT / bright.exp2()) as f32)
 }
 
 #[cfg(test)]
@@ -114,24 +133,38 @@ mod tests {
         (BINS_A_STOP * (luminance.log2() - LEAST)).floor() as usize + 1
     }
 
-    #[test]
-    fn percentiles_lie_in_their_bins() {
+    fn of(lit: &[(f32, u32)], black: u32) -> Option<f32> {
         let mut histogram = [0; BINS];
-        histogram[bin_of(0.5)] = 90;
-        histogram[bin_of(3.0)] = 10;
-        let half = percentile(&histogram, 0.5).expect("most are");
-        let bright = percentile(&histogram, 0.99).expect("some are");
-        assert!((half / 0.5).log2().abs() <= 1.0 / BINS_A_STOP, "{half}");
-        assert!((bright / 3.0).log2().abs() <= 1.0 / BINS_A_STOP, "{bright}");
-        assert!(percentile(&histogram, 0.95) < percentile(&histogram, 0.99));
+        histogram[0] = black;
+        lit.iter().for_each(|(luminance, count)| histogram[bin_of(*luminance)] += count);
+        exposure(&histogram)
+    }
+
+    #[track_caller]
+    fn close(found: Option<f32>, expected: f32) {
+        let found = found.expect("there is light");
+        assert!((found / expected).log2().abs() < 1.0 / BINS_A_STOP, "{found} for {expected}");
     }
 
     #[test]
-    fn black_has_none() {
-        let mut histogram = [0; BINS];
-        assert_eq!(percentile(&histogram, 0.99), None);
-        histogram[0] = 1000;
-        histogram[BINS - 1] = 1;
-        assert_eq!(percentile(&histogram, 0.99), None);
+    fn the_middle_becomes_middle_grey() {
+        close(of(&[(5.0, 1000)], 0), 0.04);
+        // What is black around it does not count.
+        close(of(&[(5.0, 1000)], 9000), 0.04);
+        // Nor do a few lamps and dark corners.
+        close(of(&[(1.0, 950), (1000.0, 20), (0.001, 30)], 0), 0.2);
+    }
+
+    #[test]
+    fn bright_parts_are_not_burnt_out() {
+        // A tenth of the picture is 1,000 times as bright as the rest.
+        close(of(&[(1.0, 900), (1000.0, 100)], 0), 3.0 / 1000.0);
+    }
+
+    #[test]
+    fn black_says_nothing() {
+        assert_eq!(of(&[], 0), None);
+        assert_eq!(of(&[], 1000), None);
+        assert_eq!(of(&[(1.0, 10)], 1000), None);
     }
 }

@@ -9,15 +9,13 @@ use lumencast_shaders::layout::tone;
 use lumencast_shaders::screen;
 
 use crate::gpu::Gpu;
-use crate::meter::{Meter, percentile};
+use crate::meter::{Meter, exposure};
 use crate::readback::Readback;
 use crate::timing::{PassTimes, Timed};
 use crate::{ShadeError, bindings};
 
 /// Frames that may be under way; more are not measured.
 const UNDER_WAY: usize = 3;
-/// The share of pixels that exposure leaves below white: as [`lumencast_picture::exposure`] has it.
-const BELOW_WHITE: f64 = 0.99;
 /// Between two codes of eight bits.
 const STEP: f32 = 1.0 / 255.0;
 
@@ -42,8 +40,9 @@ struct UnderWay {
 /// What a frame turned out to be, some time after it was submitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
-    /// The factor on radiance that would have brought the 99th percentile of luminance to 1; nothing
-    /// where the picture is black.
+    /// The factor on radiance that would have suited it, as in the page: the middle of its luminances
+    /// becomes middle grey (0.2), unless that would burn out more than a few per cent of it. Nothing
+    /// where it is (nearly) black.
     pub exposure: Option<f32>,
     /// What it took; nothing where the device has no clock.
     pub time: Option<PassTimes>,
@@ -180,9 +179,8 @@ impl Screen {
         gpu.poll(DURING)?;
         let Some(first) = self.under_way.front() else { return Ok(None) };
         let Some(histogram) = first.histogram.take(DURING)? else { return Ok(None) };
-        let white = percentile(bytemuck::cast_slice(&histogram), BELOW_WHITE);
+        let exposure = exposure(bytemuck::cast_slice(&histogram)).map(|e| e * first.pre_exposure);
         drop(histogram);
-        let exposure = white.map(|white| first.pre_exposure / white);
         let time = first.timed.as_ref().map_or(Ok(None), |timed| timed.take(gpu))?;
         self.under_way.pop_front();
         Ok(Some(Measured { exposure, time }))

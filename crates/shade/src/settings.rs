@@ -31,8 +31,8 @@ pub enum Materials {
     /// As glTF describes them.
     #[default]
     Full,
-    /// Every surface an opaque two-sided Lambert one with its base colour, without normal maps,
-    /// emitting from its front only: for comparisons with other renderers.
+    /// Every surface an opaque two-sided Lambert one with its base colour, without normal maps
+    /// and occlusion, emitting from its front only: for comparisons with other renderers.
     Lambert,
 }
 

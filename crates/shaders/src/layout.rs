@@ -141,9 +141,10 @@ pub struct Material {
     pub ior: f32,
     pub specular: f32,
     pub normal_scale: f32,
+    pub occlusion_strength: f32,
     pub cutoff: f32,
     pub flags: u32,
-    pub _pad: [u32; 2],
+    pub _pad: u32,
     pub base_color_map: Map,
     pub metallic_roughness_map: Map,
     pub normal_map: Map,
@@ -151,6 +152,7 @@ pub struct Material {
     pub specular_map: Map,
     pub specular_color_map: Map,
     pub transmission_map: Map,
+    pub occlusion_map: Map,
 }
 
 /// How a picture is shown. Group 0, binding 0 of [`crate::screen`].

@@ -71,6 +71,11 @@ pub fn background() -> String {
     [COMMON, VIEW, ENVIRONMENT, LIGHT, BACKGROUND].concat()
 }
 
+/// Spherical harmonics alone, for those who compare them with their own.
+pub fn harmonics() -> String {
+    [COMMON, HARMONICS].concat()
+}
+
 /// Shows a picture as display codes: `screen_vertex`, `screen_fragment`.
 pub fn screen() -> String {
     [COMMON, TONE, SCREEN].concat()

@@ -125,6 +125,7 @@ fn layouts_agree() {
             ior,
             specular,
             normal_scale,
+            occlusion_strength,
             cutoff,
             flags,
             _pad,
@@ -135,6 +136,7 @@ fn layouts_agree() {
             specular_map,
             specular_color_map,
             transmission_map,
+            occlusion_map,
         }
     );
 }

@@ -97,6 +97,7 @@ fn forward_fragment(
     let base_color = base_color_at(at, in.color / in.one);
     let substance = substance_at(at, base_color);
     let emission = emission_at(at);
+    var occlusion = occlusion_at(at);
     let tangent_normal = mapped_normal(at);
 
     let plain = (material.flags & MATERIAL_LAMBERT) != 0u;
@@ -158,12 +159,13 @@ fn forward_fragment(
         var b = bsdf_of(substance);
         if plain {
             b = lambert(substance.base_color);
+            occlusion = 1.0;
         }
         if (frame.parts & PART_DIRECT) != 0u {
             radiance += direct_light(b, n, v, position, geometric, pattern(in.clip.xy)/*ITS TURN*/);
         }
         if (frame.parts & PART_INDIRECT) != 0u {
-            radiance += indirect_light(b, n, v, position, substance.roughness);
+            radiance += indirect_light(b, n, v, position, substance.roughness, occlusion);
         }
     }
     out.color = vec4f(radiance * frame.pre_exposure * alpha, alpha);
@@ -192,21 +194,29 @@ fn direct_light(b: Bsdf, n: vec3f, v: vec3f, position: vec3f, geometric: vec3f, 
 }
 
 // Light of the field, chapter 4.2.2 of the second paper: diffuse by irradiance, specular by the split
-// sum, the lobe's mean radiance about the mirrored direction times the environment BRDF.
-fn indirect_light(b: Bsdf, n: vec3f, v: vec3f, position: vec3f, roughness: f32) -> vec3f {
+// sum, the lobe's mean radiance about the mirrored direction times the environment BRDF. The
+// material's occlusion is of the side that is seen: light through a thin surface it leaves alone.
+fn indirect_light(b: Bsdf, n: vec3f, v: vec3f, position: vec3f, roughness: f32, occlusion: f32) -> vec3f {
     let n_v = dot(n, v);
     let bands = ggx_bands(roughness);
     let mirrored = reflect(-v, n);
     let light = field_light(position, n, lobe(n, cosine_bands()), lobe(mirrored, bands));
     let under = 1.0 - reflectance(b, n_v);
-    var sum = b.diffuse * under * light.a / PI;
+    var sum = b.diffuse * under * occlusion * light.a / PI;
     let by = textureSampleLevel(environment_brdf, table_sampler, table_at(n_v, roughness), 0.0).xy;
-    sum += (b.f0 * by.x + b.f90 * by.y) * light.b;
+    sum += (b.f0 * by.x + b.f90 * by.y) * specular_occlusion(n_v, occlusion, b.alpha) * light.b;
     if any(b.transmission > vec3f(0.0)) {
         let behind = field_light(position, -n, lobe(-v, bands), lobe(-v, bands));
         sum += b.transmission * under * behind.a;
     }
     return sum;
+}
+
+// What occlusion leaves of the specular lobe: of a smooth surface seen from above more than of the
+// diffuse one, at grazing angles less. An empirical formula, Lagarde and de Rousiers 2014 ("Moving
+// Frostbite to PBR"), of α; three.js puts perceptual roughness there. 1 where nothing is occluded.
+fn specular_occlusion(n_v: f32, occlusion: f32, alpha: f32) -> f32 {
+    return saturate(pow(n_v + occlusion, exp2(-16.0 * alpha - 1.0)) - 1.0 + occlusion);
 }
 
 // Where the table has a cosine and a roughness: its outermost texels stand for 0 and 1.

@@ -18,11 +18,12 @@ struct Material {
     ior: f32,
     specular: f32,
     normal_scale: f32,
+    occlusion_strength: f32,
     // Coverage below it is none; 0 where alpha is not a mask.
     cutoff: f32,
     // Bits, see MATERIAL_*.
     flags: u32,
-    _pad: vec2u,
+    _pad: u32,
     base_color_map: Map,
     metallic_roughness_map: Map,
     normal_map: Map,
@@ -30,6 +31,7 @@ struct Material {
     specular_map: Map,
     specular_color_map: Map,
     transmission_map: Map,
+    occlusion_map: Map,
 }
 
 const MATERIAL_DOUBLE_SIDED: u32 = 1u;
@@ -53,6 +55,8 @@ const MATERIAL_LAMBERT: u32 = 8u;
 @group(3) @binding(12) var specular_color_sampler: sampler;
 @group(3) @binding(13) var transmission_texture: texture_2d<f32>;
 @group(3) @binding(14) var transmission_sampler: sampler;
+@group(3) @binding(15) var occlusion_texture: texture_2d<f32>;
+@group(3) @binding(16) var occlusion_sampler: sampler;
 
 // Both sets of texture coordinates.
 struct Coordinates {
@@ -94,6 +98,12 @@ fn substance_at(at: Coordinates, base_color: vec4f) -> Substance {
 fn emission_at(at: Coordinates) -> vec3f {
     let texel = textureSample(emissive_texture, emissive_sampler, mapped(material.emissive_map, at));
     return material.emissive * texel.rgb;
+}
+
+// The share of indirect light that arrives, 1 where there is no map.
+fn occlusion_at(at: Coordinates) -> f32 {
+    let texel = textureSample(occlusion_texture, occlusion_sampler, mapped(material.occlusion_map, at));
+    return 1.0 + material.occlusion_strength * (texel.r - 1.0);
 }
 
 // The normal map's normal, tangent space; z alone where there is no map.

@@ -8,7 +8,7 @@ const UNKNOWN: f32 = 1.0 / 1024.0;
 /// Exposure in stops: radiance times 2^stops is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposure {
-    /// Whether it follows the picture: the 99th percentile of luminance becomes white.
+    /// Whether it follows the picture: the middle of its luminances becomes middle grey.
     pub auto: bool,
     /// By hand.
     pub stops: f32,

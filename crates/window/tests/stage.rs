@@ -162,7 +162,7 @@ fn screenshots_do_not_overwrite_each_other() {
     test.press(Key::P);
     test.press(Key::P);
     for name in ["cornell-1.png", "cornell-2.png"] {
-        let picture = Loaded::read(&test.folder.join(name)).unwrap().linear();
+        let picture = Loaded::read(test.folder.join(name)).unwrap().linear();
         assert_eq!((picture.width(), picture.height()), (SIZE.x, SIZE.y));
         let bright = picture.pixels().iter().filter(|p| p.max_element() > 0.2).count();
         assert!(bright > picture.pixels().len() / 20, "{bright} bright pixels in {name}");

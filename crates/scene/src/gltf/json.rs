@@ -217,6 +217,7 @@ pub(super) struct Material {
     pub(super) name: String,
     pub(super) pbr_metallic_roughness: MetallicRoughness,
     pub(super) normal_texture: Option<NormalTexture>,
+    pub(super) occlusion_texture: Option<OcclusionTexture>,
     pub(super) emissive_texture: Option<TextureInfo>,
     pub(super) emissive_factor: [f32; 3],
     pub(super) alpha_mode: String,
@@ -231,6 +232,7 @@ impl Default for Material {
             name: String::new(),
             pbr_metallic_roughness: MetallicRoughness::default(),
             normal_texture: None,
+            occlusion_texture: None,
             emissive_texture: None,
             emissive_factor: [0.0; 3],
             alpha_mode: "OPAQUE".into(),
@@ -325,6 +327,14 @@ pub(super) struct NormalTexture {
     pub(super) info: TextureInfo,
     #[serde(default = "one")]
     pub(super) scale: f32,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct OcclusionTexture {
+    #[serde(flatten)]
+    pub(super) info: TextureInfo,
+    #[serde(default = "one")]
+    pub(super) strength: f32,
 }
 
 #[derive(Debug, Default, Deserialize)]

@@ -28,6 +28,7 @@ fn textures(m: &json::Material) -> impl Iterator<Item = &json::TextureInfo> {
         pbr.base_color_texture.as_ref(),
         pbr.metallic_roughness_texture.as_ref(),
         m.normal_texture.as_ref().map(|n| &n.info),
+        m.occlusion_texture.as_ref().map(|o| &o.info),
         m.emissive_texture.as_ref(),
         m.extensions.transmission.as_ref().and_then(|t| t.transmission_texture.as_ref()),
         specular.and_then(|s| s.specular_texture.as_ref()),
@@ -79,6 +80,8 @@ fn read_material(
         metallic_roughness_texture: texture(pbr.metallic_roughness_texture.as_ref())?,
         normal_texture: texture(json.normal_texture.as_ref().map(|n| &n.info))?,
         normal_scale: json.normal_texture.as_ref().map_or(1.0, |n| n.scale),
+        occlusion_texture: texture(json.occlusion_texture.as_ref().map(|o| &o.info))?,
+        occlusion_strength: json.occlusion_texture.as_ref().map_or(1.0, |o| o.strength),
         emissive: Vec3::from(json.emissive_factor)
             * extensions.emissive_strength.as_ref().map_or(1.0, |e| e.emissive_strength),
         emissive_texture: texture(json.emissive_texture.as_ref())?,
@@ -113,7 +116,15 @@ fn alpha_mode(json: &json::Material) -> Result<AlphaMode, Fault> {
 
 /// Refuses what has no meaning, and brings shares a little out of range back into it.
 fn check(m: &mut Material) -> Result<(), Fault> {
-    let numbers = [m.metallic, m.roughness, m.normal_scale, m.transmission, m.ior, m.specular];
+    let numbers = [
+        m.metallic,
+        m.roughness,
+        m.normal_scale,
+        m.occlusion_strength,
+        m.transmission,
+        m.ior,
+        m.specular,
+    ];
     let cutoff = if let AlphaMode::Mask(cutoff) = m.alpha_mode { cutoff } else { 0.0 };
     if !(m.base_color.is_finite()
         && m.specular_color.is_finite()
@@ -130,7 +141,13 @@ fn check(m: &mut Material) -> Result<(), Fault> {
     }
     m.base_color = m.base_color.clamp(Vec4::ZERO, Vec4::ONE);
     m.specular_color = m.specular_color.clamp(Vec3::ZERO, Vec3::splat(limits::EXTENT));
-    for share in [&mut m.metallic, &mut m.roughness, &mut m.transmission, &mut m.specular] {
+    for share in [
+        &mut m.metallic,
+        &mut m.roughness,
+        &mut m.occlusion_strength,
+        &mut m.transmission,
+        &mut m.specular,
+    ] {
         *share = share.clamp(0.0, 1.0);
     }
     Ok(())

@@ -202,6 +202,9 @@ fn materials_with_their_extensions() {
                 "baseColorFactor": [0.1, 0.2, 0.3, 0.4], "metallicFactor": 0.5, "roughnessFactor": 0.6,
                 "baseColorTexture": { "index": 0, "extensions": { "KHR_texture_transform": transform } },
             },
+            "occlusionTexture": {
+                "index": 0, "strength": 0.9, "extensions": { "KHR_texture_transform": transform },
+            },
             "emissiveFactor": [1.0, 0.5, 0.0], "alphaMode": "MASK", "alphaCutoff": 0.3, "doubleSided": true,
             "extensions": {
                 "KHR_materials_emissive_strength": { "emissiveStrength": 100000.0 },
@@ -231,6 +234,25 @@ fn materials_with_their_extensions() {
     let want = Vec2::new(0.25 + cos * u + sin * v, 0.5 - sin * u + cos * v);
     let got = texture.texture_from_mesh.transform_point2(Vec2::new(0.3, 0.7));
     assert!((got - want).length() < 1e-6, "{got} {want}");
+    let occlusion = m.occlusion_texture.as_ref().expect("a texture");
+    assert_eq!((m.occlusion_strength, occlusion.tex_coord), (0.9, 1));
+    assert_eq!(occlusion.texture_from_mesh, texture.texture_from_mesh);
+}
+
+#[test]
+fn the_strength_of_occlusion_is_a_share() {
+    let texture = json!({ "index": 0 });
+    let with = |strength: f32| json!({ "index": 0, "strength": strength });
+    for (texture, strength) in [(texture, 1.0), (with(1.5), 1.0), (with(-0.5), 0.0)] {
+        let mut w = triangle();
+        w.add("images", json!({ "uri": TEXEL }));
+        w.add("textures", json!({ "source": 0 }));
+        w.add("materials", json!({ "occlusionTexture": texture }));
+        let scene = load(w);
+        let m = &scene.materials()[0];
+        assert!(m.occlusion_texture.is_some());
+        assert_eq!(m.occlusion_strength, strength);
+    }
 }
 
 #[test]
@@ -241,6 +263,7 @@ fn senseless_materials_are_refused_by_name() {
         (json!({ "alphaMode": "GLASS" }), "GLASS"),
         (json!({ "extensions": { "KHR_materials_ior": { "ior": 0.5 } } }), "refraction"),
         (json!({ "emissiveTexture": { "index": 3 } }), "texture 3"),
+        (json!({ "occlusionTexture": { "index": 4 } }), "texture 4"),
     ] {
         let mut w = triangle();
         let mut material = material;

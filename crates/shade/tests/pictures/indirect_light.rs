@@ -5,12 +5,14 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use crate::common::{SIZE, drawn, renderer};
-use glam::{DVec3, Quat, UVec3, Vec3};
+use glam::{Affine2, DVec3, Quat, UVec2, UVec3, Vec2, Vec3};
 use lumencast_light::{
     Grid, LightField, OffsetPolicy, Order, ProbeVolume, Sh, VolumeId, sh::basis,
 };
-use lumencast_scene::{Material, Snapshot, View};
-use lumencast_shade::{Lighting, Settings};
+use lumencast_scene::{
+    Filter, Image, Light, LightKind, Material, Snapshot, TextureRef, View, Wrap,
+};
+use lumencast_shade::{Lighting, Materials, Settings};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 fn settings() -> Settings {
@@ -59,7 +61,7 @@ fn worst(drawn_light: &LightField, light: &LightField, offset: OffsetPolicy) -> 
 
     let (mut worst, mut largest) = (0.0f32, 0.0f32);
     for (i, pixel) in (0..).zip(&picture) {
-        let at = (glam::UVec2::new(i % SIZE.x, i / SIZE.x).as_vec2() + 0.5) / SIZE.as_vec2();
+        let at = (UVec2::new(i % SIZE.x, i / SIZE.x).as_vec2() + 0.5) / SIZE.as_vec2();
         let (origin, direction) = view.ray(at, SIZE.x as f32 / SIZE.y as f32);
         let point = origin - direction * (origin.y / direction.y);
         // Pixels that the floor's edge goes through belong to either side.
@@ -201,6 +203,93 @@ fn furnace() {
         let picture = renderer.pictures(&[view], &settings()).unwrap().remove(0);
         let middle = picture[(SIZE.y / 2 * SIZE.x + SIZE.x / 2) as usize].x;
         assert!((least..1.003).contains(&middle), "{name}: {middle}");
+    }
+}
+
+/// A map whose texels let through 128/255 and all of the light, moved by half its width: on the floor
+/// they lie the other way round. Only red has a say.
+fn occlusion_map() -> TextureRef {
+    let texels = vec![[128, 255, 255, 255], [255, 0, 0, 0]];
+    TextureRef {
+        image: Arc::new(Image { name: String::new(), width: 2, height: 1, texels }),
+        tex_coord: 0,
+        texture_from_mesh: Affine2::from_translation(Vec2::new(0.5, 0.0)),
+        wrap: [Wrap::Repeat; 2],
+        filter: Filter::Nearest,
+    }
+}
+
+/// A material's occlusion takes from the field's light, as far as its strength says, and from no other.
+#[test]
+fn occlusion_takes_from_indirect_light_alone() {
+    const ROUGHNESS: f32 = 0.3;
+    let mut sh = Sh::dark(Order::L2);
+    sh.coefficients[0] = Vec3::splat(3.0);
+    let light = uniform(&sh);
+    let view = View::look_at(Vec3::new(1.0, 2.5, 3.0), Vec3::ZERO, 0.9).unwrap();
+    let mut renderer = renderer(&floor(Material::default()), &settings());
+    renderer.set_light(&light, OffsetPolicy::None).unwrap();
+    let mut drawn = |material: &Material, settings: &Settings| {
+        let mut stage = Stage::default();
+        let material = stage.material(material.clone());
+        stage.quad(Vec3::new(-3.0, 0.0, 3.0), Vec3::X * 6.0, Vec3::NEG_Z * 6.0, material);
+        let kind = LightKind::Point { radius: 0.0 };
+        let lamp = Light { kind, color: Vec3::ONE, intensity: 30.0, range: None };
+        stage.light(lamp, Vec3::Y * 3.0, Vec3::NEG_Y);
+        renderer.set_scene(&stage.snapshot());
+        let picture = renderer.pictures(&[view], settings).unwrap().remove(0);
+        assert!(picture.iter().any(|p| p.x > 0.0), "there is light");
+        picture
+    };
+    let direct = Settings { lighting: Lighting::DIRECT, ..settings() };
+    let without_maps = Settings { materials: Materials::Lambert, ..settings() };
+
+    let diffuse = lambert(Vec3::splat(0.8), Vec3::ZERO);
+    let metal = Material { metallic: 1.0, roughness: ROUGHNESS, ..Material::default() };
+    for (name, material) in [("diffuse", diffuse), ("metal", metal)] {
+        let left = |share: f32, n_v: f32| match name {
+            "diffuse" => share,
+            // Lagarde and de Rousiers 2014.
+            _ => (n_v + share).powf((-16.0 * ROUGHNESS.powi(2) - 1.0).exp2()) - 1.0 + share,
+        };
+        for strength in [0.0, 0.5, 1.0] {
+            let occluded = Material {
+                occlusion_texture: Some(occlusion_map()),
+                occlusion_strength: strength,
+                ..material.clone()
+            };
+            for same in [&direct, &without_maps] {
+                assert!(
+                    drawn(&occluded, same) == drawn(&material, same),
+                    "{name}, {strength}, {same:?}"
+                );
+            }
+            let (open, occluded) = (drawn(&material, &settings()), drawn(&occluded, &settings()));
+            if strength == 0.0 {
+                assert!(occluded == open, "{name}: strength 0 changes light");
+            }
+            let mut seen = [0; 2];
+            for (i, (pixel, open)) in (0..).zip(occluded.iter().zip(&open)) {
+                let at = (UVec2::new(i % SIZE.x, i / SIZE.x).as_vec2() + 0.5) / SIZE.as_vec2();
+                let (origin, direction) = view.ray(at, SIZE.x as f32 / SIZE.y as f32);
+                let point = origin - direction * (origin.y / direction.y);
+                // Away from the floor's edge and from where the texels meet.
+                if direction.y >= 0.0 || point.abs().max_element() > 2.9 || point.x.abs() < 0.1 {
+                    continue;
+                }
+                let is_occluded = point.x > 0.0;
+                seen[usize::from(is_occluded)] += 1;
+                let texel = if is_occluded { 128.0 / 255.0 } else { 1.0 };
+                let share = 1.0 + strength * (texel - 1.0);
+                let expected = left(share, -direction.normalize().y).min(1.0);
+                let found = pixel.x / open.x;
+                assert!(
+                    (found - expected).abs() < 4e-3,
+                    "{name}, strength {strength}, at {point}: {found}, expected {expected}"
+                );
+            }
+            assert!(seen.iter().all(|n| *n > 500), "both texels are seen: {seen:?}");
+        }
     }
 }
 

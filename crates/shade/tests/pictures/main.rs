@@ -2,6 +2,7 @@
 //! tested.
 
 mod bad_input;
+mod committed;
 mod common;
 mod direct_light;
 mod indirect_light;

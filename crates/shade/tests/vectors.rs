@@ -1,0 +1,155 @@
+//! `vectors/sh.json`, which `light` and the TypeScript client read too: the same numbers from the
+//! shaders, on whatever adapter there is.
+
+use glam::{Vec3, Vec4};
+use lumencast_shade::{Gpu, wgpu};
+use lumencast_shaders::harmonics;
+use serde::Deserialize;
+
+#[derive(Deserialize)]
+struct Vectors {
+    basis: Vec<Basis>,
+    irradiance: Vec<Irradiance>,
+    ggx: Vec<Ggx>,
+}
+
+#[derive(Deserialize)]
+struct Basis {
+    direction: Vec3,
+    values: Vec<f32>,
+}
+
+#[derive(Deserialize)]
+struct Irradiance {
+    coefficients: Vec<Vec3>,
+    normal: Vec3,
+    lux: Vec3,
+}
+
+#[derive(Deserialize)]
+struct Ggx {
+    roughness: f32,
+    bands: [f32; 5],
+}
+
+/// What the shader says of a direction and a roughness.
+#[derive(Clone, Copy)]
+struct Answer {
+    basis: [f32; 25],
+    cosine: [f32; 25],
+    ggx: [f32; 5],
+}
+
+/// Numbers of an answer.
+const ANSWER: usize = 55;
+
+/// Asks the functions of `harmonics.wgsl`: direction and roughness in, numbers out.
+const QUESTIONS: &str = "
+@group(0) @binding(0) var<storage, read> asked: array<vec4f>;
+@group(0) @binding(1) var<storage, read_write> answers: array<array<f32, 55>>;
+
+fn answer(i: u32, first: u32, l: Lobe) {
+    let groups = array(l.g0, l.g1, l.g2, l.g3, l.g4, l.g5);
+    for (var g = 0u; g < 6u; g++) {
+        for (var k = 0u; k < 4u; k++) {
+            answers[i][first + 4u * g + k] = groups[g][k];
+        }
+    }
+    answers[i][first + 24u] = l.g6;
+}
+
+@compute @workgroup_size(1)
+fn ask(@builtin(global_invocation_id) id: vec3u) {
+    let i = id.x;
+    answer(i, 0u, lobe(asked[i].xyz, Bands(1.0, 1.0, 1.0, 1.0, 1.0)));
+    answer(i, 25u, lobe(asked[i].xyz, cosine_bands()));
+    let bands = ggx_bands(asked[i].w);
+    let all = array(bands.b0, bands.b1, bands.b2, bands.b3, bands.b4);
+    for (var k = 0u; k < 5u; k++) {
+        answers[i][50u + k] = all[k];
+    }
+}
+";
+
+fn ask(asked: &[Vec4]) -> Vec<Answer> {
+    let gpu = Gpu::new().expect("an adapter");
+    let device = gpu.device();
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: None,
+        source: wgpu::ShaderSource::Wgsl((harmonics() + QUESTIONS).into()),
+    });
+    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: None,
+        layout: None,
+        module: &module,
+        entry_point: Some("ask"),
+        compilation_options: Default::default(),
+        cache: None,
+    });
+    let buffer = |size: usize, usage| {
+        device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: size as u64,
+            usage,
+            mapped_at_creation: false,
+        })
+    };
+    let storage = wgpu::BufferUsages::STORAGE;
+    let input = buffer(size_of_val(asked), storage | wgpu::BufferUsages::COPY_DST);
+    gpu.queue().write_buffer(&input, 0, bytemuck::cast_slice(asked));
+    let size = asked.len() * ANSWER * size_of::<f32>();
+    let output = buffer(size, storage | wgpu::BufferUsages::COPY_SRC);
+    let read = buffer(size, wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ);
+    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &[
+            wgpu::BindGroupEntry { binding: 0, resource: input.as_entire_binding() },
+            wgpu::BindGroupEntry { binding: 1, resource: output.as_entire_binding() },
+        ],
+    });
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let mut pass = encoder.begin_compute_pass(&Default::default());
+    pass.set_pipeline(&pipeline);
+    pass.set_bind_group(0, &group, &[]);
+    pass.dispatch_workgroups(asked.len() as u32, 1, 1);
+    drop(pass);
+    encoder.copy_buffer_to_buffer(&output, 0, &read, 0, size as u64);
+    gpu.queue().submit([encoder.finish()]);
+    read.map_async(wgpu::MapMode::Read, .., |mapped| mapped.unwrap());
+    device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+    let bytes = read.get_mapped_range(..).unwrap();
+    let numbers: &[f32] = bytemuck::cast_slice(&bytes);
+    let part = |numbers: &[f32]| Answer {
+        basis: numbers[..25].try_into().unwrap(),
+        cosine: numbers[25..50].try_into().unwrap(),
+        ggx: numbers[50..].try_into().unwrap(),
+    };
+    numbers.chunks_exact(ANSWER).map(part).collect()
+}
+
+#[test]
+fn shaders_agree_with_the_vectors() {
+    let vectors: Vectors =
+        serde_json::from_str(include_str!("../../../vectors/sh.json")).expect("vectors/sh.json");
+    let directions: Vec<Vec4> = vectors.basis.iter().map(|v| v.direction.extend(0.0)).collect();
+    for (case, answer) in vectors.basis.iter().zip(ask(&directions)) {
+        assert_eq!(case.values.len(), 25);
+        for (a, b) in answer.basis.iter().zip(&case.values) {
+            assert!((a - b).abs() < 2e-6, "{}: {a} {b}", case.direction);
+        }
+    }
+    let normals: Vec<Vec4> = vectors.irradiance.iter().map(|v| v.normal.extend(0.0)).collect();
+    for (case, answer) in vectors.irradiance.iter().zip(ask(&normals)) {
+        let terms = case.coefficients.iter().zip(answer.cosine);
+        let lux: Vec3 = terms.map(|(c, y)| *c * y).sum();
+        assert!((lux - case.lux).length() < 2e-5, "{lux} {}", case.lux);
+    }
+    let rough: Vec<Vec4> = vectors.ggx.iter().map(|v| Vec3::Y.extend(v.roughness)).collect();
+    for (case, answer) in vectors.ggx.iter().zip(ask(&rough)) {
+        for (a, b) in answer.ggx.iter().zip(case.bands) {
+            // Sines and cosines of a device have fewer digits.
+            assert!((a - b).abs() < 2e-3, "{}: {:?} {:?}", case.roughness, answer.ggx, case.bands);
+        }
+    }
+}
