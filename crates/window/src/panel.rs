@@ -51,7 +51,7 @@ pub(crate) struct Asked {
 
 /// What pointer and keys do.
 const HELP: &str = "Drag: turn. Right drag: pan. Wheel: nearer. W A S D, Q E: walk, with Shift faster. \
-     1 2 3: all light, direct, indirect. O, F: orbit, fly. X: automatic exposure. P: screenshot. \
+     1 2 3: direct light, indirect, both. O, F: orbit, fly. X: automatic exposure. P: screenshot. \
      H: this panel.";
 /// Samples a pixel that can be chosen.
 const SAMPLES: [u32; 4] = [1, 2, 4, 8];
@@ -188,9 +188,9 @@ pub(crate) fn keys(
     }
     let pressed = |key| context.input(|input| input.key_pressed(key));
     for (key, lighting) in [
-        (Key::Num1, Lighting::FIELD),
-        (Key::Num2, Lighting::DIRECT),
-        (Key::Num3, Lighting::INDIRECT),
+        (Key::Num1, Lighting::DIRECT),
+        (Key::Num2, Lighting::INDIRECT),
+        (Key::Num3, Lighting::FIELD),
     ] {
         if pressed(key) {
             controls.settings.lighting = lighting;

@@ -139,10 +139,14 @@ fn keys_choose_what_is_shown() {
     let mut test = Test::new("keys");
     test.frames([vec![], vec![], vec![]]);
     assert!(test.stage.is_settled(), "exposure is known after some frames");
-    test.press(Key::Num3);
-    assert_eq!(test.stage.controls().settings.lighting, Lighting::INDIRECT);
-    test.press(Key::Num2);
-    assert_eq!(test.stage.controls().settings.lighting, Lighting::DIRECT);
+    for (key, lighting) in [
+        (Key::Num1, Lighting::DIRECT),
+        (Key::Num2, Lighting::INDIRECT),
+        (Key::Num3, Lighting::FIELD),
+    ] {
+        test.press(key);
+        assert_eq!(test.stage.controls().settings.lighting, lighting);
+    }
     test.press(Key::H);
     assert!(!test.stage.controls().panel);
     test.frames(vec![vec![]; 6]);
