@@ -34,6 +34,18 @@ enum Release {
     Backports,
 }
 
+/// A library that windows look for when they are opened.
+const fn of_windows(name: &'static str, present: fn() -> bool) -> Package {
+    Package {
+        name,
+        release: Release::Stable,
+        purpose: Purpose::Test,
+        why: "a part of X11 that windows need",
+        optional: false,
+        present,
+    }
+}
+
 const PACKAGES: &[Package] = &[
     Package {
         name: "build-essential",
@@ -75,6 +87,11 @@ const PACKAGES: &[Package] = &[
         optional: false,
         present: || runs("Xvfb", "-help"),
     },
+    of_windows("libx11-6", || has_library("libX11.so.6")),
+    of_windows("libx11-xcb1", || has_library("libX11-xcb.so.1")),
+    of_windows("libxcursor1", || has_library("libXcursor.so.1")),
+    of_windows("libxi6", || has_library("libXi.so.6")),
+    of_windows("libxkbcommon-x11-0", || has_library("libxkbcommon-x11.so.0")),
     Package {
         name: "python3-pip",
         release: Release::Stable,
@@ -262,6 +279,12 @@ fn runs(program: &str, flag: &str) -> bool {
     output(program, &[flag]).is_some()
 }
 
+/// Whether a shared library is where Debian puts them.
+fn has_library(name: &str) -> bool {
+    let Ok(folders) = fs::read_dir("/usr/lib") else { return false };
+    folders.flatten().any(|folder| folder.path().join(name).exists())
+}
+
 /// Major version of an installed Debian package.
 fn installed_version(package: &str) -> Option<u32> {
     let version = output("dpkg-query", &["-W", "-f", "${Version}", package])?;
@@ -271,6 +294,13 @@ fn installed_version(package: &str) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn libraries_are_found() {
+        // Every program needs it.
+        assert!(has_library("libc.so.6") || !is_bookworm());
+        assert!(!has_library("libnothing-of-the-kind.so.1"));
+    }
 
     #[test]
     fn node_is_asked_for_as_in_the_packages() {

@@ -65,6 +65,14 @@ fn wrong_usage_exits_with_2() {
 }
 
 #[test]
+fn a_folder_is_no_scene_and_no_output() {
+    let folder = Folder::new("no-scene");
+    let path = folder.0.to_str().expect("text");
+    run(&["serve", path]).failed_saying(&[path, "not a regular file"]);
+    run(&["bake", "cornell", "-o", path]).failed_saying(&[path, "is a folder"]);
+}
+
+#[test]
 fn a_missing_scene_is_named() {
     for command in ["serve", "bake", "inspect", "probe"] {
         let mut arguments = vec![command, "no/such/scene.glb"];
