@@ -203,7 +203,7 @@ impl Cache {
         let news = regions
             .entry(region)
             .or_insert_with(|| RegionCache::new(cells, known.order))
-            .add(bytes, now, volume)?;
+            .add(bytes, now, catalog.tick_seconds, volume)?;
         Ok(Received { header, news })
     }
 

@@ -4,8 +4,6 @@ use glam::Vec3;
 use lumencast_codec::{DecodeError, ProbeDecoder, ProbeHeader, Region};
 use lumencast_light::{Order, ProbeVolume};
 
-/// Share of a new interval in the measured one.
-const INTERVAL_SHARE: f64 = 0.2;
 /// The passage from one update to the next takes at most so long, seconds, however rare they are.
 const LONGEST_PASSAGE: f64 = 0.5;
 
@@ -18,8 +16,8 @@ pub(crate) struct RegionCache {
     /// What was shown when the newest light came; empty when nothing had come before.
     from: Vec<Vec3>,
     to: Vec<Vec3>,
-    /// Measured seconds between updates.
-    interval: Option<f64>,
+    /// Seconds from the last light to the newest.
+    passage: f64,
     /// Whether the volume holds `to` already.
     settled: bool,
 }
@@ -40,7 +38,7 @@ impl RegionCache {
             newest: None,
             from: Vec::new(),
             to: Vec::new(),
-            interval: None,
+            passage: 0.0,
             settled: true,
         }
     }
@@ -50,10 +48,14 @@ impl RegionCache {
     }
 
     /// Takes a frame in; whether it is newer than what was there. `volume` is what is shown.
+    ///
+    /// The passage to it takes as long as it was waited for: when layers are dropped, it adapts with
+    /// the first frame. Frames that come in a burst pass over the time in which they were made.
     pub(crate) fn add(
         &mut self,
         frame: &[u8],
         now: f64,
+        tick_seconds: f64,
         volume: &mut ProbeVolume,
     ) -> Result<bool, DecodeError> {
         let light = self.decoder.decode(frame)?;
@@ -66,9 +68,10 @@ impl RegionCache {
             for probe in self.region.probes(volume.grid.resolution) {
                 self.from.extend_from_slice(volume.probe(probe));
             }
-            let passed = (now - newest.arrived).max(0.0);
-            let measured = self.interval.unwrap_or(passed);
-            self.interval = Some(measured + INTERVAL_SHARE * (passed - measured));
+            let waited = now - newest.arrived;
+            let ticks = light.header.info.tick.saturating_sub(newest.header.info.tick);
+            let made = ticks as f64 * tick_seconds;
+            self.passage = waited.max(made).clamp(0.0, LONGEST_PASSAGE);
         }
         self.newest = Some(Newest { header: light.header, arrived: now });
         self.to = light.coefficients;
@@ -77,16 +80,15 @@ impl RegionCache {
     }
 
     /// Brings `volume` to what is to be seen at `now`: on the way from the last update to the
-    /// newest, which it reaches one measured interval after that one came, and keeps.
+    /// newest, which it reaches one passage after that one came, and keeps.
     pub(crate) fn show(&mut self, now: f64, volume: &mut ProbeVolume) {
         let Some(newest) = self.newest else { return };
         if self.settled {
             return;
         }
-        let passage = self.interval.unwrap_or(0.0).min(LONGEST_PASSAGE);
         let passed = (now - newest.arrived).max(0.0);
-        let share =
-            if self.from.is_empty() || passed >= passage { 1.0 } else { passed / passage } as f32;
+        let is_there = self.from.is_empty() || passed >= self.passage;
+        let share = if is_there { 1.0 } else { passed / self.passage } as f32;
         let n = volume.order.coefficients();
         for (i, probe) in self.region.probes(volume.grid.resolution).enumerate() {
             let (own, range) = (volume.probe_mut(probe), i * n..(i + 1) * n);

@@ -188,6 +188,42 @@ fn light_arrives_blended_with_its_age_and_version() {
     assert!(trace.iter().all(|v| *v < 3.0 * (1.0 + NEAR)));
 }
 
+/// Passages take as long as was waited for what they lead to: with the first frame after layers have
+/// been dropped, and for frames that come together, the time in which they were made.
+#[test]
+fn passages_take_the_time_between_updates() {
+    let mut server = Server::new(1);
+    let mut cache = Cache::new();
+    cache.catalog(&server.catalog.encode(), 0.0).unwrap();
+    let frames: Vec<Vec<Sent>> = (0..33u16)
+        .map(|tick| {
+            server.shine(1.0 + f32::from(tick / 4));
+            server.tick(f64::from(tick) * TICK)
+        })
+        .collect();
+    let of_layer = |sent: &Sent, most: u8| match sent {
+        Sent::Probes { layer, .. } => *layer <= most,
+        _ => true,
+    };
+    let arrive = |cache: &mut Cache, tick: usize, most: u8, now: f64| {
+        for sent in frames[tick].iter().filter(|sent| of_layer(sent, most)) {
+            take_in(cache, sent, now).unwrap();
+        }
+    };
+    let time = |tick: usize| tick as f64 * TICK;
+    (0..=16).for_each(|tick| arrive(&mut cache, tick, 2, time(tick)));
+    assert!(near(shown(&mut cache, time(17)), 5.0));
+    // From now on the lowest layer alone: every fourth update.
+    (17..=20).for_each(|tick| arrive(&mut cache, tick, 0, time(tick)));
+    assert!(near(shown(&mut cache, time(22)), 5.5), "half-way after half of four ticks");
+    assert!(near(shown(&mut cache, time(24)), 6.0));
+    // Two updates at once after a pause: the second was made four ticks after the first.
+    (21..=28).for_each(|tick| arrive(&mut cache, tick, 0, time(28)));
+    assert!(near(shown(&mut cache, time(28)), 6.0), "{:?}", shown(&mut cache, time(28)));
+    assert!(near(shown(&mut cache, time(30)), 7.0), "half-way from 6 to 8");
+    assert!(near(shown(&mut cache, time(32)), 8.0));
+}
+
 #[test]
 fn an_overdue_update_leaves_the_newest_standing() {
     let mut server = Server::new(1);
