@@ -29,8 +29,8 @@ const REGIONS = 8;
 const CAMERA: [number, number, number] = [-5, 0, 0];
 /** Megabits a second. */
 const RATES = { wide: 100, half: 0.8, tooNarrow: 0.3 } as const;
-/** Milliseconds to adapt in, and to measure for. */
-const ADAPT = 5000;
+/** Milliseconds to adapt in, turns that begin meanwhile included, and to measure for. */
+const ADAPT = 12_000;
 const MEASURE = 5000;
 
 const link = await NarrowLink.open().catch((error: Error) => {
