@@ -19,6 +19,8 @@ pub struct Live {
     views: Vec<NamedView>,
     now: Instant,
     eye: Option<Vec3>,
+    /// Ages of the newest light and of the oldest region's, seconds.
+    ages: (Option<f64>, Option<f64>),
     /// When the first light came.
     lit: Option<Instant>,
 }
@@ -33,7 +35,15 @@ impl Live {
     pub fn new(session: Session, scene: Scene) -> Self {
         let views = scene.views();
         let replica = Replica::new(scene);
-        Self { session, replica, views, now: Instant::now(), eye: None, lit: None }
+        Self {
+            session,
+            replica,
+            views,
+            now: Instant::now(),
+            eye: None,
+            ages: (None, None),
+            lit: None,
+        }
     }
 }
 
@@ -57,7 +67,8 @@ impl World for Live {
             self.eye = Some(eye);
         }
         self.replica.update(&self.session, self.now);
-        if self.lit.is_none() && self.session.light(self.now, |light| light.age.is_some()) {
+        self.ages = self.session.light(self.now, |light| (light.age, light.oldest_age));
+        if self.lit.is_none() && self.ages.0.is_some() {
             self.lit = Some(self.now);
         }
     }
@@ -73,7 +84,7 @@ impl World for Live {
     fn facts(&self) -> Vec<(&'static str, String)> {
         let statistics = self.session.statistics(self.now);
         let seconds = |age: Option<f64>| age.map(|age| format!("{:.0} ms", 1e3 * age));
-        let (age, oldest) = self.session.light(self.now, |light| (light.age, light.oldest_age));
+        let (age, oldest) = self.ages;
         let server = statistics.tick_ms.map(|ms| format!("{ms:.1} ms a tick"));
         let facts = [
             ("age", seconds(age)),
