@@ -9,7 +9,7 @@ import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
-import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import { chromiumProgram, launchProgram } from '../../testing/chromium.js';
 import { buildPage, openPage } from './browser.js';
 import { NarrowLink, SLOW_ADDRESS } from './narrow-link.js';
@@ -43,6 +43,7 @@ describe.skipIf(!link)('a link that is too slow', () => {
   let folder: string;
   let browser: Browser;
   let server: Server;
+  let page: Page;
 
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), 'lumencast-link-'));
@@ -53,6 +54,9 @@ describe.skipIf(!link)('a link that is too slow', () => {
     const where = { host: SLOW_ADDRESS, inside: link!.inside };
     server = await Server.start(program, scene, PORT, [...options, '--page', join(folder, 'page')], where);
   }, 120_000);
+
+  // A page that stays open takes its share of the link.
+  afterEach(() => page?.close());
 
   afterAll(async () => {
     await browser?.close();
@@ -68,7 +72,7 @@ describe.skipIf(!link)('a link that is too slow', () => {
     'over %s',
     async (transport) => {
       await link!.carry(RATES.wide);
-      const page = await openPage(browser, server.address, VIEWPORT, { transport });
+      page = await openPage(browser, server.address, VIEWPORT, { transport });
       await page.evaluate(watch, CAMERA);
       await allLayers(page);
       const measureAt = async (rate: number, ms = MEASURE) => {
@@ -96,7 +100,7 @@ describe.skipIf(!link)('a link that is too slow', () => {
         expect(p99).toBeLessThan(2);
       }
 
-      const slow = await measureAt(RATES.tooNarrow, 2 * MEASURE);
+      const slow = await measureAt(RATES.tooNarrow, 3 * MEASURE);
       const [near, far] = [slow.regions[0], slow.regions[REGIONS - 1]];
       expect(slow.layers).toBe(1);
       expect(slow.tickRate).toBeGreaterThan(0.8 * wide.tickRate);
@@ -105,7 +109,8 @@ describe.skipIf(!link)('a link that is too slow', () => {
       expect(near.updates).toBeGreaterThan(3 * far.updates);
       expect(near.median).toBeLessThan(far.median / 3);
       // Far regions are old, but get their turn: without one they would be as old as the narrow link.
-      for (const { p99 } of slow.regions) expect(p99).toBeLessThan(12);
+      const narrowFor = (ADAPT + 3 * MEASURE) / 1000;
+      for (const { p99 } of slow.regions) expect(p99).toBeLessThan((2 / 3) * narrowFor);
 
       await link!.carry(RATES.wide);
       await allLayers(page);
@@ -116,7 +121,6 @@ describe.skipIf(!link)('a link that is too slow', () => {
       }
 
       expect(await page.evaluate(() => window.watched!.lost)).toBe(0);
-      await page.close();
     },
     150_000,
   );
