@@ -247,23 +247,26 @@ class LiveSession implements Session, Sink {
     this.dispatch();
   }
 
-  probes({ name, field, region, layer }: TrackPlan, frame: Uint8Array): void {
+  probes(track: TrackPlan, frame: Uint8Array): boolean {
+    const { name, field, region, layer } = track;
     const now = this.hear(name, frame);
     let added: ReturnType<Cache['addProbes']>;
     try {
       added = this.cache.addProbes(field, region, frame, now);
     } catch (error) {
-      return this.drop(error);
+      this.drop(error);
+      return false;
     }
-    if (!added) return;
+    if (!added) return false;
     const { update, tick } = added.header;
     const arrived = performance.timeOrigin + 1000 * now;
     const decoded = performance.timeOrigin + performance.now();
     const bytes = frame.length;
     this.meter.update(update, { field, region, layer, tick, arrived, decoded, bytes }, now);
     const delay = this.cache.delayOf(field, tick, now);
-    if (delay !== undefined) this.reading?.layers.arrived(update, delay, bytes, now);
+    if (delay !== undefined) this.reading?.arrived(track, update, delay, bytes, now);
     if (added.news) this.emitter.emit('light', { field, region, tick });
+    return added.news;
   }
 
   /** Notes that a frame came; returns when. */

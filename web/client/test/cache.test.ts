@@ -116,6 +116,23 @@ describe('light', () => {
     expect(cache.light(1).fields[0].tick).toBe(2);
   });
 
+  it('passes over a group that is sent again from its beginning', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    const group = Array.from({ length: 40 }, () => server.step().probes).flat();
+    for (const { track, bytes } of group) addProbes(cache, track, bytes, 0);
+    const revision = () => cache.light(2).fields[0].revision;
+    const before = revision();
+    for (const { track, bytes } of group) addProbes(cache, track, bytes, 1);
+    expect(revision()).toBe(before);
+    expect(shown(cache, 2)).toBeCloseTo(40, 3);
+    // The next group follows, far later.
+    server.tick += 400;
+    feed(cache, server.step(), 20);
+    expect(shown(cache, 20.1)).toBeLessThan(440);
+    expect(shown(cache, 21)).toBeCloseTo(441, 1);
+  });
+
   it('tells its age by the server’s clock', () => {
     const server = new FakeServer({ clock: 77 });
     const cache = joined(server);

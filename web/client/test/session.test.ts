@@ -413,6 +413,21 @@ describe('reading', () => {
     expect(session.stats.layers).toBe(3);
   });
 
+  it('brings light to more regions than it can read at once, again and again', async () => {
+    const regions = 112;
+    const { net, server, session } = await joined(new FakeServer({ regions }));
+    const ticks = new Map<number, number>();
+    session.on('light', ({ region, tick }) => ticks.set(region, tick));
+    // The fake server has a keyframe every 1.6 s, no matter who begins to read: so long a turn may take.
+    const round = 3 * 1.6 + 1;
+    await run(net, server, 2 * round);
+    expect(session.light().fields[0].regions).toEqual({ lit: regions, all: regions });
+    expect(ticks.size).toBe(regions);
+    expect(Math.min(...ticks.values())).toBeGreaterThan(server.tick - round / TICK);
+    expect(net.link.readers.size).toBeLessThanOrEqual(82);
+    expect(session.stats.layers).toBe(3);
+  });
+
   it('drops layers on a link that is too slow, and takes them back when it recovers', async () => {
     const { net, server, session } = await joined();
     await run(net, server, 2);

@@ -1,6 +1,6 @@
 import type { FieldLight } from '../api.js';
 import { cellCount, type Field, type Region, valuesPerProbe } from '../codec/catalog.js';
-import type { ProbeHeader } from '../codec/probe-header.js';
+import { type ProbeHeader, splitProbeFrame } from '../codec/probe-header.js';
 import { ProbeDecoder } from '../codec/probes.js';
 
 /** Seconds that a change takes to show at most, however long the silence before it was. */
@@ -95,9 +95,13 @@ export class FieldCache {
   add(region: number, frame: Uint8Array, now: number): { header: ProbeHeader; news: boolean } {
     const state = this.regions.get(region);
     if (!state) throw new RangeError(`field ${this.field.id} has no region ${region}`);
-    const { header, coefficients } = state.decoder.decode(frame);
+    const { header } = splitProbeFrame(frame);
     const before = state.header;
-    if (before && header.update <= before.update) return { header, news: false };
+    const news = !before || header.update > before.update;
+    // As when a group is sent again from its beginning, to a reader who had it.
+    if (!news && !state.decoder.lacks(header.update)) return { header, news };
+    const { coefficients } = state.decoder.decode(frame);
+    if (!news) return { header, news };
     if (state.to) {
       // Frames that come in a burst blend over the time in which they were made.
       const made = before ? (header.tick - before.tick) * this.tickSeconds : 0;
@@ -111,7 +115,7 @@ export class FieldCache {
     state.scale = header.scale;
     state.arrived = now;
     state.shown = -1;
-    return { header, news: true };
+    return { header, news };
   }
 
   /** Of the regions' newest frames the oldest and the newest: their heads, and when they came. */

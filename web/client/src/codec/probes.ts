@@ -39,6 +39,13 @@ export class ProbeDecoder {
     return { header, coefficients: toRgb(region.values) };
   }
 
+  /** Whether a later delta may refer to an update, as far as is known. */
+  lacks(update: number): boolean {
+    const layer = layerOf(update);
+    const held = this.bases[layer];
+    return layer <= 1 && (!held || held.update < update);
+  }
+
   private base(header: ProbeHeader): Reconstruction | undefined {
     if (header.base === undefined) return undefined;
     const base = this.bases.find((base) => base?.update === header.base);
@@ -53,10 +60,7 @@ export class ProbeDecoder {
 
   /** Keeps what later deltas may refer to; late frames do not replace newer ones. */
   private keep(update: number, region: Reconstruction): void {
-    const layer = layerOf(update);
-    if (layer > 1) return;
-    const held = this.bases[layer];
-    if (!held || held.update < update) this.bases[layer] = { update, region };
+    if (this.lacks(update)) this.bases[layerOf(update)] = { update, region };
   }
 }
 

@@ -1,5 +1,6 @@
-import type { Catalog, Grid, Region } from '../codec/catalog.js';
+import type { Catalog, Field, Grid, Region } from '../codec/catalog.js';
 import type { Vec3, Vec4 } from '../edit.js';
+import type { Turns } from './turns.js';
 
 /** Priorities of the tracks that are always read. */
 export const CATALOG_PRIORITY = 255;
@@ -10,9 +11,9 @@ const TURN_PRIORITY = 252;
 const RANKS = 80;
 /**
  * Tracks read at once. Each takes a stream, and a peer allows about 100: past this, far regions lose
- * their upper layers, then all.
+ * their upper layers, then all do, then far ones take turns (see `Turns`).
  */
-const MOST_TRACKS = 80;
+export const MOST_TRACKS = 80;
 
 /** A track to read. */
 export interface TrackPlan {
@@ -23,18 +24,46 @@ export interface TrackPlan {
   readonly priority: number;
 }
 
+/** The tracks of the regions' lowest layers, near regions first. */
+export function lowestTracks(catalog: Catalog, camera: Vec3 | undefined): string[] {
+  return byDistance(catalog, camera).map(({ field, region }) => trackName(field, region, 0));
+}
+
 /**
  * The tracks to read, most important first: layer 0 of all regions before layer 1 of any, since light
- * that is seldom renewed beats light that is not; within a layer near regions before far ones. Only the
- * track `turn` goes before all of them.
+ * that is seldom renewed beats light that is not; within a layer near regions before far ones. Of regions
+ * that take turns those that `turns` reads; only the track `turns.turn` goes before all of them.
  */
 export function planTracks(
   catalog: Catalog,
   layers: number,
   camera: Vec3 | undefined,
-  turn?: string,
+  turns?: Pick<Turns, 'turn' | 'reads'>,
 ): TrackPlan[] {
-  const regions = catalog.fields
+  const regions = byDistance(catalog, camera);
+  const plan: TrackPlan[] = [];
+  for (let layer = 0; layer < layers; layer++) {
+    // Tracks that are free between turns are for those who wait, not for upper layers.
+    if (layer > 0 && regions.length >= MOST_TRACKS) break;
+    regions.forEach(({ field, region }, rank) => {
+      if (layer >= field.layers) return;
+      const name = trackName(field, region, layer);
+      if (turns && !turns.reads(name)) return;
+      const ranked = STATE_PRIORITY - 4 - RANKS * layer - Math.min(rank, RANKS - 1);
+      plan.push({
+        name,
+        field: field.id,
+        region: region.id,
+        layer,
+        priority: name === turns?.turn ? TURN_PRIORITY : ranked,
+      });
+    });
+  }
+  return plan.slice(0, MOST_TRACKS);
+}
+
+function byDistance(catalog: Catalog, camera: Vec3 | undefined): { field: Field; region: Region }[] {
+  return catalog.fields
     .flatMap((field) =>
       field.regions.map((region) => ({
         field,
@@ -43,22 +72,10 @@ export function planTracks(
       })),
     )
     .sort((a, b) => a.distance - b.distance);
-  const plan: TrackPlan[] = [];
-  for (let layer = 0; layer < layers; layer++) {
-    regions.forEach(({ field, region }, rank) => {
-      if (layer >= field.layers) return;
-      const name = `f${field.id}/r${region.id}/l${layer}`;
-      const ranked = STATE_PRIORITY - 4 - RANKS * layer - Math.min(rank, RANKS - 1);
-      plan.push({
-        name,
-        field: field.id,
-        region: region.id,
-        layer,
-        priority: name === turn ? TURN_PRIORITY : ranked,
-      });
-    });
-  }
-  return plan.slice(0, MOST_TRACKS);
+}
+
+function trackName(field: Field, region: Region, layer: number): string {
+  return `f${field.id}/r${region.id}/l${layer}`;
 }
 
 /** Metres from a point in the world to a region's box. */

@@ -2,7 +2,7 @@ import { type Catalog, epochOf } from '../codec/catalog.js';
 import type { Vec3 } from '../edit.js';
 import type { Link, TrackReader } from '../transport.js';
 import { LayerControl } from './layers.js';
-import { planTracks, STATE_PRIORITY, type TrackPlan } from './plan.js';
+import { lowestTracks, MOST_TRACKS, planTracks, STATE_PRIORITY, type TrackPlan } from './plan.js';
 import { Turns } from './turns.js';
 
 /** Milliseconds for which state frames are waited for: every one of them counts. */
@@ -11,7 +11,8 @@ const STATE_AGE = 5000;
 /** Who takes what is read. */
 export interface Sink {
   state(frame: Uint8Array): void;
-  probes(track: TrackPlan, frame: Uint8Array): void;
+  /** Returns whether this is newer light than the region had. */
+  probes(track: TrackPlan, frame: Uint8Array): boolean;
 }
 
 /** The tracks read of one server's epoch over one connection: which, and with what priority. */
@@ -21,7 +22,17 @@ export class Reading {
   private readonly readers = new Map<string, TrackReader>();
   private readonly turns: Turns;
   private camera: Vec3 | undefined;
+  private moved = false;
   private stale = true;
+  /** Whether upper layers are read, which could be dropped. */
+  private upper = false;
+  /** Time of the last beat, and whether the server has ticked since. */
+  private beat: number;
+  private ticked = false;
+  /** Time of the last beat by which it had ticked. */
+  private tickedAt: number;
+  /** Time that stands still while the server does not tick. */
+  private awake: number;
 
   constructor(
     private readonly link: Link,
@@ -29,34 +40,47 @@ export class Reading {
     private readonly sink: Sink,
     now: number,
   ) {
+    this.beat = this.tickedAt = this.awake = now;
     const most = Math.max(1, ...catalog.fields.map((field) => field.layers));
     // Only of the catalog's own server are clock and updates known by which delivery is judged.
     const own = catalog.fields.filter((field) => epochOf(catalog, field) === catalog.epoch);
     const judged = new Set(own.map((field) => field.id));
-    const perUpdate = [1, 2, 3].map((layers) =>
-      framesPerUpdate(planTracks(catalog, layers, undefined).filter(({ field }) => judged.has(field))),
+    this.turns = new Turns(lowestTracks(catalog, undefined), catalog.tickSeconds, now, MOST_TRACKS);
+    const steady = ({ field, name }: TrackPlan) => judged.has(field) && !this.turns.isFar(name);
+    this.layers = new LayerControl(most, catalog.tickSeconds, (layers) =>
+      framesPerUpdate(planTracks(catalog, layers, this.camera).filter(steady)),
     );
-    this.layers = new LayerControl(most, catalog.tickSeconds, (layers) => perUpdate[layers - 1]);
-    const lowest = planTracks(catalog, 1, undefined).map(({ name }) => name);
-    this.turns = new Turns(lowest, catalog.tickSeconds, now);
-    this.stateReader = link.subscribe('state', { priority: STATE_PRIORITY, maxAge: STATE_AGE }, (frame) =>
-      sink.state(frame),
-    );
+    this.stateReader = link.subscribe('state', { priority: STATE_PRIORITY, maxAge: STATE_AGE }, (frame) => {
+      this.ticked = true;
+      sink.state(frame);
+    });
   }
 
   setCamera(camera: Vec3 | undefined): void {
     this.camera = camera;
-    this.stale = true;
+    this.moved = true;
+  }
+
+  /** Light came; see {@link LayerControl.arrived}. What comes and goes in turn tells nothing of the link. */
+  arrived({ name }: TrackPlan, update: number, delay: number, bytes: number, now: number): void {
+    if (!this.turns.isFar(name)) this.layers.arrived(update, delay, bytes, now);
   }
 
   /** Adapts to the link and the camera. To be called some times a second. */
   adapt(now: number): void {
+    this.keepTime(now);
+    if (this.moved) {
+      this.turns.order(lowestTracks(this.catalog, this.camera), this.awake);
+      this.moved = false;
+      this.stale = true;
+    }
     if (this.layers.judge(now, this.link.bandwidth())) this.stale = true;
-    if (this.turns.judge(now, this.layers.layers === 1)) this.stale = true;
+    const slow = this.layers.layers === 1 || !this.upper;
+    if (this.turns.judge(this.awake, slow)) this.stale = true;
     if (!this.stale) return;
     this.stale = false;
-    const planned = planTracks(this.catalog, this.layers.layers, this.camera, this.turns.turn);
-    const plan = planned.filter(({ name }) => this.turns.reads(name));
+    const plan = planTracks(this.catalog, this.layers.layers, this.camera, this.turns);
+    this.upper = plan.some(({ layer }) => layer > 0);
     const wanted = new Set(plan.map((track) => track.name));
     for (const [name, reader] of this.readers) {
       if (wanted.has(name)) continue;
@@ -64,6 +88,16 @@ export class Reading {
       this.readers.delete(name);
     }
     for (const track of plan) this.read(track);
+  }
+
+  /** A server that stands still, or takes longer for a tick than it should, starves nobody. */
+  private keepTime(now: number): void {
+    if (this.ticked) {
+      this.awake += Math.min(now - this.tickedAt, Math.max(now - this.beat, this.catalog.tickSeconds));
+      this.tickedAt = now;
+    }
+    this.ticked = false;
+    this.beat = now;
   }
 
   private read(track: TrackPlan): void {
@@ -74,8 +108,8 @@ export class Reading {
     this.readers.set(
       name,
       this.link.subscribe(name, options, (frame) => {
-        this.turns.heard(name);
-        this.sink.probes(track, frame);
+        // A group under way is sent from its beginning: that is light of the last turn.
+        if (this.sink.probes(track, frame)) this.turns.heard(name);
       }),
     );
   }
