@@ -114,7 +114,7 @@ fn levels(
             meshes.push(own.iter().map(|corners| corners.map(place)).collect());
             meshes.len() - 1
         };
-        let mesh = match instance.deformed {
+        let mesh = match instance.deformation {
             Some(_) => add(),
             None => *known.entry(instance.mesh_id).or_insert_with(add),
         };

@@ -1,5 +1,7 @@
 //! Morph targets and skins: glTF 2.0, sections 3.7.2.2 and 3.7.3.
 
+use std::sync::{Arc, OnceLock};
+
 use glam::{Affine3A, Mat3A, Vec3, Vec3A, Vec4};
 use rayon::prelude::*;
 
@@ -11,16 +13,72 @@ const BATCH: usize = 2048;
 
 /// Where a skin's joints are.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Pose {
+pub struct Pose {
     /// One a joint, from the mesh at rest to the space of the skinned vertices.
-    pub(crate) joints: Vec<Affine3A>,
-    /// The same for vertices without joints.
-    pub(crate) rigid: Affine3A,
+    pub joints: Vec<Affine3A>,
+    /// The same for vertices without joints, and for joints that there are not.
+    pub rigid: Affine3A,
+}
+
+impl Pose {
+    /// The transform of a joint, or of what has none.
+    pub fn of(&self, joint: Option<usize>) -> &Affine3A {
+        joint.and_then(|joint| self.joints.get(joint)).unwrap_or(&self.rigid)
+    }
+}
+
+/// How a mesh is deformed. Who deforms vertices elsewhere, on a graphics device, reads the cause
+/// alone; for everyone else they are computed when they are first asked for, and kept.
+#[derive(Debug)]
+pub struct Deformation {
+    mesh: Arc<Mesh>,
+    weights: Vec<f32>,
+    pose: Option<Pose>,
+    vertices: OnceLock<Vec<Vertices>>,
+}
+
+impl Deformation {
+    /// Of a mesh's morph targets by `weights` (1 displaces in full; targets past the last one keep to
+    /// 0), and then of its skin by a pose.
+    pub fn new(mesh: Arc<Mesh>, weights: Vec<f32>, pose: Option<Pose>) -> Self {
+        Self { mesh, weights, pose, vertices: OnceLock::new() }
+    }
+
+    /// What is deformed.
+    pub fn mesh(&self) -> &Arc<Mesh> {
+        &self.mesh
+    }
+
+    /// Of morph targets, the first first.
+    pub fn weights(&self) -> &[f32] {
+        &self.weights
+    }
+
+    /// Where the joints are; absent for a mesh that is only morphed.
+    pub fn pose(&self) -> Option<&Pose> {
+        self.pose.as_ref()
+    }
+
+    /// The deformed vertices, one entry a primitive.
+    #[inline]
+    pub fn vertices(&self) -> &[Vertices] {
+        self.vertices.get().unwrap_or_else(|| {
+            // Not within the lock: a thread that waits for others' batches may take up work that
+            // asks for these vertices too.
+            let vertices = deform(&self.mesh, &self.weights, self.pose.as_ref());
+            self.vertices.get_or_init(|| vertices)
+        })
+    }
+
+    /// Whether it is this one, of that mesh.
+    pub(crate) fn has_cause(&self, mesh: &Arc<Mesh>, weights: &[f32], pose: Option<&Pose>) -> bool {
+        Arc::ptr_eq(&self.mesh, mesh) && self.weights == weights && self.pose.as_ref() == pose
+    }
 }
 
 /// A mesh's vertices after morphing by `weights` and, where it has a skin, skinning. One entry a
 /// primitive.
-pub(crate) fn deform(mesh: &Mesh, weights: &[f32], pose: Option<&Pose>) -> Vec<Vertices> {
+fn deform(mesh: &Mesh, weights: &[f32], pose: Option<&Pose>) -> Vec<Vertices> {
     let deform = |primitive: &Primitive| {
         let mut vertices = morph(primitive, weights);
         if let Some(pose) = pose {
@@ -65,13 +123,13 @@ fn unit(tangent: Vec3, rest: Vec4) -> Vec4 {
     tangent.try_normalize().map_or(rest, |t| t.extend(rest.w))
 }
 
-fn skin(primitive: &Primitive, vertices: &mut Vertices, Pose { joints, rigid }: &Pose) {
+fn skin(primitive: &Primitive, vertices: &mut Vertices, pose: &Pose) {
     let blended = |vertex: usize| {
-        let Some(names) = primitive.joints.get(vertex) else { return *rigid };
+        let Some(names) = primitive.joints.get(vertex) else { return pose.rigid };
         let weights = primitive.weights[vertex].to_array();
         let mut matrix = Affine3A::from_mat3_translation(glam::Mat3::ZERO, Vec3::ZERO);
         for (joint, weight) in names.iter().zip(weights).filter(|(_, w)| *w > 0.0) {
-            let joint = joints.get(usize::from(*joint)).copied().unwrap_or(*rigid);
+            let joint = pose.of(Some((*joint).into()));
             matrix.matrix3 += joint.matrix3 * weight;
             matrix.translation += joint.translation * weight;
         }

@@ -51,6 +51,7 @@ mod volume;
 pub use aabb::Aabb;
 pub use asset::{Camera, FileContents, Projection, SceneFile};
 pub use builtin::NAMES as BUILTINS;
+pub use deform::{Deformation, Pose};
 pub use edit::{Edit, InstanceSource, LightSpec, MaterialChange, Playback, Transform};
 pub use environment::{Environment, HdrImage};
 pub use error::{Fault, SceneError};

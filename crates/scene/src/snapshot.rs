@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Affine3A;
 
-use crate::{Environment, Material, Mesh, MeshId, NodeId, PlacedLight, Vertices};
+use crate::{Deformation, Environment, Material, Mesh, MeshId, NodeId, PlacedLight, Vertices};
 
 /// One moment of a scene. Immutable; cheap to clone and to send to other threads.
 #[derive(Clone, Debug)]
@@ -33,9 +33,20 @@ pub struct Instance {
     pub mesh_id: MeshId,
     /// The mesh at rest.
     pub mesh: Arc<Mesh>,
-    /// Skinned or morphed vertices, one entry a primitive; absent for rigid meshes. A skinned
-    /// mesh's vertices are in the space of `world_from_object` like any other's.
-    pub deformed: Option<Arc<Vec<Vertices>>>,
+    /// How it is skinned and morphed; absent for rigid meshes. A skinned mesh's vertices are in the
+    /// space of `world_from_object` like any other's. Equal pointers are equal vertices.
+    pub deformation: Option<Arc<Deformation>>,
     /// Affine, invertible; a negative determinant mirrors and flips the winding.
     pub world_from_object: Affine3A,
+}
+
+impl Instance {
+    /// The vertices of a primitive in object space, deformed where the mesh is.
+    #[inline]
+    pub fn vertices(&self, primitive: usize) -> &Vertices {
+        match &self.deformation {
+            Some(deformation) => &deformation.vertices()[primitive],
+            None => &self.mesh.primitives[primitive].vertices,
+        }
+    }
 }

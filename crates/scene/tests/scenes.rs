@@ -25,8 +25,7 @@ fn check(name: &str, snapshot: &Snapshot) {
     for instance in &snapshot.instances {
         assert!(instance.world_from_object.inverse().is_finite(), "{name}: {}", instance.node);
         for (index, primitive) in instance.mesh.primitives.iter().enumerate() {
-            let deformed = instance.deformed.as_ref().map(|d| &d[index]);
-            let vertices = deformed.unwrap_or(&primitive.vertices);
+            let vertices = instance.vertices(index);
             let count = vertices.positions.len();
             let all_there = |n: usize| n == 0 || n == count;
             assert_eq!(vertices.normals.len(), count, "{name}");

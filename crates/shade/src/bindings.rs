@@ -11,6 +11,9 @@ pub(crate) const UNIFORM: wgpu::BindingType = buffer(wgpu::BufferBindingType::Un
 /// A storage buffer that is only read.
 pub(crate) const STORAGE: wgpu::BindingType =
     buffer(wgpu::BufferBindingType::Storage { read_only: true });
+/// A storage buffer that is written.
+pub(crate) const WRITTEN: wgpu::BindingType =
+    buffer(wgpu::BufferBindingType::Storage { read_only: false });
 /// A sampler that filters.
 pub(crate) const SAMPLER: wgpu::BindingType =
     wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);

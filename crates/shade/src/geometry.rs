@@ -1,7 +1,7 @@
 //! Triangles on the device: two vertex buffers and an index buffer a primitive, uploaded once a mesh.
 //! What deformation changes (position, normal, tangent; 40 bytes a vertex) lies apart from the rest
-//! (texture coordinates, colour; 32 bytes), so that a deforming instance has its own of the first
-//! and shares the second.
+//! (texture coordinates, colour; 32 bytes), so that a deforming instance has its own of the first,
+//! written on the device from those at rest, and shares the second.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -10,6 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3, Vec4};
 use lumencast_scene::{Aabb, Mesh, Primitive, Vertices};
 
+use crate::deform::Deformable;
 use crate::gpu::Gpu;
 
 /// Locations 0 to 2 of the shaders.
@@ -21,6 +22,9 @@ pub(crate) struct Shape {
     tangent: [f32; 4],
 }
 
+/// Bytes of a vertex.
+pub(crate) const SHAPE_SIZE: usize = size_of::<Shape>();
+
 /// Locations 3 to 5.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -29,6 +33,11 @@ pub(crate) struct Attributes {
     uv1: [f32; 2],
     color: [f32; 4],
 }
+
+/// Read and written by the pass that deforms, and copied by those who compare what it wrote.
+const SHAPE_USAGE: wgpu::BufferUsages = wgpu::BufferUsages::VERTEX
+    .union(wgpu::BufferUsages::STORAGE)
+    .union(wgpu::BufferUsages::COPY_SRC);
 
 const SHAPE: [wgpu::VertexAttribute; 3] =
     wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4];
@@ -62,21 +71,47 @@ pub(crate) struct Part {
 #[derive(Debug, Default)]
 pub(crate) struct Geometry {
     /// By address; the mesh is kept, so that no other takes its place.
-    meshes: HashMap<usize, (Arc<Mesh>, Vec<Part>)>,
+    meshes: HashMap<usize, Kept>,
+}
+
+#[derive(Debug)]
+struct Kept {
+    mesh: Arc<Mesh>,
+    parts: Vec<Part>,
+    /// One a primitive, once an instance deforms.
+    deformables: Vec<Option<Deformable>>,
 }
 
 impl Geometry {
     /// The primitives of a mesh, in order.
     pub(crate) fn parts(&mut self, gpu: &Gpu, mesh: &Arc<Mesh>) -> &[Part] {
-        let (_, parts) = self.meshes.entry(Arc::as_ptr(mesh).addr()).or_insert_with(|| {
-            (mesh.clone(), mesh.primitives.iter().map(|p| upload(gpu, p)).collect())
-        });
-        parts
+        &self.kept(gpu, mesh).parts
+    }
+
+    /// The same, and what of each deforms; nothing where the device has no room for that.
+    pub(crate) fn deforming(
+        &mut self,
+        gpu: &Gpu,
+        mesh: &Arc<Mesh>,
+    ) -> impl Iterator<Item = (&Part, Option<&Deformable>)> {
+        let kept = self.kept(gpu, mesh);
+        if kept.deformables.is_empty() {
+            kept.deformables = mesh.primitives.iter().map(|p| Deformable::new(gpu, p)).collect();
+        }
+        kept.parts.iter().zip(kept.deformables.iter().map(Option::as_ref))
+    }
+
+    fn kept(&mut self, gpu: &Gpu, mesh: &Arc<Mesh>) -> &mut Kept {
+        self.meshes.entry(Arc::as_ptr(mesh).addr()).or_insert_with(|| Kept {
+            mesh: mesh.clone(),
+            parts: mesh.primitives.iter().map(|p| upload(gpu, p)).collect(),
+            deformables: Vec::new(),
+        })
     }
 
     /// Forgets meshes that nobody else has.
     pub(crate) fn forget_unused(&mut self) {
-        self.meshes.retain(|_, (mesh, _)| Arc::strong_count(mesh) > 1);
+        self.meshes.retain(|_, kept| Arc::strong_count(&kept.mesh) > 1);
     }
 }
 
@@ -85,6 +120,11 @@ impl Part {
     pub(crate) fn deformed(&self, gpu: &Gpu, vertices: &Vertices) -> Self {
         let shape = shape(gpu, vertices);
         Self { shape, bounds: bounds(&vertices.positions), ..self.clone() }
+    }
+
+    /// The same triangles with room for other vertices.
+    pub(crate) fn to_deform(&self, gpu: &Gpu) -> Self {
+        Self { shape: gpu.buffer("vertices", SHAPE_USAGE, &[], self.shape.size()), ..self.clone() }
     }
 }
 
@@ -102,7 +142,12 @@ fn upload(gpu: &Gpu, primitive: &Primitive) -> Part {
     let indices = bytemuck::cast_slice(&primitive.triangles);
     Part {
         shape: shape(gpu, vertices),
-        attributes: vertex_buffer(gpu, bytemuck::cast_slice(&attributes)),
+        attributes: gpu.buffer(
+            "attributes",
+            wgpu::BufferUsages::VERTEX,
+            bytemuck::cast_slice(&attributes),
+            64,
+        ),
         indices: gpu.buffer("indices", index, indices, 4),
         index_count: 3 * primitive.triangles.len() as u32,
         bounds: bounds(&vertices.positions),
@@ -117,11 +162,7 @@ fn shape(gpu: &Gpu, vertices: &Vertices) -> wgpu::Buffer {
             tangent: vertices.tangents.get(i).copied().unwrap_or(Vec4::ZERO).to_array(),
         })
         .collect();
-    vertex_buffer(gpu, bytemuck::cast_slice(&shapes))
-}
-
-fn vertex_buffer(gpu: &Gpu, contents: &[u8]) -> wgpu::Buffer {
-    gpu.buffer("vertices", wgpu::BufferUsages::VERTEX, contents, 64)
+    gpu.buffer("vertices", SHAPE_USAGE, bytemuck::cast_slice(&shapes), 64)
 }
 
 fn bounds(positions: &[Vec3]) -> Aabb {

@@ -16,6 +16,7 @@
 
 mod bindings;
 mod camera;
+mod deform;
 mod environment_brdf;
 mod error;
 mod field;

@@ -26,14 +26,9 @@ impl Meter {
             visibility: wgpu::ShaderStages::COMPUTE,
             ..bindings::entry(binding, ty)
         };
-        let histogram = wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Storage { read_only: false },
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        };
         let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("meter"),
-            entries: &[of_compute(0, bindings::PICTURE), of_compute(1, histogram)],
+            entries: &[of_compute(0, bindings::PICTURE), of_compute(1, bindings::WRITTEN)],
         });
         let pipeline_layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("meter"),

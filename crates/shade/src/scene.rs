@@ -5,10 +5,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
-use lumencast_scene::{Aabb, Instance, Material, NodeId, Snapshot, Vertices};
+use lumencast_scene::{Aabb, Deformation, Instance, Material, NodeId, Snapshot};
 use lumencast_shaders::layout;
 
 use crate::camera::Frustum;
+use crate::deform::{Cause, Deformer};
 use crate::geometry::{Geometry, Part};
 use crate::gpu::Gpu;
 use crate::materials::{GpuMaterial, Surface};
@@ -32,14 +33,20 @@ pub(crate) struct Call {
     pub(crate) instances: Range<u32>,
 }
 
-/// Vertices of a deforming instance, as long as they stay the same.
-type Deformed = (Arc<Vec<Vertices>>, Vec<Part>);
+/// The primitives of a deforming instance.
+#[derive(Debug)]
+struct Deformed {
+    parts: Vec<Part>,
+    /// What they were last deformed by.
+    by: Arc<Deformation>,
+}
 
 /// A snapshot on the device.
 #[derive(Debug)]
 pub(crate) struct GpuScene {
     geometry: Geometry,
     textures: Textures,
+    deformer: Deformer,
     deformed: HashMap<NodeId, Deformed>,
     materials: Vec<GpuMaterial>,
     /// Of which `materials` were made.
@@ -54,6 +61,7 @@ impl GpuScene {
         Self {
             geometry: Geometry::default(),
             textures: Textures::new(gpu, anisotropy),
+            deformer: Deformer::new(gpu),
             deformed: HashMap::new(),
             materials: Vec::new(),
             source: None,
@@ -74,21 +82,14 @@ impl GpuScene {
         self.update_materials(gpu, material_layout, &snapshot.materials, model);
         let placed: Vec<layout::Instance> = snapshot.instances.iter().map(placed).collect();
         self.instances = instance_buffer(gpu, &placed);
+        self.deform(gpu, snapshot);
         self.draws.clear();
         let mut rigid: HashMap<(usize, usize), usize> = HashMap::new();
-        let mut deformed = std::mem::take(&mut self.deformed);
         for (instance, number) in snapshot.instances.iter().zip(0..) {
-            let own = instance.deformed.as_ref().map(|vertices| {
-                let parts = self.geometry.parts(gpu, &instance.mesh);
-                let entry = match deformed.remove(&instance.node) {
-                    Some(kept) if Arc::ptr_eq(&kept.0, vertices) => kept,
-                    _ => (vertices.clone(), deform(gpu, parts, vertices)),
-                };
-                &self.deformed.entry(instance.node).or_insert(entry).1
-            });
+            let own = self.deformed.get(&instance.node);
             for primitive in 0..instance.mesh.primitives.len() {
                 let part = match own {
-                    Some(parts) => &parts[primitive],
+                    Some(deformed) => &deformed.parts[primitive],
                     None => &self.geometry.parts(gpu, &instance.mesh)[primitive],
                 };
                 if part.index_count == 0 {
@@ -121,6 +122,55 @@ impl GpuScene {
             self.bounds.grow(bounds.max);
         }
         self.geometry.forget_unused();
+    }
+
+    /// Brings the vertices of deforming instances to this moment.
+    fn deform(&mut self, gpu: &Gpu, snapshot: &Snapshot) {
+        let mut before = std::mem::take(&mut self.deformed);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("deform"),
+            timestamp_writes: None,
+        });
+        for instance in &snapshot.instances {
+            let Some(deformation) = &instance.deformation else { continue };
+            let kept = before.remove(&instance.node);
+            let deformed = match kept {
+                Some(kept) if Arc::ptr_eq(&kept.by, deformation) => kept,
+                _ => self.deformed_by(gpu, &mut pass, deformation, kept),
+            };
+            self.deformed.insert(instance.node, deformed);
+        }
+        drop(pass);
+        gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Deforms the primitives of an instance, in the buffers that it had before where they fit.
+    fn deformed_by(
+        &mut self,
+        gpu: &Gpu,
+        pass: &mut wgpu::ComputePass<'_>,
+        deformation: &Arc<Deformation>,
+        before: Option<Deformed>,
+    ) -> Deformed {
+        let mesh = deformation.mesh();
+        let mut own = before
+            .filter(|before| Arc::ptr_eq(before.by.mesh(), mesh))
+            .map_or_else(Vec::new, |before| before.parts)
+            .into_iter();
+        let cause = Cause::new(gpu, deformation);
+        let rest = self.geometry.deforming(gpu, mesh).enumerate();
+        let parts = rest.map(|(primitive, (rest, deformable))| {
+            let own = own.next();
+            let Some(deformable) = deformable else {
+                return rest.deformed(gpu, &deformation.vertices()[primitive]);
+            };
+            let mut part = own.unwrap_or_else(|| rest.to_deform(gpu));
+            let by = (&**deformation, &cause);
+            self.deformer.deform(gpu, pass, deformable, by, rest, &mut part);
+            part
+        });
+        Deformed { parts: parts.collect(), by: deformation.clone() }
     }
 
     fn update_materials(
@@ -208,8 +258,4 @@ fn placed(instance: &Instance) -> layout::Instance {
         mirrors: u32::from(to.matrix3.determinant() < 0.0),
         ..layout::Instance::default()
     }
-}
-
-fn deform(gpu: &Gpu, parts: &[Part], vertices: &[Vertices]) -> Vec<Part> {
-    parts.iter().zip(vertices).map(|(part, vertices)| part.deformed(gpu, vertices)).collect()
 }

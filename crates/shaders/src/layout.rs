@@ -155,6 +155,41 @@ pub struct Material {
     pub occlusion_map: Map,
 }
 
+/// How a primitive is deformed. Group 0, binding 0 of [`crate::deform`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Deform {
+    pub vertices: u32,
+    pub morphs: u32,
+    pub joints: u32,
+    pub flags: u32,
+}
+
+/// The joints that a vertex hangs on. Group 0, binding 2 of [`crate::deform`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Influence {
+    pub weights: Vec4,
+    pub joints: [u32; 2],
+    pub _pad: [u32; 2],
+}
+
+/// A morph target that displaces. Group 0, binding 4 of [`crate::deform`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Morph {
+    pub number: u32,
+    pub weight: f32,
+}
+
+/// Bits of [`Deform::flags`].
+pub mod deform {
+    /// By joints.
+    pub const SKINNED: u32 = 1;
+    /// Each triangle has its own normal.
+    pub const FLAT: u32 = 2;
+}
+
 /// How a picture is shown. Group 0, binding 0 of [`crate::screen`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

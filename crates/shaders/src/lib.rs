@@ -1,13 +1,13 @@
 //! WGSL modules, put together into shaders, and the memory layouts that they share with Rust.
 //!
-//! A shader is the text of its modules one after the other ([`forward`], [`depth`], [`background`],
-//! and for what is done with a picture [`screen`], [`meter`]); what they need of each other is told by their order here, since WGSL has no imports. Tests
-//! validate every shader without a GPU, and compare every struct of [`layout`] with what the
-//! compiler makes of its namesake.
+//! A shader is the text of its modules one after the other ([`forward`], [`depth`], [`background`];
+//! before them [`deform`], and for what is done with a picture [`screen`], [`meter`]); what they need
+//! of each other is told by their order here, since WGSL has no imports. Tests validate every shader
+//! without a GPU, and compare every struct of [`layout`] with what the compiler makes of its namesake.
 //!
 //! Bindings are grouped by lifetime: 0 the pass (its view, instances, and which of them it draws), 1
 //! the frame's light (punctual lights, shadow maps, environment), 2 the light field, 3 the material.
-//! What is done with a picture has a group of its own.
+//! Deforming and what is done with a picture have a group of their own.
 //!
 //! ```
 //! use lumencast_shaders::{Shading, forward};
@@ -34,6 +34,7 @@ const BACKGROUND: &str = include_str!("../wgsl/background.wgsl");
 const TONE: &str = include_str!("../wgsl/tone.wgsl");
 const SCREEN: &str = include_str!("../wgsl/screen.wgsl");
 const METER: &str = include_str!("../wgsl/meter.wgsl");
+const DEFORM: &str = include_str!("../wgsl/deform.wgsl");
 
 /// How often a multisampled surface is shaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -69,6 +70,11 @@ pub fn depth() -> String {
 /// Draws the environment where there is no surface: `background_vertex`, `background_fragment`.
 pub fn background() -> String {
     [COMMON, VIEW, ENVIRONMENT, LIGHT, BACKGROUND].concat()
+}
+
+/// Deforms the vertices of a primitive: `deform_vertices`.
+pub fn deform() -> String {
+    [COMMON, DEFORM].concat()
 }
 
 /// Spherical harmonics alone, for those who compare them with their own.

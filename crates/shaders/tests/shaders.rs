@@ -3,7 +3,7 @@
 
 use std::mem::{offset_of, size_of};
 
-use lumencast_shaders::{Shading, background, depth, forward, layout, meter, screen};
+use lumencast_shaders::{Shading, background, deform, depth, forward, layout, meter, screen};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{Module, TypeInner};
 
@@ -24,6 +24,7 @@ fn every_shader_is_valid() {
         ("forward, by samples", forward(Shading::Samples), 2),
         ("depth", depth(), 3),
         ("background", background(), 2),
+        ("deform", deform(), 1),
         ("screen", screen(), 2),
         ("meter", meter(), 1),
     ] {
@@ -62,7 +63,11 @@ macro_rules! same {
 
 #[test]
 fn layouts_agree() {
-    let modules = [compiled("forward", &forward(Shading::Pixels)), compiled("screen", &screen())];
+    let modules = [
+        compiled("forward", &forward(Shading::Pixels)),
+        compiled("deform", &deform()),
+        compiled("screen", &screen()),
+    ];
     let m = &modules;
     same!(m, View { clip_from_world, world_from_clip, eye, perspective, forward, turn });
     same!(m, Instance { world_from_object, normal_from_object, mirrors, _pad0, _pad1, _pad2 });
@@ -112,6 +117,9 @@ fn layouts_agree() {
     same!(m, Field { count, offset_policy, offset_metres, _pad });
     same!(m, Volume { cell_from_world, spacing, scale, resolution, texels, origin, _pad });
     same!(m, Map { row0, row1 });
+    same!(m, Deform { vertices, morphs, joints, flags });
+    same!(m, Influence { weights, joints, _pad });
+    same!(m, Morph { number, weight });
     same!(m, Screen { factor, tone_map, step, _pad });
     same!(
         m,

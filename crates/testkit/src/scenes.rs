@@ -81,7 +81,7 @@ impl Stage {
         world_from_object: Affine3A,
     ) -> &mut Self {
         let node = NodeId(self.instances.len() as u32);
-        self.instances.push(Instance { node, mesh_id, mesh, deformed: None, world_from_object });
+        self.instances.push(Instance { node, mesh_id, mesh, deformation: None, world_from_object });
         self
     }
 

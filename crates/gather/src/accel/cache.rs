@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lumencast_scene::{Instance, Mesh, NodeId, Snapshot, Vertices};
+use lumencast_scene::{Deformation, Instance, Mesh, NodeId, Snapshot};
 
 use super::{Accel, Kernel, MeshBvh};
 
@@ -12,15 +12,15 @@ use super::{Accel, Kernel, MeshBvh};
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
     pub(super) rigid: HashMap<Address, Kept<()>>,
-    pub(super) deforming: HashMap<(NodeId, Address), Kept<Arc<Vec<Vertices>>>>,
+    pub(super) deforming: HashMap<(NodeId, Address), Kept<Arc<Deformation>>>,
 }
 
 #[derive(Debug)]
-pub(super) struct Kept<V> {
+pub(super) struct Kept<D> {
     /// Keeps the address from being used again.
     mesh: Arc<Mesh>,
     /// What the hierarchy was last fitted to.
-    vertices: V,
+    deformation: D,
     bvh: Arc<MeshBvh>,
     used: bool,
 }
@@ -40,9 +40,9 @@ impl AccelCache {
         let placed: Vec<_> = (0..)
             .zip(&snapshot.instances)
             .map(|(index, instance)| {
-                let bvh = match &instance.deformed {
+                let bvh = match &instance.deformation {
                     None => self.rigid(instance),
-                    Some(vertices) => self.deformed(instance, vertices),
+                    Some(deformation) => self.deformed(instance, deformation),
                 };
                 (index, instance.world_from_object, bvh)
             })
@@ -55,7 +55,7 @@ impl AccelCache {
     fn rigid(&mut self, instance: &Instance) -> Arc<MeshBvh> {
         let kept = self.rigid.entry(address(&instance.mesh)).or_insert_with(|| Kept {
             mesh: instance.mesh.clone(),
-            vertices: (),
+            deformation: (),
             bvh: Arc::new(MeshBvh::build(&instance.mesh, None)),
             used: true,
         });
@@ -63,18 +63,18 @@ impl AccelCache {
         kept.bvh.clone()
     }
 
-    fn deformed(&mut self, instance: &Instance, vertices: &Arc<Vec<Vertices>>) -> Arc<MeshBvh> {
+    fn deformed(&mut self, instance: &Instance, deformation: &Arc<Deformation>) -> Arc<MeshBvh> {
         let key = (instance.node, address(&instance.mesh));
         let kept = self.deforming.entry(key).or_insert_with(|| Kept {
             mesh: instance.mesh.clone(),
-            vertices: vertices.clone(),
-            bvh: Arc::new(MeshBvh::build(&instance.mesh, Some(vertices))),
+            deformation: deformation.clone(),
+            bvh: Arc::new(MeshBvh::build(&instance.mesh, Some(deformation.vertices()))),
             used: true,
         });
-        if !Arc::ptr_eq(&kept.vertices, vertices) {
-            kept.vertices = vertices.clone();
+        if !Arc::ptr_eq(&kept.deformation, deformation) {
+            kept.deformation = deformation.clone();
             // A job in flight may still trace the old one: `make_mut` then copies it.
-            Arc::make_mut(&mut kept.bvh).refit(&kept.mesh, vertices);
+            Arc::make_mut(&mut kept.bvh).refit(&kept.mesh, deformation.vertices());
         }
         kept.used = true;
         kept.bvh.clone()

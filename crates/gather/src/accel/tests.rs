@@ -4,7 +4,7 @@ use std::iter::once;
 use std::sync::Arc;
 
 use glam::{Affine3A, DVec3, Quat, Vec3};
-use lumencast_scene::{Instance, Mesh, MeshId, NodeId, Primitive, Snapshot, Vertices};
+use lumencast_scene::{Deformation, Instance, Mesh, MeshId, NodeId, Primitive, Snapshot, Vertices};
 
 use super::*;
 use crate::sampling::{Sampler, sphere};
@@ -384,12 +384,12 @@ fn refitted_is_as_good_as_rebuilt() {
 #[test]
 fn cache_keeps_what_has_not_changed() {
     let mesh = soup(50, 0.2);
-    let vertices = Arc::new(vec![mesh.primitives[0].vertices.clone()]);
-    let instance = |node, deformed| Instance {
+    let deformation = || Some(Arc::new(Deformation::new(mesh.clone(), vec![], None)));
+    let instance = |node, deformation| Instance {
         node: NodeId(node),
         mesh_id: MeshId(0),
         mesh: mesh.clone(),
-        deformed,
+        deformation,
         world_from_object: Affine3A::IDENTITY,
     };
     let snapshot = |instances| Snapshot {
@@ -405,13 +405,12 @@ fn cache_keeps_what_has_not_changed() {
         let accel = cache.update(s, Kernel::detect());
         accel.placed.iter().map(|p| Arc::as_ptr(&p.bvh)).collect::<Vec<_>>()
     };
-    let both =
-        snapshot(vec![instance(0, None), instance(1, None), instance(2, Some(vertices.clone()))]);
+    let both = snapshot(vec![instance(0, None), instance(1, None), instance(2, deformation())]);
     let first = update(&both);
     assert_eq!(first[0], first[1], "two instances of a mesh share its hierarchy");
     assert_ne!(first[0], first[2]);
     assert_eq!(update(&both), first);
-    let moved = snapshot(vec![instance(0, None), instance(2, Some(Arc::new((*vertices).clone())))]);
+    let moved = snapshot(vec![instance(0, None), instance(2, deformation())]);
     assert_eq!(update(&moved)[0], first[0]);
     update(&snapshot(vec![]));
     assert!(cache.rigid.is_empty() && cache.deforming.is_empty());
@@ -433,7 +432,7 @@ fn surfaces_do_not_shade_themselves() {
             node: NodeId(0),
             mesh_id: MeshId(0),
             mesh: ball.clone(),
-            deformed: None,
+            deformation: None,
             world_from_object,
         };
         let snapshot = Arc::new(Snapshot {

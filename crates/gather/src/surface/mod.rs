@@ -87,8 +87,8 @@ impl<'a> Triangle<'a> {
     pub(crate) fn new(instance: &'a Instance, primitive: u32, triangle: u32) -> Self {
         let p = primitive as usize;
         let primitive = &instance.mesh.primitives[p];
-        let vertices = instance.deformed.as_ref().map_or(&primitive.vertices, |d| &d[p]);
-        Self { primitive, vertices, corners: primitive.triangles[triangle as usize] }
+        let corners = primitive.triangles[triangle as usize];
+        Self { primitive, vertices: instance.vertices(p), corners }
     }
 
     /// Asks for the indices that [`Self::new`] reads.

@@ -7,27 +7,17 @@ use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
 use super::Scene;
 use super::nodes::{Node, PlacedSkin};
-use crate::deform::{Pose, deform};
 use crate::trs::is_invertible;
-use crate::{Instance, Mesh, NodeId, PlacedLight, Snapshot, Vertices};
+use crate::{Deformation, Instance, Mesh, NodeId, PlacedLight, Pose, Snapshot};
 
-/// Deformed vertices by node, kept while what deforms them stays as it is.
+/// Deformations by node, kept while they stay as they are.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Deformed(BTreeMap<NodeId, Kept>);
+pub(crate) struct Deformations(BTreeMap<NodeId, Kept>);
 
 #[derive(Clone, Debug)]
 struct Kept {
-    mesh: Arc<Mesh>,
-    cause: Cause,
-    vertices: Arc<Vec<Vertices>>,
+    deformation: Arc<Deformation>,
     used: bool,
-}
-
-/// What deforms a mesh.
-#[derive(Clone, Debug, PartialEq)]
-struct Cause {
-    weights: Vec<f32>,
-    pose: Option<Pose>,
 }
 
 /// The space of skinned meshes that are mirrored: their triangles then wind as at rest, and the
@@ -54,11 +44,11 @@ impl Scene {
     fn capture(&mut self) -> Snapshot {
         let materials =
             self.shared_materials.get_or_insert_with(|| Arc::from(self.materials.clone())).clone();
-        let mut deformed = std::mem::take(&mut self.deformed);
-        deformed.0.values_mut().for_each(|kept| kept.used = false);
-        let instances = self.instances(&mut deformed);
-        deformed.0.retain(|_, kept| kept.used);
-        self.deformed = deformed;
+        let mut deformations = std::mem::take(&mut self.deformations);
+        deformations.0.values_mut().for_each(|kept| kept.used = false);
+        let instances = self.instances(&mut deformations);
+        deformations.0.retain(|_, kept| kept.used);
+        self.deformations = deformations;
         let mut lights = self.lights();
         lights.retain(|l| l.light.intensity > 0.0 && l.light.color != Vec3::ZERO);
         let environment = self.environment.clone();
@@ -66,9 +56,11 @@ impl Scene {
         Snapshot { version, time, instances, materials, lights, environment }
     }
 
-    pub(super) fn instances(&self, deformed: &mut Deformed) -> Vec<Instance> {
+    pub(super) fn instances(&self, deformations: &mut Deformations) -> Vec<Instance> {
         let placed = self.nodes.placed().into_iter();
-        placed.filter_map(|(id, node, world)| self.instance(id, node, world, deformed)).collect()
+        placed
+            .filter_map(|(id, node, world)| self.instance(id, node, world, deformations))
+            .collect()
     }
 
     /// The mesh of a node; `None` where it has none or has shrunk to nothing.
@@ -77,7 +69,7 @@ impl Scene {
         id: NodeId,
         node: &Node,
         world_from_node: Affine3A,
-        deformed: &mut Deformed,
+        deformations: &mut Deformations,
     ) -> Option<Instance> {
         let mesh_id = node.mesh?;
         let mesh = self.meshes.get(mesh_id.0 as usize).filter(|m| m.triangle_count() > 0)?.clone();
@@ -97,15 +89,15 @@ impl Scene {
             None => world_from_node,
         };
         let is_deformed = world_from_rest.is_some() || !node.weights.is_empty();
-        let deformed = is_deformed.then(|| {
+        let deformation = is_deformed.then(|| {
             // A mirror is its own inverse.
             let pose = world_from_rest.map(|joints| Pose {
                 joints: joints.into_iter().map(|joint| world_from_object * joint).collect(),
                 rigid: world_from_object * world_from_node,
             });
-            deformed.vertices(id, &mesh, Cause { weights: node.weights.clone(), pose })
+            deformations.of(id, &mesh, &node.weights, pose)
         });
-        Some(Instance { node: id, mesh_id, mesh, deformed, world_from_object })
+        Some(Instance { node: id, mesh_id, mesh, deformation, world_from_object })
     }
 
     fn world_from_rest(&self, placed: &PlacedSkin, world_from_node: Affine3A) -> Vec<Affine3A> {
@@ -127,19 +119,23 @@ impl Scene {
     }
 }
 
-impl Deformed {
-    fn vertices(&mut self, id: NodeId, mesh: &Arc<Mesh>, cause: Cause) -> Arc<Vec<Vertices>> {
+impl Deformations {
+    fn of(
+        &mut self,
+        id: NodeId,
+        mesh: &Arc<Mesh>,
+        weights: &[f32],
+        pose: Option<Pose>,
+    ) -> Arc<Deformation> {
         if let Some(kept) = self.0.get_mut(&id)
-            && Arc::ptr_eq(&kept.mesh, mesh)
-            && kept.cause == cause
+            && kept.deformation.has_cause(mesh, weights, pose.as_ref())
         {
             kept.used = true;
-            return kept.vertices.clone();
+            return kept.deformation.clone();
         }
-        let vertices = Arc::new(deform(mesh, &cause.weights, cause.pose.as_ref()));
-        let kept = Kept { mesh: mesh.clone(), cause, vertices: vertices.clone(), used: true };
-        self.0.insert(id, kept);
-        vertices
+        let deformation = Arc::new(Deformation::new(mesh.clone(), weights.to_vec(), pose));
+        self.0.insert(id, Kept { deformation: deformation.clone(), used: true });
+        deformation
     }
 }
 

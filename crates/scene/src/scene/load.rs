@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::Affine3A;
 
-use super::capture::Deformed;
+use super::capture::Deformations;
 use super::nodes::{Node, Nodes, PlacedSkin};
 use super::playback::Clock;
 use super::{Model, Scene};
@@ -136,7 +136,7 @@ impl Scene {
             environment_replaced: false,
             time: 0.0,
             version: 0,
-            deformed: Deformed::default(),
+            deformations: Deformations::default(),
             shared_materials: None,
             snapshot: None,
         }

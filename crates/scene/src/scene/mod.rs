@@ -13,7 +13,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Quat, Vec3};
 
 pub use apply::EditError;
-use capture::Deformed;
+use capture::Deformations;
 use nodes::Nodes;
 use playback::Clock;
 
@@ -23,8 +23,8 @@ use crate::gltf::source::Folder;
 use crate::limits::Budget;
 use crate::trs::Trs;
 use crate::{
-    Aabb, AnimationId, Environment, FileContents, HdrImage, Instance, Light, Material, Mesh,
-    MeshId, NamedView, NodeId, Snapshot, Transform, View, VolumeSpec,
+    Aabb, AnimationId, Environment, FileContents, HdrImage, Light, Material, Mesh, MeshId,
+    NamedView, NodeId, Snapshot, Transform, View, VolumeSpec,
 };
 
 /// A scene: what its file says, what edits have made of it, and its time.
@@ -51,7 +51,7 @@ pub struct Scene {
     environment_replaced: bool,
     time: f64,
     version: u64,
-    deformed: Deformed,
+    deformations: Deformations,
     shared_materials: Option<Arc<[Material]>>,
     snapshot: Option<Arc<Snapshot>>,
 }
@@ -180,15 +180,9 @@ impl Scene {
         let mut add = |world: &Affine3A, positions: &[Vec3]| {
             positions.iter().for_each(|p| bounds.grow(world.transform_point3(*p)));
         };
-        for Instance { mesh, deformed, world_from_object, .. } in
-            self.instances(&mut self.deformed.clone())
-        {
-            match deformed {
-                Some(parts) => parts.iter().for_each(|v| add(&world_from_object, &v.positions)),
-                None => mesh
-                    .primitives
-                    .iter()
-                    .for_each(|p| add(&world_from_object, &p.vertices.positions)),
+        for instance in self.instances(&mut self.deformations.clone()) {
+            for primitive in 0..instance.mesh.primitives.len() {
+                add(&instance.world_from_object, &instance.vertices(primitive).positions);
             }
         }
         if bounds.is_empty() { Aabb { min: Vec3::ZERO, max: Vec3::ZERO } } else { bounds }

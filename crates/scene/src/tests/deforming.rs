@@ -92,14 +92,14 @@ fn morph_targets_displace_by_their_weights() {
     let moved = scene.snapshot();
     let instance = &moved.instances[0];
     assert_eq!(instance.world_from_object.translation.z, 10.0);
-    let vertices = &instance.deformed.as_ref().expect("deformed")[0];
+    let vertices = instance.vertices(0);
     let want = [Vec3::new(0.5, 0.0, 0.5), Vec3::new(1.0, 0.0, 0.5), Vec3::new(0.0, 1.0, 0.5)];
     assert_eq!(vertices.positions, want);
     assert!(vertices.normals.iter().all(|n| *n == Vec3::Z));
 
     // Unchanged weights keep the same vertices, changed ones give new ones.
     let kept =
-        |scene: &mut Scene| scene.snapshot().instances[0].deformed.clone().expect("deformed");
+        |scene: &mut Scene| scene.snapshot().instances[0].deformation.clone().expect("deformed");
     let before = kept(&mut scene);
     let transform = crate::Transform { translation: Some(Vec3::ONE), ..Default::default() };
     scene.apply(&Edit::MoveNode { node: NodeId(0), transform }).expect("moved");
@@ -140,7 +140,7 @@ fn skinned_vertices_follow_their_joints() {
     let snapshot = scene.snapshot();
     let instance = &snapshot.instances[0];
     assert_eq!(instance.world_from_object, glam::Affine3A::IDENTITY);
-    let v = &instance.deformed.as_ref().expect("skinned")[0];
+    let v = instance.vertices(0);
     // By hand: the tip turns (0, 2) about (0, 1) to (−1, 1); (1, 1) goes to (0, 2), half of it to
     // (0.5, 1.5); the root moves all by z = 5.
     let want = [Vec3::new(0., 0., 5.), Vec3::new(0.5, 1.5, 5.), Vec3::new(-1., 1., 5.)];
@@ -175,8 +175,7 @@ fn mirrored_skins_keep_their_front() {
         .iter()
         .map(|instance| {
             let to_world = instance.world_from_object;
-            let rest = &instance.mesh.primitives[0].vertices;
-            let vertices = instance.deformed.as_ref().map_or(rest, |deformed| &deformed[0]);
+            let vertices = instance.vertices(0);
             let p = |i: usize| to_world.transform_point3(vertices.positions[i]);
             let winding = to_world.matrix3.determinant().signum();
             let face = winding * (p(1) - p(0)).cross(p(2) - p(0)).normalize();

@@ -59,7 +59,9 @@ fn by_node(snapshot: &Snapshot) -> Vec<String> {
     instances.sort_by_key(|i| i.node);
     instances
         .iter()
-        .map(|i| format!("{:?} {:?} {:?} {:?}", i.node, i.mesh_id, i.world_from_object, i.deformed))
+        .map(|i| {
+            format!("{:?} {:?} {:?} {:?}", i.node, i.mesh_id, i.world_from_object, i.deformation)
+        })
         .collect()
 }
 
