@@ -17,7 +17,9 @@ use tokio::runtime::Runtime;
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 
-use crate::arguments::{Exposure, GatherArguments, SceneArguments, TickArguments, parse_offset};
+use crate::arguments::{
+    Exposure, GatherArguments, SceneArguments, TickArguments, parse_offset, parse_positive,
+};
 use crate::camera::{self, CameraArgument, parse_size};
 use crate::light_source::{self, is_address};
 use crate::output;
@@ -65,6 +67,9 @@ pub(crate) struct View {
     /// Where in front of a surface light is read: none, half-cell or metres.
     #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
     offset: lumencast_light::OffsetPolicy,
+    /// Takes ringing out of light by a Hann window that ends at this band. None unless given.
+    #[arg(long, value_name = "BAND", value_parser = parse_positive)]
+    window: Option<f32>,
     /// Saves a picture as soon as there is light, and ends.
     #[arg(long, value_name = "FILE.png")]
     screenshot: Option<PathBuf>,
@@ -119,6 +124,7 @@ impl View {
         let controls = Controls {
             settings,
             offset: self.offset,
+            window: self.window,
             tone_map: self.tone_map,
             exposure: lumencast_window::Exposure::new(self.exposure.0),
             panel: true,

@@ -2,7 +2,9 @@
 
 use glam::Vec3;
 
-use crate::{OffsetPolicy, Order, ProbeVolume, sh::Sh};
+use crate::sh::{Sh, convolve};
+use crate::zh::Bands;
+use crate::{OffsetPolicy, Order, ProbeVolume};
 
 /// The light of a scene: volumes, the finer ones laid over the coarser.
 ///
@@ -49,6 +51,16 @@ impl LightField {
     /// The volumes, to give them other light.
     pub fn volumes_mut(&mut self) -> &mut [ProbeVolume] {
         &mut self.volumes
+    }
+
+    /// All light convolved by a lobe, or through a window (see [`crate::zh`]).
+    #[must_use]
+    pub fn convolved(mut self, bands: &Bands) -> Self {
+        for volume in &mut self.volumes {
+            let probe = volume.order.coefficients();
+            volume.coefficients.chunks_mut(probe).for_each(|probe| convolve(probe, bands));
+        }
+        self
     }
 
     /// Light at a world position on a surface with a world `normal` (zero in free space); `None`
@@ -125,6 +137,17 @@ mod tests {
 
     fn read_at(field: &LightField, position: Vec3) -> f32 {
         field.sample(position, Vec3::ZERO, OffsetPolicy::None).unwrap().coefficients[0].x
+    }
+
+    #[test]
+    fn every_probe_is_convolved() {
+        let mut field = LightField::new(vec![uniform(0, Vec3::ZERO, 4.0, 2, 1.0)]);
+        field.volumes_mut()[0].coefficients.iter_mut().for_each(|c| *c = Vec3::ONE);
+        let field = field.convolved(&[3.0, 0.5, 9.0, 9.0, 9.0]);
+        for probe in 0..8 {
+            let [c0, rest @ ..] = field.volumes()[0].probe(probe) else { unreachable!() };
+            assert_eq!((*c0, rest), (Vec3::splat(3.0), &[Vec3::splat(0.5); 3][..]));
+        }
     }
 
     #[test]

@@ -158,9 +158,7 @@ impl Sh {
     /// Light convolved by a lobe (see [`crate::zh`]).
     pub fn convolved(&self, bands: &Bands) -> Self {
         let mut result = *self;
-        for (c, l) in result.coefficients.iter_mut().zip(BAND) {
-            *c *= bands[l];
-        }
+        convolve(&mut result.coefficients, bands);
         result
     }
 
@@ -178,6 +176,11 @@ impl Sh {
             *own += *c * weight;
         }
     }
+}
+
+/// Convolves the coefficients of an expansion by a lobe.
+pub(crate) fn convolve(coefficients: &mut [Vec3], bands: &Bands) {
+    coefficients.iter_mut().zip(BAND).for_each(|(c, l)| *c *= bands[l]);
 }
 
 #[cfg(test)]

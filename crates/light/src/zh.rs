@@ -49,6 +49,16 @@ pub fn ggx(roughness: f32) -> Bands {
     bands
 }
 
+/// The Hann window of a width in bands, above 0: it falls from 1 at band 0 to 0 at that band, and
+/// what lies beyond is cut off (Sloan 2008, "Stupid Spherical Harmonics (SH) Tricks"). Multiplied
+/// radiance rings less, and is less sharp.
+pub fn hann(width: f32) -> Bands {
+    std::array::from_fn(|l| {
+        let t = (l as f32 / width).min(1.0);
+        0.5 + 0.5 * (std::f32::consts::PI * t).cos()
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,6 +120,25 @@ mod tests {
         for (l, (band, cosine)) in ggx(1.0).into_iter().zip(COSINE).enumerate() {
             assert!((band - cosine / PI).abs() < 5e-4, "{l}: {band}");
         }
+    }
+
+    /// Radiance of a distant light, cut off after band 2, is negative on its far side.
+    #[test]
+    fn a_window_takes_ringing_away() {
+        let rings = |window: Bands| {
+            let radiance = |x: f64| -> f64 {
+                let terms = legendre(x).into_iter().zip(window).zip([1.0, 3.0, 5.0]);
+                terms.map(|((p, w), degrees)| p * f64::from(w) * degrees).sum()
+            };
+            let least = (0..=200).map(|i| radiance(f64::from(i) / 100.0 - 1.0));
+            least.fold(f64::INFINITY, f64::min) / radiance(1.0)
+        };
+        // By hand: (7.5 x² + 3 x − 1.5) / 9, and (1.875 x² + 2.25 x + 0.375) / 4.5.
+        assert!((rings([1.0; 5]) + 0.2).abs() < 1e-3);
+        assert!((rings(hann(3.0)) + 1.0 / 15.0).abs() < 1e-3);
+        assert!((f64::from(hann(3.0)[1]) - 0.75).abs() < 1e-6);
+        assert_eq!(hann(3.0)[3..], [0.0, 0.0]);
+        assert!(hann(1e6).iter().all(|band| (band - 1.0).abs() < 1e-6));
     }
 
     #[test]

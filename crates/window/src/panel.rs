@@ -15,6 +15,8 @@ pub struct Controls {
     pub settings: Settings,
     /// Where in front of surfaces light is read.
     pub offset: OffsetPolicy,
+    /// Band at which a Hann window against ringing ends, where there is one.
+    pub window: Option<f32>,
     /// From linear light to the display.
     pub tone_map: ToneMap,
     /// How bright.
@@ -147,6 +149,11 @@ fn drawing(ui: &mut Ui, controls: &mut Controls) {
         OffsetPolicy::None => "at the surface".into(),
         OffsetPolicy::HalfCell => "half a cell off it".into(),
         OffsetPolicy::Metres(metres) => format!("{metres} m off it"),
+    });
+    let windows = [None, Some(5.0), Some(4.0), Some(3.0)];
+    choice(ui, "Window of harmonics", &mut controls.window, &windows, |window| match window {
+        None => "none".into(),
+        Some(width) => format!("Hann, to band {width}"),
     });
 }
 

@@ -44,6 +44,7 @@ impl Test {
         let controls = Controls {
             settings: Settings { samples: 1, ..Settings::default() },
             offset: OffsetPolicy::HalfCell,
+            window: None,
             tone_map: ToneMap::Srgb,
             exposure: Exposure::new(None),
             panel: true,

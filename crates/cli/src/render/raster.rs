@@ -5,14 +5,14 @@ use std::time::Instant;
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use glam::{Affine3A, UVec2, Vec3};
-use lumencast_light::{LightField, OffsetPolicy, ProbeVolume};
+use lumencast_light::{LightField, OffsetPolicy, ProbeVolume, zh};
 use lumencast_picture::{Picture, exposure};
 use lumencast_scene::{Scene, View};
 use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadows, Transparency};
 use serde_json::json;
 
 use super::{Lighting, PartsArgument, Render};
-use crate::arguments::parse_offset;
+use crate::arguments::{parse_offset, parse_positive};
 use crate::light_source::{self, Computed};
 use crate::output;
 
@@ -38,6 +38,10 @@ pub(crate) struct RasterArguments {
     /// Where in front of a surface the field is read: none, half-cell or metres.
     #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
     offset: OffsetPolicy,
+    /// Takes ringing out of the field by a Hann window that ends at this band; 3 leaves order 2 a
+    /// quarter of its band 2. None unless given.
+    #[arg(long, value_name = "BAND", value_parser = parse_positive)]
+    window: Option<f32>,
     /// How often surfaces are shaded: once a sample, or once a pixel, which is faster.
     #[arg(long, value_enum, default_value_t = ShadingArgument::Samples)]
     shading: ShadingArgument,
@@ -93,7 +97,11 @@ impl Render {
         if settings.lighting.indirect {
             let volumes = self.volumes(scene)?;
             probes = volumes.iter().map(|volume| volume.grid.probe_count()).sum();
-            renderer.set_light(&LightField::new(volumes), self.raster.offset)?;
+            let light = match self.raster.window {
+                Some(width) => LightField::new(volumes).convolved(&zh::hann(width)),
+                None => LightField::new(volumes),
+            };
+            renderer.set_light(&light, self.raster.offset)?;
         }
         let grid = self.raster.views.unwrap_or(UVec2::ONE);
         let views = views(&view, grid, self.raster.view_spacing);
