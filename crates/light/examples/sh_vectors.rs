@@ -1,5 +1,5 @@
 //! Writes `vectors/sh.json`, by which every implementation of the light's mathematics is tested:
-//! `cargo run -p lumencast-light --example vectors > vectors/sh.json`.
+//! `cargo run -p lumencast-light --example sh_vectors > vectors/sh.json`.
 //!
 //! `basis`: the 25 functions at unit vectors. `irradiance`: coefficients, a normal, lux.
 //! `ggx`: roughness and multipliers of bands 0 to 4. `rotation`: coefficients, a quaternion, rotated

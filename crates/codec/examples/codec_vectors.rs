@@ -1,5 +1,5 @@
 //! Writes `vectors/codec.json`, by which every decoder of probe frames is tested:
-//! `cargo run -p lumencast-codec --example vectors > vectors/codec.json`.
+//! `cargo run -p lumencast-codec --example codec_vectors > vectors/codec.json`.
 //!
 //! `sequences`: each is for one decoder, frames in order. `coefficients` is the FNV-1a hash (32 bits)
 //! of the decoded coefficients' little-endian f32 bits, r, g, b by turns; `first` the first of them.
