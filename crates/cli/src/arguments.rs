@@ -13,6 +13,7 @@ use lumencast_gather::path_trace::{CpuPathTracer, MaterialModel, Options};
 use lumencast_light::{Grid, OffsetPolicy, Order};
 use lumencast_scene::{Edit, Scene, Script, VolumeSpec};
 use lumencast_server::{GatherOptions, SampleRange, TickOptions};
+use lumencast_shade::Occlusion;
 
 use crate::environment::EnvironmentArgument;
 
@@ -284,6 +285,18 @@ pub(crate) fn parse_offset(text: &str) -> Result<OffsetPolicy, String> {
             _ => Err("none, half-cell, or a number of metres".into()),
         },
     }
+}
+
+/// How far ambient occlusion reaches, metres; 0 for none.
+pub(crate) fn parse_occlusion(text: &str) -> Result<f32> {
+    let metres: f32 = text.parse()?;
+    ensure!(metres >= 0.0 && metres.is_finite(), "metres, 0 or more");
+    Ok(metres)
+}
+
+/// Ambient occlusion that reaches so far.
+pub(crate) fn occlusion(radius: f32) -> Option<Occlusion> {
+    (radius > 0.0).then(|| Occlusion { radius, ..Occlusion::default() })
 }
 
 /// `1` to `4`

@@ -18,7 +18,8 @@ use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 
 use crate::arguments::{
-    Exposure, GatherArguments, SceneArguments, TickArguments, parse_offset, parse_positive,
+    Exposure, GatherArguments, SceneArguments, TickArguments, occlusion, parse_occlusion,
+    parse_offset, parse_positive,
 };
 use crate::camera::{self, CameraArgument, parse_size};
 use crate::light_source::{self, is_address};
@@ -70,6 +71,10 @@ pub(crate) struct View {
     /// Takes ringing out of light by a Hann window that ends at this band. None unless given.
     #[arg(long, value_name = "BAND", value_parser = parse_positive)]
     window: Option<f32>,
+    /// Takes away indirect light that is hidden within so many metres, which probes are too sparse
+    /// for; 0 takes none. Also in the panel.
+    #[arg(long, value_name = "METRES", default_value_t = 0.0, value_parser = parse_occlusion)]
+    occlusion: f32,
     /// Saves a picture as soon as there is light, and ends.
     #[arg(long, value_name = "FILE.png")]
     screenshot: Option<PathBuf>,
@@ -120,7 +125,11 @@ impl View {
             Some(camera) => Some(camera::among(world.views(), camera)?),
             None => None,
         };
-        let settings = Settings { samples: self.multisampling, ..Settings::default() };
+        let settings = Settings {
+            samples: self.multisampling,
+            occlusion: occlusion(self.occlusion),
+            ..Settings::default()
+        };
         let controls = Controls {
             settings,
             offset: self.offset,

@@ -187,6 +187,12 @@ fn a_clients_picture_is_near_the_reference() {
     assert!(psnr("direct.exr") < 20.0, "without indirect light it is noticed");
     assert!(linear(&at("indirect.exr")).pixels().iter().any(|p| p.x > 0.1));
 
+    draw("occluded.exr", &["--lighting", "field", "--light", text(&light), "--occlusion", "0.3"]);
+    assert!(psnr("occluded.exr") > 25.0, "{}", psnr("occluded.exr"));
+    let sum = |name: &str| linear(&at(name)).pixels().iter().map(|p| p.y).sum::<f32>();
+    let left = sum("occluded.exr") / sum("field.exr");
+    assert!((0.8..0.995).contains(&left), "{left}");
+
     let pair = at("pair.png");
     let ran = run(&[
         "render",
@@ -223,5 +229,7 @@ fn what_cannot_be_drawn_is_said() {
     std::fs::write(&other, b"LUMENCST is not all").expect("written");
     render(&["--lighting", "field", "--light", text(&other)]).failed_saying(&["no light field"]);
     render(&["--lighting", "field", "--parts", "direct"]).failed_saying(&["--lighting direct"]);
+    let behind = render(&["--lighting", "field", "--occlusion=-1"]);
+    assert!(behind.code == Some(2) && behind.stderr.contains("metres"), "{behind:?}");
     assert!(!picture.exists());
 }

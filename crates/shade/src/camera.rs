@@ -14,6 +14,7 @@ const NEAR: f32 = 0.01;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Camera {
     pub(crate) clip_from_world: Mat4,
+    clip_from_view: Mat4,
     pub(crate) eye: Vec3,
     /// Unit.
     pub(crate) forward: Vec3,
@@ -55,8 +56,10 @@ impl Camera {
         };
         let moved = 2.0 * jitter / size;
         let jittered = Mat4::from_translation(Vec3::new(moved.x, -moved.y, 0.0));
+        let clip_from_view = jittered * clip_from_view;
         Self {
-            clip_from_world: jittered * clip_from_view * view_from_world,
+            clip_from_world: clip_from_view * view_from_world,
+            clip_from_view,
             eye,
             forward,
             perspective,
@@ -67,6 +70,7 @@ impl Camera {
         layout::View {
             clip_from_world: self.clip_from_world,
             world_from_clip: self.clip_from_world.inverse(),
+            view_from_clip: self.clip_from_view.inverse(),
             eye: self.eye,
             perspective: f32::from(u8::from(self.perspective)),
             forward: self.forward,

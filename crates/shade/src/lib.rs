@@ -10,7 +10,8 @@
 //! Direct light has the materials of the path tracer (the shaders are twins of `gather::bsdf`),
 //! shadows come from shadow maps. Indirect light is the field's, trilinearly filtered: diffuse by
 //! convolution with the clamped cosine, specular by the split sum with the fitted lobe of the second
-//! paper's appendix A. The shaders are in `lumencast-shaders`.
+//! paper's appendix A; what probes are too sparse for, [`Occlusion`] of short range can take away from
+//! it. The shaders are in `lumencast-shaders`.
 
 #![forbid(unsafe_code)]
 
@@ -25,6 +26,7 @@ mod gpu;
 mod lights;
 mod materials;
 mod meter;
+mod occlusion;
 mod pipelines;
 mod readback;
 mod renderer;
@@ -41,6 +43,6 @@ pub use error::ShadeError;
 pub use gpu::Gpu;
 pub use renderer::{Drawn, Renderer};
 pub use screen::{Measured, Screen, Show};
-pub use settings::{Lighting, Materials, Settings, Shading, Shadows, Transparency};
+pub use settings::{Lighting, Materials, Occlusion, Settings, Shading, Shadows, Transparency};
 pub use timing::PassTimes;
 pub use wgpu;

@@ -10,6 +10,7 @@ use lumencast_shaders::layout;
 use crate::bindings::{FILTERED, SAMPLER, STORAGE, UNIFORM, entry, texture};
 use crate::environment_brdf::environment_brdf;
 use crate::gpu::{DEPTH, Gpu};
+use crate::occlusion::Occluder;
 use crate::shadows::ShadowPlan;
 
 /// Entries a side of the environment BRDF's table.
@@ -44,6 +45,8 @@ fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
             entry(6, comparison),
             entry(7, texture(FILTERED, plane)),
             entry(8, SAMPLER),
+            entry(9, texture(exact, plane)),
+            entry(10, texture(depth, plane)),
         ],
     })
 }
@@ -95,6 +98,7 @@ impl GpuLights {
         snapshot: &Snapshot,
         plan: &ShadowPlan,
         frame: layout::Frame,
+        occlusion: &Occluder,
     ) -> wgpu::BindGroup {
         let environment = self.environment(gpu, &snapshot.environment);
         let lights: Vec<layout::Light> = snapshot
@@ -134,6 +138,8 @@ impl GpuLights {
                 entry(6, sampler(&self.comparison)),
                 entry(7, texture(&self.table)),
                 entry(8, sampler(&self.linear)),
+                entry(9, texture(occlusion.visibility())),
+                entry(10, texture(occlusion.depth())),
             ],
         })
     }

@@ -14,6 +14,8 @@ pub(crate) struct Variant {
     pub(crate) samples: u32,
     pub(crate) shading: Shading,
     pub(crate) transparency: Transparency,
+    /// Whether there is ambient occlusion.
+    pub(crate) occluded: bool,
 }
 
 /// All pipelines of a variant.
@@ -169,7 +171,8 @@ fn forward_pipeline(
     blends: bool,
 ) -> wgpu::RenderPipeline {
     let buffers = geometry::vertex_layouts();
-    let constants = [("BLENDED", f64::from(u8::from(blends)))];
+    let constant = |is: bool| f64::from(u8::from(is));
+    let constants = [("BLENDED", constant(blends)), ("OCCLUDED", constant(variant.occluded))];
     let target = wgpu::ColorTargetState {
         format: COLOR,
         blend: blends.then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),

@@ -13,13 +13,14 @@ use crate::field::GpuField;
 use crate::gpu::Gpu;
 use crate::lights::GpuLights;
 use crate::materials::Surface;
+use crate::occlusion::{Groups, Occluder};
 use crate::pipelines::{Layouts, Pipelines, Variant};
 use crate::scene::{Call, GpuScene};
 use crate::screen::{Screen, Show};
 use crate::settings::{Lighting, Materials, Settings, Transparency};
 use crate::shadows::ShadowPlan;
 use crate::target::{Target, depth_attachment};
-use crate::timing::{PassTimes, Timing};
+use crate::timing::{PassTimes, Spans, Timing};
 
 /// How far patterns turn from one frame of a picture to the next: the golden section fills the circle
 /// evenly for any number.
@@ -54,6 +55,7 @@ pub struct Renderer {
     wanted: Option<Arc<Snapshot>>,
     lights: GpuLights,
     field: GpuField,
+    occluder: Occluder,
     /// The shadow maps that are on the device.
     drawn: Option<ShadowPlan>,
 }
@@ -109,6 +111,15 @@ impl Passes {
     fn timestamps(&self, number: u32) -> Option<wgpu::RenderPassTimestampWrites<'_>> {
         self.timing.as_ref().map(|timing| timing.of_pass(number))
     }
+
+    /// Of the first and the last pass of the occlusion of picture `number`.
+    fn occlusion_timestamps(
+        &self,
+        number: u32,
+    ) -> [Option<wgpu::RenderPassTimestampWrites<'_>>; 2] {
+        let Some(timing) = &self.timing else { return [None, None] };
+        timing.of_occlusion(number).map(Some)
+    }
 }
 
 impl Renderer {
@@ -120,6 +131,7 @@ impl Renderer {
             scene: GpuScene::new(&gpu, settings.anisotropy),
             lights,
             field,
+            occluder: Occluder::new(&gpu),
             gpu,
             pipelines: None,
             target: None,
@@ -259,12 +271,16 @@ impl Renderer {
             // A pixel of one sample is shaded once either way.
             shading: if samples > 1 { settings.shading } else { Default::default() },
             transparency: settings.transparency,
+            occluded: settings.drawn_occlusion().is_some(),
         };
         if self.pipelines.as_ref().is_none_or(|p| p.variant != variant) {
             self.pipelines = Some(Pipelines::new(&self.gpu, &self.layouts, variant));
         }
         if self.target.as_ref().is_none_or(|target| !target.fits(settings.size, samples)) {
             self.target = Some(Target::new(&self.gpu, settings.size, samples));
+        }
+        if variant.occluded {
+            self.occluder.prepare(&self.gpu, &self.layouts.pass, settings.size);
         }
         let Some(wanted) = &self.wanted else { return };
         let is_shown = |(shown, model): &(Arc<Snapshot>, Materials)| {
@@ -277,7 +293,7 @@ impl Renderer {
         }
     }
 
-    /// Draws one frame of each camera: shadow maps, then surfaces, then what lies behind them.
+    /// Draws one frame of each camera: shadow maps, then occlusion, surfaces, and what lies behind them.
     /// `taken` is called after each camera's commands, before the next one's overwrite the picture.
     fn frame(
         &mut self,
@@ -305,7 +321,14 @@ impl Renderer {
             })
             .chain(cameras.iter().map(|camera| camera.layout(turn)))
             .collect();
-        let passes = self.passes(&views, shadows.len(), &visible);
+        let occlusion = settings.drawn_occlusion();
+        let occlusion = occlusion.and_then(|settings| self.occluder.groups(&self.gpu, settings));
+        let spans = Spans {
+            shadow_maps: shadows.len() as u32,
+            pictures: cameras.len() as u32,
+            occlusions: if occlusion.is_some() { cameras.len() as u32 } else { 0 },
+        };
+        let passes = self.passes(&views, spans, &visible);
 
         if redraws {
             let layers = self.lights.shadow_maps(&self.gpu, plan);
@@ -315,8 +338,11 @@ impl Renderer {
             self.drawn = Some(plan.clone());
         }
         let frame = frame_layout(settings, self.pipelines.as_ref(), number);
-        let light = self.lights.group(&self.gpu, snapshot, plan, frame);
-        for (calls, pass) in camera_calls.iter().zip(shadows.len() as u32..) {
+        let light = self.lights.group(&self.gpu, snapshot, plan, frame, &self.occluder);
+        for (calls, pass) in camera_calls.iter().zip(spans.shadow_maps..) {
+            if let Some(groups) = &occlusion {
+                self.draw_occlusion(encoder, &passes, pass, calls, groups);
+            }
             self.draw_picture(encoder, &passes, pass, calls, &light, settings.lighting);
             if let Some(target) = &self.target {
                 taken(&self.gpu, encoder, target);
@@ -369,10 +395,9 @@ impl Renderer {
         }
     }
 
-    /// A pass a view, the first `shadow_maps` for shadow maps; `visible`: the instances that they
-    /// draw.
-    fn passes(&self, views: &[layout::View], shadow_maps: usize, visible: &[u32]) -> Passes {
-        let timing = Timing::new(&self.gpu, views.len(), shadow_maps);
+    /// What passes with these views have in common; `visible`: the instances that they draw.
+    fn passes(&self, views: &[layout::View], spans: Spans, visible: &[u32]) -> Passes {
+        let timing = Timing::new(&self.gpu, spans);
         let alignment = self.gpu.device.limits().min_uniform_buffer_offset_alignment;
         let size = size_of::<layout::View>();
         let stride = (size as u32).next_multiple_of(alignment);
@@ -416,18 +441,54 @@ impl Renderer {
             timestamp_writes: passes.timestamps(number),
             ..Default::default()
         });
+        self.draw_depth(&mut pass, passes, number, calls);
+    }
+
+    /// Draws what a camera's picture is going to read of ambient occlusion. Blended surfaces have no
+    /// part in it: half of one hides half of what lies behind it, which no single depth tells.
+    fn draw_occlusion(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        passes: &Passes,
+        number: u32,
+        calls: &[Call],
+        groups: &Groups,
+    ) {
+        let [first, last] = passes.occlusion_timestamps(number);
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("depth of pixels"),
+            depth_stencil_attachment: Some(depth_attachment(
+                self.occluder.depth(),
+                wgpu::StoreOp::Store,
+            )),
+            timestamp_writes: first,
+            ..Default::default()
+        });
+        let solid = |call: &&Call| self.scene.draw(call).0.surface != Surface::Blended;
+        self.draw_depth(&mut pass, passes, number, calls.iter().filter(solid));
+        drop(pass);
+        self.occluder.draw(encoder, groups, |pass| passes.bind(pass, number), last);
+    }
+
+    fn draw_depth<'a>(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        passes: &Passes,
+        number: u32,
+        calls: impl IntoIterator<Item = &'a Call>,
+    ) {
         let mut last = None;
         for call in calls {
             let (draw, material) = self.scene.draw(call);
             if last != Some(draw.surface) {
                 pass.set_pipeline(self.layouts.depth(draw.surface));
-                passes.bind(&mut pass, number);
+                passes.bind(pass, number);
                 last = Some(draw.surface);
             }
             if draw.surface != Surface::Solid {
                 pass.set_bind_group(3, &material.group, &[]);
             }
-            draw_call(&mut pass, &draw.part, call);
+            draw_call(pass, &draw.part, call);
         }
     }
 
@@ -500,5 +561,7 @@ fn frame_layout(settings: &Settings, pipelines: Option<&Pipelines>, number: u32)
         sample_count: pipelines.map_or(1, |p| p.variant.samples),
         filter_radius: settings.shadows.filter_radius,
         frame: number,
+        occlusion_radius: settings.drawn_occlusion().map_or(0.0, |occlusion| occlusion.radius),
+        ..layout::Frame::default()
     }
 }

@@ -84,6 +84,26 @@ impl Default for Shadows {
     }
 }
 
+/// Ambient occlusion of short range, from the depth of the picture: what hides indirect light at a
+/// distance for which probes are too sparse. Blended surfaces neither hide nor lose any, and what the
+/// picture does not show hides nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Occlusion {
+    /// How far light is hidden, metres; at half of it three quarters as much as next to a surface.
+    pub radius: f32,
+    /// Slices of space through a pixel; 16 pixels beside each other take different ones, and are
+    /// averaged. Cost grows with `directions * steps`, and noise falls.
+    pub directions: u32,
+    /// Samples to either side of a slice. Thin things far from a point may lie between them.
+    pub steps: u32,
+}
+
+impl Default for Occlusion {
+    fn default() -> Self {
+        Self { radius: 0.25, directions: 2, steps: 6 }
+    }
+}
+
 /// How pictures are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -100,6 +120,8 @@ pub struct Settings {
     pub materials: Materials,
     /// Shadows of punctual lights.
     pub shadows: Shadows,
+    /// Ambient occlusion of indirect light, none by default.
+    pub occlusion: Option<Occlusion>,
     /// Blended surfaces.
     pub transparency: Transparency,
     /// Multiplies all light before it is stored in half floats; pictures come back divided by it.
@@ -119,9 +141,18 @@ impl Default for Settings {
             lighting: Lighting::FIELD,
             materials: Materials::Full,
             shadows: Shadows::default(),
+            occlusion: None,
             transparency: Transparency::Coverage,
             pre_exposure: 1.0,
             anisotropy: 8,
         }
+    }
+}
+
+impl Settings {
+    /// The occlusion, where there is anything for it to hide.
+    pub(crate) fn drawn_occlusion(&self) -> Option<Occlusion> {
+        let is_drawn = |radius: f32| self.lighting.indirect && radius > 0.0 && radius.is_finite();
+        self.occlusion.filter(|occlusion| is_drawn(occlusion.radius))
     }
 }

@@ -11,6 +11,8 @@ use crate::readback::Readback;
 pub struct PassTimes {
     /// Shadow maps: drawn once for all views, and kept while neither scene nor cascades change.
     pub shadows: f64,
+    /// Ambient occlusion, with the depth that it is of, of all views.
+    pub occlusion: f64,
     /// Surfaces and what lies behind them, of all views.
     pub pictures: f64,
 }
@@ -18,32 +20,41 @@ pub struct PassTimes {
 impl std::ops::AddAssign for PassTimes {
     fn add_assign(&mut self, other: Self) {
         self.shadows += other.shadows;
+        self.occlusion += other.occlusion;
         self.pictures += other.pictures;
     }
 }
 
-/// The most passes of a frame that are timed.
+/// The most spans of a frame that are timed.
 const MOST: u32 = 2048;
 /// Of a timestamp.
 const TICK: u64 = 8;
 const DURING: &str = "reading timestamps";
 
-/// Two timestamps for each pass of a frame.
+/// The spans of a frame that are timed, in this order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Spans {
+    pub(crate) shadow_maps: u32,
+    pub(crate) pictures: u32,
+    /// As many as there are pictures, or none. Each is of several passes.
+    pub(crate) occlusions: u32,
+}
+
+/// Two timestamps for each span of a frame.
 #[derive(Debug)]
 pub(crate) struct Timing {
     queries: wgpu::QuerySet,
     count: u32,
-    /// How many of the passes, the first ones, draw shadow maps.
-    shadow_maps: usize,
+    spans: Spans,
     resolved: wgpu::Buffer,
     read: wgpu::Buffer,
 }
 
 impl Timing {
-    /// For so many passes, of which the first draw shadow maps; nothing where the adapter has no
-    /// clock.
-    pub(crate) fn new(gpu: &Gpu, passes: usize, shadow_maps: usize) -> Option<Self> {
-        let count = 2 * u32::try_from(passes).ok().filter(|passes| (1..=MOST).contains(passes))?;
+    /// Nothing where the adapter has no clock.
+    pub(crate) fn new(gpu: &Gpu, spans: Spans) -> Option<Self> {
+        let all = spans.shadow_maps + spans.pictures + spans.occlusions;
+        let count = 2 * Some(all).filter(|all| (1..=MOST).contains(all))?;
         if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return None;
         }
@@ -56,15 +67,30 @@ impl Timing {
         let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
         let resolved = gpu.buffer("timestamps", usage, &[], size);
         let read = Readback::buffer(gpu, "timestamps", size);
-        Some(Self { queries, count, shadow_maps, resolved, read })
+        Some(Self { queries, count, spans, resolved, read })
     }
 
-    /// What a pass has to write.
+    /// What the pass of a shadow map or a picture has to write, which is a span by itself.
     pub(crate) fn of_pass(&self, number: u32) -> wgpu::RenderPassTimestampWrites<'_> {
+        self.writes(Some(2 * number), Some(2 * number + 1))
+    }
+
+    /// What the first and the last pass of the occlusion of a picture have to write, whose own pass
+    /// has this number.
+    pub(crate) fn of_occlusion(&self, number: u32) -> [wgpu::RenderPassTimestampWrites<'_>; 2] {
+        let first = 2 * (number + self.spans.pictures);
+        [self.writes(Some(first), None), self.writes(None, Some(first + 1))]
+    }
+
+    fn writes(
+        &self,
+        beginning_of_pass_write_index: Option<u32>,
+        end_of_pass_write_index: Option<u32>,
+    ) -> wgpu::RenderPassTimestampWrites<'_> {
         wgpu::RenderPassTimestampWrites {
             query_set: &self.queries,
-            beginning_of_pass_write_index: Some(2 * number),
-            end_of_pass_write_index: Some(2 * number + 1),
+            beginning_of_pass_write_index,
+            end_of_pass_write_index,
         }
     }
 
@@ -76,7 +102,7 @@ impl Timing {
 
     /// Asks for the timestamps of a frame that was submitted.
     pub(crate) fn submitted(self) -> Timed {
-        Timed { read: Readback::begin(self.read), shadow_maps: self.shadow_maps }
+        Timed { read: Readback::begin(self.read), spans: self.spans }
     }
 }
 
@@ -84,7 +110,7 @@ impl Timing {
 #[derive(Debug)]
 pub(crate) struct Timed {
     read: Readback,
-    shadow_maps: usize,
+    spans: Spans,
 }
 
 impl Timed {
@@ -106,8 +132,9 @@ impl Timed {
             .collect();
         // Clocks may jump: no pass takes less than nothing.
         let seconds = |pair: &[u64]| period * pair[1].saturating_sub(pair[0]) as f64;
-        let (shadows, pictures) = ticks.split_at(2 * self.shadow_maps);
+        let (shadows, views) = ticks.split_at(2 * self.spans.shadow_maps as usize);
+        let (pictures, occlusions) = views.split_at(2 * self.spans.pictures as usize);
         let sum = |ticks: &[u64]| ticks.chunks_exact(2).map(seconds).fold(0.0, f64::add);
-        PassTimes { shadows: sum(shadows), pictures: sum(pictures) }
+        PassTimes { shadows: sum(shadows), occlusion: sum(occlusions), pictures: sum(pictures) }
     }
 }

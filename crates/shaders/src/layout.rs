@@ -22,6 +22,7 @@ pub fn rows(transform: &Affine3A) -> Rows {
 pub struct View {
     pub clip_from_world: Mat4,
     pub world_from_clip: Mat4,
+    pub view_from_clip: Mat4,
     pub eye: Vec3,
     pub perspective: f32,
     pub forward: Vec3,
@@ -52,6 +53,10 @@ pub struct Frame {
     pub sample_count: u32,
     pub filter_radius: f32,
     pub frame: u32,
+    pub occlusion_radius: f32,
+    pub _pad0: u32,
+    pub _pad1: u32,
+    pub _pad2: u32,
 }
 
 /// Light from afar. Group 1, binding 1.
@@ -188,6 +193,16 @@ pub mod deform {
     pub const SKINNED: u32 = 1;
     /// Each triangle has its own normal.
     pub const FLAT: u32 = 2;
+}
+
+/// Ambient occlusion. Group 1, binding 0 of [`crate::occlusion`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Occlusion {
+    pub radius: f32,
+    pub directions: u32,
+    pub steps: u32,
+    pub _pad: u32,
 }
 
 /// How a picture is shown. Group 0, binding 0 of [`crate::screen`].

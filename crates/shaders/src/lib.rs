@@ -1,9 +1,10 @@
 //! WGSL modules, put together into shaders, and the memory layouts that they share with Rust.
 //!
-//! A shader is the text of its modules one after the other ([`forward`], [`depth`], [`background`];
-//! before them [`deform`], and for what is done with a picture [`screen`], [`meter`]); what they need
-//! of each other is told by their order here, since WGSL has no imports. Tests validate every shader
-//! without a GPU, and compare every struct of [`layout`] with what the compiler makes of its namesake.
+//! A shader is the text of its modules one after the other ([`forward`], [`depth`], [`background`],
+//! [`occlusion`]; before them [`deform`], and for what is done with a picture [`screen`], [`meter`]);
+//! what they need of each other is told by their order here, since WGSL has no imports. Tests validate
+//! every shader without a GPU, and compare every struct of [`layout`] with what the compiler makes of
+//! its namesake.
 //!
 //! Bindings are grouped by lifetime: 0 the pass (its view, instances, and which of them it draws), 1
 //! the frame's light (punctual lights, shadow maps, environment), 2 the light field, 3 the material.
@@ -31,6 +32,7 @@ const MATERIAL: &str = include_str!("../wgsl/material.wgsl");
 const FORWARD: &str = include_str!("../wgsl/forward.wgsl");
 const DEPTH: &str = include_str!("../wgsl/depth.wgsl");
 const BACKGROUND: &str = include_str!("../wgsl/background.wgsl");
+const OCCLUSION: &str = include_str!("../wgsl/occlusion.wgsl");
 const TONE: &str = include_str!("../wgsl/tone.wgsl");
 const SCREEN: &str = include_str!("../wgsl/screen.wgsl");
 const METER: &str = include_str!("../wgsl/meter.wgsl");
@@ -60,8 +62,8 @@ pub fn forward(shading: Shading) -> String {
     modules + &own
 }
 
-/// Draws what a light sees: `depth_vertex` alone for opaque surfaces; `masked_depth_vertex` and
-/// `masked_depth_fragment` for those with holes.
+/// Draws the depth that a light or a camera sees: `depth_vertex` alone for opaque surfaces;
+/// `masked_depth_vertex` and `masked_depth_fragment` for those with holes.
 pub fn depth() -> String {
     // `Bsdf` for what `material.wgsl` returns.
     [COMMON, VIEW, BSDF, MATERIAL, DEPTH].concat()
@@ -80,6 +82,11 @@ pub fn deform() -> String {
 /// Spherical harmonics alone, for those who compare them with their own.
 pub fn harmonics() -> String {
     [COMMON, HARMONICS].concat()
+}
+
+/// Ambient occlusion in screen space: `occlusion_vertex`, `occlusion_fragment`, and `blur_fragment`.
+pub fn occlusion() -> String {
+    [COMMON, VIEW, OCCLUSION].concat()
 }
 
 /// Shows a picture as display codes: `screen_vertex`, `screen_fragment`.

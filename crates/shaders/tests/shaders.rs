@@ -3,7 +3,9 @@
 
 use std::mem::{offset_of, size_of};
 
-use lumencast_shaders::{Shading, background, deform, depth, forward, layout, meter, screen};
+use lumencast_shaders::{
+    Shading, background, deform, depth, forward, layout, meter, occlusion, screen,
+};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{Module, TypeInner};
 
@@ -25,6 +27,7 @@ fn every_shader_is_valid() {
         ("depth", depth(), 3),
         ("background", background(), 2),
         ("deform", deform(), 1),
+        ("occlusion", occlusion(), 3),
         ("screen", screen(), 2),
         ("meter", meter(), 1),
     ] {
@@ -66,10 +69,14 @@ fn layouts_agree() {
     let modules = [
         compiled("forward", &forward(Shading::Pixels)),
         compiled("deform", &deform()),
+        compiled("occlusion", &occlusion()),
         compiled("screen", &screen()),
     ];
     let m = &modules;
-    same!(m, View { clip_from_world, world_from_clip, eye, perspective, forward, turn });
+    same!(
+        m,
+        View { clip_from_world, world_from_clip, view_from_clip, eye, perspective, forward, turn }
+    );
     same!(m, Instance { world_from_object, normal_from_object, mirrors, _pad0, _pad1, _pad2 });
     same!(
         m,
@@ -82,6 +89,10 @@ fn layouts_agree() {
             sample_count,
             filter_radius,
             frame,
+            occlusion_radius,
+            _pad0,
+            _pad1,
+            _pad2,
         }
     );
     same!(m, Environment { zenith, kind, ground, turn, horizon, _pad });
@@ -120,6 +131,7 @@ fn layouts_agree() {
     same!(m, Deform { vertices, morphs, joints, flags });
     same!(m, Influence { weights, joints, _pad });
     same!(m, Morph { number, weight });
+    same!(m, Occlusion { radius, directions, steps, _pad });
     same!(m, Screen { factor, tone_map, step, _pad });
     same!(
         m,

@@ -1,5 +1,6 @@
-// Draws the depth that a light sees. Masked surfaces leave their holes open; of blended ones as many
-// texels stay open as light passes, which the filter of the shadow's edge averages.
+// Draws the depth that a light or a camera sees. Masked surfaces leave their holes open; of blended
+// ones, of which cameras want no depth, as many texels stay open as light passes, which the filter of
+// the shadow's edge averages.
 
 struct DepthVertex {
     @location(0) position: vec3f,

@@ -63,6 +63,8 @@ fn pattern(pixel: vec2f) -> f32 {
 
 // Whether blended surfaces are mixed with what lies behind them, which then has to be drawn before.
 override BLENDED: bool = false;
+// Whether there is ambient occlusion in screen space.
+override OCCLUDED: bool = false;
 
 struct Shaded {
     @location(0) color: vec4f,
@@ -92,6 +94,7 @@ fn forward_fragment(
 ) -> Shaded {
     let position = in.position / in.one;
     let geometry = cross(dpdx(position), dpdy(position));
+    let slopes = vec2f(dpdx(in.clip.z), dpdy(in.clip.z));
     let uv = in.uv / in.one;
     let at = Coordinates(uv.xy, uv.zw);
     let base_color = base_color_at(at, in.color / in.one);
@@ -165,7 +168,11 @@ fn forward_fragment(
             radiance += direct_light(b, n, v, position, geometric, pattern(in.clip.xy)/*ITS TURN*/);
         }
         if (frame.parts & PART_INDIRECT) != 0u {
-            radiance += indirect_light(b, n, v, position, substance.roughness, occlusion);
+            var visible = 1.0;
+            if OCCLUDED {
+                visible = ambient_visibility(in.clip, slopes);
+            }
+            radiance += indirect_light(b, n, v, position, substance.roughness, occlusion, visible);
         }
     }
     out.color = vec4f(radiance * frame.pre_exposure * alpha, alpha);
@@ -195,21 +202,70 @@ fn direct_light(b: Bsdf, n: vec3f, v: vec3f, position: vec3f, geometric: vec3f, 
 
 // Light of the field, chapter 4.2.2 of the second paper: diffuse by irradiance, specular by the split
 // sum, the lobe's mean radiance about the mirrored direction times the environment BRDF. The
-// material's occlusion is of the side that is seen: light through a thin surface it leaves alone.
-fn indirect_light(b: Bsdf, n: vec3f, v: vec3f, position: vec3f, roughness: f32, occlusion: f32) -> vec3f {
+// material's occlusion is of the side that is seen: light through a thin surface it leaves alone. So is
+// `visible`, what ambient occlusion leaves; both tell of the same crevices, of which each counts once.
+fn indirect_light(
+    b: Bsdf, n: vec3f, v: vec3f, position: vec3f, roughness: f32, occlusion: f32, visible: f32,
+) -> vec3f {
     let n_v = dot(n, v);
     let bands = ggx_bands(roughness);
     let mirrored = reflect(-v, n);
     let light = field_light(position, n, lobe(n, cosine_bands()), lobe(mirrored, bands));
     let under = 1.0 - reflectance(b, n_v);
-    var sum = b.diffuse * under * occlusion * light.a / PI;
+    var of_diffuse = vec3f(occlusion);
+    var of_specular = occlusion;
+    if OCCLUDED {
+        of_diffuse = min(of_diffuse, many_bounces(visible, b.diffuse));
+        of_specular = min(of_specular, visible);
+    }
+    var sum = b.diffuse * under * of_diffuse * light.a / PI;
     let by = textureSampleLevel(environment_brdf, table_sampler, table_at(n_v, roughness), 0.0).xy;
-    sum += (b.f0 * by.x + b.f90 * by.y) * specular_occlusion(n_v, occlusion, b.alpha) * light.b;
+    sum += (b.f0 * by.x + b.f90 * by.y) * specular_occlusion(n_v, of_specular, b.alpha) * light.b;
     if any(b.transmission > vec3f(0.0)) {
         let behind = field_light(position, -n, lobe(-v, bands), lobe(-v, bands));
         sum += b.transmission * under * behind.a;
     }
     return sum;
+}
+
+// What ambient occlusion leaves of the light at a place of the picture whose depth changes so much from
+// a pixel to the next. Where the pixel shows another surface, those beside it are asked: so edges between
+// samples of a pixel have no seams, and blended surfaces, of which no depth was drawn, are left alone.
+fn ambient_visibility(at: vec4f, slopes: vec2f) -> f32 {
+    let pixel = vec2i(at.xy);
+    if depth_share(pixel, at, slopes, frame.occlusion_radius) > 0.0 {
+        return textureLoad(occlusion_visibility, pixel, 0).r;
+    }
+    var sum = 0.0;
+    var weights = 0.0;
+    for (var i = 0; i < 9; i++) {
+        let beside = pixel + vec2i(i % 3 - 1, i / 3 - 1);
+        // Surfaces bend: now what lies within the radius will do, the more the nearer it is.
+        let share = depth_share(beside, at, slopes, 8.0 * frame.occlusion_radius);
+        let weight = share * share;
+        if weight > 0.0 {
+            sum += weight * textureLoad(occlusion_visibility, beside, 0).r;
+            weights += weight;
+        }
+    }
+    return select(1.0, sum / weights, weights > 0.0);
+}
+
+fn depth_share(pixel: vec2i, at: vec4f, slopes: vec2f, radius: f32) -> f32 {
+    if any(pixel < vec2i(0)) || any(pixel >= vec2i(textureDimensions(occlusion_depths))) {
+        return 0.0;
+    }
+    let expected = at.z + dot(slopes, vec2f(pixel) + 0.5 - at.xy);
+    return same_surface(textureLoad(occlusion_depths, pixel, 0), expected, radius);
+}
+
+// The share of light that arrives at a place of which so much is visible, when what hides it has the
+// same albedo and scatters light itself: the fit of Jiménez et al. 2016.
+fn many_bounces(visible: f32, albedo: vec3f) -> vec3f {
+    let a = 2.0404 * albedo - 0.3324;
+    let b = -4.7951 * albedo + 0.6417;
+    let c = 2.7552 * albedo + 0.6903;
+    return clamp(((visible * a + b) * visible + c) * visible, vec3f(visible), vec3f(1.0));
 }
 
 // What occlusion leaves of the specular lobe: of a smooth surface seen from above more than of the

@@ -52,6 +52,11 @@ struct Frame {
     // How far maps and edges soften a light without a size, texels.
     filter_radius: f32,
     frame: u32,
+    // Of ambient occlusion, metres.
+    occlusion_radius: f32,
+    _pad0: u32,
+    _pad1: u32,
+    _pad2: u32,
 }
 
 // Which light is drawn.
@@ -69,6 +74,9 @@ const PART_INDIRECT: u32 = 4u;
 // By cosine and roughness: what F0 and F90 are multiplied by.
 @group(1) @binding(7) var environment_brdf: texture_2d<f32>;
 @group(1) @binding(8) var table_sampler: sampler;
+// Ambient occlusion: the share of indirect light that arrives, and the depths that it is of.
+@group(1) @binding(9) var occlusion_visibility: texture_2d<f32>;
+@group(1) @binding(10) var occlusion_depths: texture_depth_2d;
 
 // Light arriving from a punctual light, were nothing in between.
 struct Incident {

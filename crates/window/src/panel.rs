@@ -1,9 +1,11 @@
 //! The panel: what people set, and what they read.
 
+use std::ops::RangeInclusive;
+
 use egui::{ComboBox, Grid, Label, RichText, Slider, Ui};
 use lumencast_light::OffsetPolicy;
 use lumencast_picture::ToneMap;
-use lumencast_shade::{Lighting, Settings, Shading, Transparency};
+use lumencast_shade::{Lighting, Occlusion, Settings, Shading, Transparency};
 
 use crate::camera::Steering;
 use crate::exposure::Exposure;
@@ -59,6 +61,9 @@ const HELP: &str = "Drag: turn. Right drag: pan. Wheel: nearer. W A S D, Q E: wa
 const SAMPLES: [u32; 4] = [1, 2, 4, 8];
 /// Sides of shadow maps that can be chosen.
 const SHADOWS: [u32; 5] = [0, 512, 1024, 2048, 4096];
+
+/// How far occlusion can be made to reach, metres.
+const RADIUS: RangeInclusive<f32> = 0.01..=2.0;
 
 /// Shows the panel.
 pub(crate) fn show(
@@ -144,6 +149,7 @@ fn drawing(ui: &mut Ui, controls: &mut Controls) {
     });
     ui.add(Slider::new(&mut shadows.filter_samples, 1..=64).text("PCF samples"));
     ui.add(Slider::new(&mut shadows.search_samples, 0..=64).text("PCSS samples"));
+    occlusion(ui, &mut settings.occlusion);
     let offsets = [OffsetPolicy::HalfCell, OffsetPolicy::None, OffsetPolicy::Metres(0.1)];
     choice(ui, "Light is read", &mut controls.offset, &offsets, |offset| match offset {
         OffsetPolicy::None => "at the surface".into(),
@@ -155,6 +161,18 @@ fn drawing(ui: &mut Ui, controls: &mut Controls) {
         None => "none".into(),
         Some(width) => format!("Hann, to band {width}"),
     });
+}
+
+fn occlusion(ui: &mut Ui, occlusion: &mut Option<Occlusion>) {
+    let mut is_drawn = occlusion.is_some();
+    if ui.checkbox(&mut is_drawn, "Ambient occlusion").changed() {
+        *occlusion = is_drawn.then(Occlusion::default);
+    }
+    if let Some(Occlusion { radius, directions, steps }) = occlusion {
+        ui.add(Slider::new(radius, RADIUS).logarithmic(true).suffix(" m").text("reach"));
+        ui.add(Slider::new(directions, 1..=8).text("directions"));
+        ui.add(Slider::new(steps, 1..=16).text("steps"));
+    }
 }
 
 /// One of several values.

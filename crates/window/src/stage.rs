@@ -200,6 +200,9 @@ impl Stage {
         }
         if let Some(time) = self.time {
             frame.push(("shadow maps", milliseconds(time.shadows)));
+            if self.controls.settings.occlusion.is_some() {
+                frame.push(("occlusion", milliseconds(time.occlusion)));
+            }
             frame.push(("picture", milliseconds(time.pictures)));
         }
         frame.push(("size", format!("{} × {}", size.x, size.y)));

@@ -12,7 +12,7 @@ use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadow
 use serde_json::json;
 
 use super::{Lighting, PartsArgument, Render};
-use crate::arguments::{parse_offset, parse_positive};
+use crate::arguments::{occlusion, parse_occlusion, parse_offset, parse_positive};
 use crate::light_source::{self, Computed};
 use crate::output;
 
@@ -58,6 +58,10 @@ pub(crate) struct RasterArguments {
     #[arg(long, value_name = "N", default_value_t = 16,
           value_parser = clap::value_parser!(u32).range(0..=256))]
     pcss: u32,
+    /// Takes away indirect light that is hidden within so many metres (ambient occlusion in screen
+    /// space), which probes are too sparse for; 0 takes none.
+    #[arg(long, value_name = "METRES", default_value_t = 0.0, value_parser = parse_occlusion)]
+    occlusion: f32,
     /// How blended surfaces are drawn: by the samples that they cover, or sorted and mixed.
     #[arg(long, value_enum, default_value_t = TransparencyArgument::Coverage)]
     transparency: TransparencyArgument,
@@ -139,6 +143,7 @@ impl Render {
                 search_samples: pcss,
                 ..Shadows::default()
             },
+            occlusion: occlusion(self.raster.occlusion),
             transparency: match self.raster.transparency {
                 TransparencyArgument::Coverage => Transparency::Coverage,
                 TransparencyArgument::Sorted => Transparency::Sorted,
@@ -195,7 +200,9 @@ impl Render {
                 "probes": probes,
                 "seconds": seconds,
                 "device_seconds": drawn.time.map(|time| json!({
-                    "shadows": time.shadows, "pictures": time.pictures,
+                    "shadows": time.shadows,
+                    "occlusion": time.occlusion,
+                    "pictures": time.pictures,
                 })),
                 "exposure": exposure,
             }));
@@ -212,9 +219,10 @@ impl Render {
             drawn.shadow_maps, drawn.shadow_resolution
         );
         match drawn.time {
-            Some(PassTimes { shadows, pictures }) => println!(
-                "{adapter}: {:.1} ms shadow maps, {:.1} ms pictures",
+            Some(PassTimes { shadows, occlusion, pictures }) => println!(
+                "{adapter}: {:.1} ms shadow maps, {:.1} ms occlusion, {:.1} ms pictures",
                 1e3 * shadows,
+                1e3 * occlusion,
                 1e3 * pictures
             ),
             None => println!("{adapter}"),

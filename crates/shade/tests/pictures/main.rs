@@ -6,4 +6,5 @@ mod committed;
 mod common;
 mod direct_light;
 mod indirect_light;
+mod occlusion;
 mod screen;

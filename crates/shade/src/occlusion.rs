@@ -1,0 +1,214 @@
+//! Ambient occlusion in screen space: how much of its half space each pixel's surface sees within a
+//! short distance, by what the picture's own depth shows.
+//!
+//! Three passes a view, before its picture: depth, of one sample a pixel; visibility, at as many pixels,
+//! which differ in where they look; and the mean of 4×4 of them that are of one surface. The picture
+//! reads the result where its own depth is that of the pixel (`ambient_visibility` of the shader).
+//! Six bytes a pixel.
+
+use glam::UVec2;
+use lumencast_shaders::{layout, occlusion};
+
+use crate::bindings::{PICTURE, UNIFORM, entry, texture};
+use crate::gpu::{DEPTH, Gpu};
+use crate::settings::Occlusion;
+
+/// The visible share of a half space.
+const VISIBILITY: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
+
+/// What finds occlusion.
+#[derive(Debug)]
+pub(crate) struct Occluder {
+    textures: Textures,
+    /// Not made before they are wanted.
+    pipelines: Option<Pipelines>,
+}
+
+/// Of a pixel where there is no occlusion.
+#[derive(Debug)]
+struct Textures {
+    size: UVec2,
+    depth: wgpu::TextureView,
+    rough: wgpu::TextureView,
+    smooth: wgpu::TextureView,
+}
+
+#[derive(Debug)]
+struct Pipelines {
+    find_layout: wgpu::BindGroupLayout,
+    find: wgpu::RenderPipeline,
+    blur_layout: wgpu::BindGroupLayout,
+    blur: wgpu::RenderPipeline,
+}
+
+/// The bindings of the passes of a frame.
+#[derive(Debug)]
+pub(crate) struct Groups {
+    find: wgpu::BindGroup,
+    blur: wgpu::BindGroup,
+}
+
+impl Occluder {
+    /// For pictures without occlusion.
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        Self { textures: Textures::new(gpu, UVec2::ONE), pipelines: None }
+    }
+
+    /// Makes ready for pictures of a size; `pass`: the bindings of group 0.
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, pass: &wgpu::BindGroupLayout, size: UVec2) {
+        if self.textures.size != size {
+            self.textures = Textures::new(gpu, size);
+        }
+        self.pipelines.get_or_insert_with(|| Pipelines::new(gpu, pass));
+    }
+
+    /// What the depth of a view is drawn into.
+    pub(crate) fn depth(&self) -> &wgpu::TextureView {
+        &self.textures.depth
+    }
+
+    /// What a picture reads.
+    pub(crate) fn visibility(&self) -> &wgpu::TextureView {
+        &self.textures.smooth
+    }
+
+    /// What the passes of a frame bind; nothing where it was not made ready.
+    pub(crate) fn groups(&self, gpu: &Gpu, settings: Occlusion) -> Option<Groups> {
+        let pipelines = self.pipelines.as_ref()?;
+        let settings = layout::Occlusion {
+            radius: settings.radius,
+            directions: settings.directions.max(1),
+            steps: settings.steps.max(1),
+            _pad: 0,
+        };
+        let uniform = wgpu::BufferUsages::UNIFORM;
+        let settings = gpu.buffer("occlusion", uniform, bytemuck::bytes_of(&settings), 0);
+        let group = |layout, views: &[&wgpu::TextureView]| {
+            let mut entries =
+                vec![wgpu::BindGroupEntry { binding: 0, resource: settings.as_entire_binding() }];
+            entries.extend((1..).zip(views).map(|(binding, view)| wgpu::BindGroupEntry {
+                binding,
+                resource: wgpu::BindingResource::TextureView(view),
+            }));
+            let label = Some("occlusion");
+            let descriptor = wgpu::BindGroupDescriptor { label, layout, entries: &entries };
+            gpu.device.create_bind_group(&descriptor)
+        };
+        let Textures { depth, rough, .. } = &self.textures;
+        Some(Groups {
+            find: group(&pipelines.find_layout, &[depth]),
+            blur: group(&pipelines.blur_layout, &[depth, rough]),
+        })
+    }
+
+    /// Draws visibility, once depth is drawn; `bind` binds group 0.
+    pub(crate) fn draw(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        groups: &Groups,
+        bind: impl Fn(&mut wgpu::RenderPass<'_>),
+        timestamps: Option<wgpu::RenderPassTimestampWrites<'_>>,
+    ) {
+        let Some(pipelines) = &self.pipelines else { return };
+        for (pipeline, group, onto, timestamps) in [
+            (&pipelines.find, &groups.find, &self.textures.rough, None),
+            (&pipelines.blur, &groups.blur, &self.textures.smooth, timestamps),
+        ] {
+            let color = wgpu::RenderPassColorAttachment {
+                view: onto,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::WHITE),
+                    store: wgpu::StoreOp::Store,
+                },
+            };
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("occlusion"),
+                color_attachments: &[Some(color)],
+                timestamp_writes: timestamps,
+                ..Default::default()
+            });
+            pass.set_pipeline(pipeline);
+            bind(&mut pass);
+            pass.set_bind_group(1, group, &[]);
+            pass.draw(0..3, 0..1);
+        }
+    }
+}
+
+impl Textures {
+    fn new(gpu: &Gpu, size: UVec2) -> Self {
+        let view = |label, format| {
+            let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                    | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            });
+            texture.create_view(&wgpu::TextureViewDescriptor::default())
+        };
+        Self {
+            size,
+            depth: view("depth of pixels", DEPTH),
+            rough: view("visibility", VISIBILITY),
+            smooth: view("smooth visibility", VISIBILITY),
+        }
+    }
+}
+
+impl Pipelines {
+    fn new(gpu: &Gpu, pass: &wgpu::BindGroupLayout) -> Self {
+        let depth = texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2);
+        let entries = [entry(0, UNIFORM), entry(1, depth), entry(2, PICTURE)];
+        let group = |entries| {
+            let label = Some("occlusion");
+            let descriptor = wgpu::BindGroupLayoutDescriptor { label, entries };
+            gpu.device.create_bind_group_layout(&descriptor)
+        };
+        let (find_layout, blur_layout) = (group(&entries[..2]), group(&entries));
+        let module = gpu.shader("occlusion", occlusion());
+        let find = pipeline(gpu, &[Some(pass), Some(&find_layout)], &module, "occlusion_fragment");
+        let blur = pipeline(gpu, &[Some(pass), Some(&blur_layout)], &module, "blur_fragment");
+        Self { find_layout, find, blur_layout, blur }
+    }
+}
+
+fn pipeline(
+    gpu: &Gpu,
+    groups: &[Option<&wgpu::BindGroupLayout>],
+    module: &wgpu::ShaderModule,
+    fragment_entry: &str,
+) -> wgpu::RenderPipeline {
+    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("occlusion"),
+        bind_group_layouts: groups,
+        immediate_size: 0,
+    });
+    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(fragment_entry),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("occlusion_vertex"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some(fragment_entry),
+            compilation_options: Default::default(),
+            targets: &[Some(VISIBILITY.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
