@@ -160,3 +160,54 @@ fn the_sky_is_seen_directly() {
     assert!(of(Parts::Direct).picture().iter().all(|v| *v == Vec3::new(1.0, 2.0, 3.0)));
     assert!(of(Parts::Indirect).picture().iter().all(|v| *v == Vec3::ZERO));
 }
+
+#[test]
+fn frames_make_up_a_film() {
+    let (scene, view) = cornell();
+    let film = render(&scene, view, settings(), 16).picture();
+    let off = |seed| {
+        let renderer = Renderer::new(&scene, view, PictureSettings { seed, ..settings() }).unwrap();
+        let frames: Vec<_> = (0..16).map(|number| renderer.frame(number)).collect();
+        let mean = |pixel: usize| frames.iter().map(|f| f.samples[pixel].radiance).sum::<Vec3>();
+        let errors = film.iter().enumerate().map(|(i, v)| (*v - mean(i) / 16.0).abs());
+        errors.map(Vec3::max_element).fold(0.0, f32::max)
+    };
+    assert!(off(settings().seed) < 1e-4, "{}", off(settings().seed));
+    assert!(off(2) > 0.1, "the check has no teeth");
+}
+
+/// A floor and a lamp below the sky: what a frame says is seen first, and what of it has no noise.
+#[test]
+fn frames_tell_what_is_met_first() {
+    let (color, lamp, sky) = (Vec3::new(0.2, 0.5, 0.8), Vec3::splat(7.0), Vec3::new(1.0, 2.0, 3.0));
+    let mut stage = Stage::default();
+    let floor = stage.material(lambert(color, Vec3::ZERO));
+    stage.quad(Vec3::new(-9.0, 0.0, 9.0), Vec3::X * 18.0, Vec3::NEG_Z * 18.0, floor);
+    let panel = stage.material(lambert(Vec3::ZERO, lamp));
+    stage.quad(Vec3::new(-9.0, 1.0, -9.0), Vec3::X * 9.0, Vec3::Y * 9.0, panel);
+    stage.environment(Environment::Constant { radiance: sky });
+    let view = View::look_at(Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.8, -9.0), 1.2).unwrap();
+    let frame = Renderer::new(&stage.snapshot(), view, settings()).unwrap().frame(3);
+    let (mut floors, mut lamps, mut skies) = (0, 0, 0);
+    for sample in &frame.samples {
+        match (sample.emitted, sample.surface) {
+            (emitted, None) => {
+                assert_eq!((emitted, sample.radiance), (sky, sky));
+                skies += 1;
+            }
+            (Vec3::ZERO, Some(surface)) => {
+                assert!(surface.position.y.abs() < 1e-5 && surface.position.z > -9.001);
+                assert_eq!((surface.normal, surface.base_color), (Vec3::Y, color));
+                assert!(sample.radiance.is_finite() && sample.radiance.min_element() >= 0.0);
+                floors += 1;
+            }
+            (emitted, Some(surface)) => {
+                assert_eq!((emitted, sample.radiance), (lamp, lamp));
+                assert_eq!((surface.normal, surface.base_color), (Vec3::Z, Vec3::ZERO));
+                assert!((surface.position.z + 9.0).abs() < 1e-4 && surface.position.x <= 0.0);
+                lamps += 1;
+            }
+        }
+    }
+    assert!(floors.min(lamps).min(skies) > 100, "{floors} {lamps} {skies}");
+}

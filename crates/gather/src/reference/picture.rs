@@ -103,9 +103,9 @@ pub struct Traced {
 /// ```
 #[derive(Debug)]
 pub struct Renderer {
-    world: World,
+    pub(super) world: World,
     view: View,
-    settings: PictureSettings,
+    pub(super) settings: PictureSettings,
     pool: rayon::ThreadPool,
 }
 
@@ -154,23 +154,12 @@ impl Renderer {
         let share = if half == 0 { until.div_ceil(2) } else { until / 2 };
         let samples = share.saturating_sub(first).min(PASS);
         let places: Vec<u32> = (first..first + samples).map(|n| film.place(half, n)).collect();
-        let size = self.settings.size;
-        let tiles_across = size.x.div_ceil(TILE);
-        let tiles = tiles_across * size.y.div_ceil(TILE);
+        let tiles = self.tile_count();
         let (done, stopped, rays) = (AtomicU64::new(0), AtomicBool::new(false), AtomicU64::new(0));
-        let s = &self.settings;
-        let paths = Paths {
-            bounces: s.bounces,
-            clamp: s.clamp,
-            roulette_from: s.roulette_from,
-            previous: None,
-        };
-        let integrator = || Integrator::new(&self.world, paths);
-        let tile = |integrator: &mut Integrator<'_>, tile: u32| {
+        let found = self.tiles(|integrator, corner| {
             if stopped.load(Ordering::Relaxed) {
                 return Vec::new();
             }
-            let corner = TILE * UVec2::new(tile % tiles_across, tile / tiles_across);
             let (sums, traced) = self.tile(corner, &places, integrator);
             rays.fetch_add(traced, Ordering::Relaxed);
             let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f32 / tiles as f32;
@@ -178,12 +167,11 @@ impl Renderer {
                 stopped.store(true, Ordering::Relaxed);
             }
             sums
-        };
-        let found: Vec<Vec<Vec3>> =
-            self.pool.install(|| (0..tiles).into_par_iter().map_init(integrator, tile).collect());
+        });
         if stopped.into_inner() && done.into_inner() < u64::from(tiles) {
             return None;
         }
+        let size = self.settings.size;
         film.add(half, &assemble(size, &found), samples);
         let paths = u64::from(size.x) * u64::from(size.y) * u64::from(samples);
         Some(Traced { paths, rays: rays.into_inner() })
@@ -197,24 +185,54 @@ impl Renderer {
         places: &[u32],
         integrator: &mut Integrator<'_>,
     ) -> (Vec<Vec3>, u64) {
+        let rays_before = integrator.rays;
+        let looks = self.looks(corner, places);
+        let parts = self.settings.parts;
+        let found: Vec<Vec3> = integrator.radiance(looks).map(|seen| part(&seen, parts)).collect();
+        let sums = found.chunks_exact(places.len().max(1)).map(|c| c.iter().sum()).collect();
+        (sums, integrator.rays - rays_before)
+    }
+
+    fn tile_count(&self) -> u32 {
+        self.settings.size.x.div_ceil(TILE) * self.settings.size.y.div_ceil(TILE)
+    }
+
+    /// What `of` makes of each tile, given its upper left pixel, on all threads.
+    pub(super) fn tiles<T: Send>(
+        &self,
+        of: impl Fn(&mut Integrator<'_>, UVec2) -> Vec<T> + Sync,
+    ) -> Vec<Vec<T>> {
+        let s = &self.settings;
+        let across = s.size.x.div_ceil(TILE);
+        let paths = Paths {
+            bounces: s.bounces,
+            clamp: s.clamp,
+            roulette_from: s.roulette_from,
+            previous: None,
+        };
+        let integrator = || Integrator::new(&self.world, paths);
+        let tile = |integrator: &mut Integrator<'_>, tile: u32| {
+            of(integrator, TILE * UVec2::new(tile % across, tile / across))
+        };
+        let tiles = (0..self.tile_count()).into_par_iter();
+        self.pool.install(|| tiles.map_init(integrator, tile).collect())
+    }
+
+    /// The camera rays of a tile, row by row: for each pixel those at some places of its sequence.
+    pub(super) fn looks(&self, corner: UVec2, places: &[u32]) -> impl Iterator<Item = Look> {
         let s = &self.settings;
         let end = (corner + TILE).min(s.size);
         let aspect = s.size.x as f32 / s.size.y as f32;
-        let rays_before = integrator.rays;
         let pixels =
-            (corner.y..end.y).flat_map(|y| (corner.x..end.x).map(move |x| UVec2::new(x, y)));
-        let looks = pixels.flat_map(|pixel| places.iter().map(move |&sample| (pixel, sample))).map(
-            |(pixel, sample)| {
+            (corner.y..end.y).flat_map(move |y| (corner.x..end.x).map(move |x| UVec2::new(x, y)));
+        pixels.flat_map(move |pixel| places.iter().map(move |&sample| (pixel, sample))).map(
+            move |(pixel, sample)| {
                 let mut sampler = Sampler::new(s.seed, pixel.y * s.size.x + pixel.x, sample);
                 let place = pixel.as_vec2() + 0.5 + s.filter.place(sampler.square());
                 let (origin, direction) = self.view.ray(place / s.size.as_vec2(), aspect);
                 Look { origin, direction, sampler }
             },
-        );
-        let found: Vec<Vec3> =
-            integrator.radiance(looks).map(|seen| part(&seen, s.parts)).collect();
-        let sums = found.chunks_exact(places.len().max(1)).map(|c| c.iter().sum()).collect();
-        (sums, integrator.rays - rays_before)
+        )
     }
 }
 
@@ -227,7 +245,7 @@ fn part(seen: &Seen, parts: Parts) -> Vec3 {
 }
 
 /// Rows of pixels out of tiles.
-fn assemble(size: UVec2, tiles: &[Vec<Vec3>]) -> Vec<Vec3> {
+pub(super) fn assemble<T: Copy>(size: UVec2, tiles: &[Vec<T>]) -> Vec<T> {
     let across = size.x.div_ceil(TILE);
     let mut pixels = Vec::with_capacity(size.x as usize * size.y as usize);
     for y in 0..size.y {

@@ -272,14 +272,17 @@ impl<'a> Point<'a> {
         }
     }
 
+    /// Linear base colour, 0 to 1.
+    pub(crate) fn base_color(&self) -> Vec3 {
+        let color = self.triangle.base_color(self.material, self.weights).truncate();
+        color.clamp(Vec3::ZERO, Vec3::ONE)
+    }
+
     /// How the surface scatters towards the ray, and the frame (columns in the world) in which it
     /// does; `None` where it scatters nothing: unlit surfaces and backs of single-sided ones.
     pub(crate) fn scattering(&self, frames: &Frames, model: MaterialModel) -> Option<(Bsdf, Mat3)> {
         let (bsdf, map) = match model {
-            MaterialModel::Lambert => {
-                let color = self.triangle.base_color(self.material, self.weights).truncate();
-                (Bsdf::lambert(color.clamp(Vec3::ZERO, Vec3::ONE)), None)
-            }
+            MaterialModel::Lambert => (Bsdf::lambert(self.base_color()), None),
             MaterialModel::Full => {
                 if self.material.unlit || !(self.front || self.material.double_sided) {
                     return None;

@@ -1,0 +1,90 @@
+//! One sample a pixel, and what its ray met first: what denoisers of real-time path tracing start
+//! from.
+
+use glam::{UVec2, Vec3};
+
+use super::Renderer;
+use super::picture::assemble;
+use crate::accel::{Hit, Ray, Stacks};
+use crate::path_trace::integrator::{Integrator, Look};
+use crate::world::{Passing, World};
+
+/// One sample a pixel, row by row from the upper left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Pixels in width and height.
+    pub size: UVec2,
+    /// A sample each; never fewer than there are pixels.
+    pub samples: Vec<Sample>,
+}
+
+/// One path from the camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Arriving radiance, cd/m², all parts of it.
+    pub radiance: Vec3,
+    /// The share of it that what is seen first sends out by itself, a lamp or the environment: it has
+    /// no noise.
+    pub emitted: Vec3,
+    /// What is seen first, where that scatters light.
+    pub surface: Option<Surface>,
+}
+
+/// A surface at the point where a camera ray met it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Surface {
+    /// World, metres.
+    pub position: Vec3,
+    /// World unit normal that it is shaded by, on the camera's side.
+    pub normal: Vec3,
+    /// Linear base colour, 0 to 1.
+    pub base_color: Vec3,
+}
+
+impl Renderer {
+    /// One sample a pixel: the `number`-th of each pixel's sequence, placed by the filter like any
+    /// other. Frames 0, 1, 2, … are together what a [`super::Film`] of as many samples holds; to
+    /// judge one by the other, give them different seeds.
+    #[must_use]
+    pub fn frame(&self, number: u32) -> Frame {
+        let tiles = self.tiles(|integrator, corner| self.samples(integrator, corner, number));
+        let size = self.settings.size;
+        Frame { size, samples: assemble(size, &tiles) }
+    }
+
+    fn samples(&self, integrator: &mut Integrator<'_>, corner: UVec2, number: u32) -> Vec<Sample> {
+        let looks: Vec<Look> = self.looks(corner, &[number]).collect();
+        let mut samples = first_met(&self.world, &looks);
+        for (sample, seen) in samples.iter_mut().zip(integrator.radiance(looks)) {
+            sample.radiance = seen.radiance();
+        }
+        samples
+    }
+}
+
+/// What rays meet first, radiance left out: the very surfaces that paths with the same numbers meet.
+fn first_met(world: &World, looks: &[Look]) -> Vec<Sample> {
+    let mut samples = vec![Sample::default(); looks.len()];
+    let ray =
+        |look: &Look| Ray { origin: look.origin, direction: look.direction, t_max: f32::INFINITY };
+    let rays = looks.iter().map(ray).zip(0..);
+    let passing = |n: u32| Passing { ends: [None; 2], key: looks[n as usize].sampler.key() };
+    world.closest(rays, &mut Stacks::default(), passing, |n, hit| {
+        samples[n as usize] = met(world, looks[n as usize].direction, hit);
+    });
+    samples
+}
+
+fn met(world: &World, direction: Vec3, hit: Option<Hit>) -> Sample {
+    let Some(hit) = hit else {
+        return Sample { emitted: world.lights.sky.radiance(direction), ..Sample::default() };
+    };
+    let Some(point) = world.point(hit, direction) else { return Sample::default() };
+    let scattering = point.scattering(world.frames(hit.instance), world.model);
+    let surface = scattering.map(|(_, frame)| Surface {
+        position: point.position,
+        normal: frame.z_axis,
+        base_color: point.base_color(),
+    });
+    Sample { emitted: point.emission(world.model), surface, ..Sample::default() }
+}
