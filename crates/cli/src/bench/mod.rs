@@ -1,5 +1,6 @@
 //! `lumencast bench`: figures of this machine.
 
+mod bmfr;
 mod paths;
 mod peers;
 mod quality;

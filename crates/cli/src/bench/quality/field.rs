@@ -1,0 +1,84 @@
+//! Light fields, and pictures drawn under them.
+
+use std::time::Instant;
+
+use anyhow::Result;
+use lumencast_light::{LightField, OffsetPolicy};
+use lumencast_scene::{View, VolumeSpec};
+use lumencast_shade::{Lighting, Renderer, Settings};
+
+use super::reference::Judge;
+use super::report::{Errors, Row};
+use super::{BenchQuality, Subject, sum};
+use crate::bench::{cells, draw};
+use crate::light_source::Computed;
+
+/// Samples a probe of one of the second paper's updates.
+pub(super) const UPDATE: u32 = 512;
+
+/// A field as it is measured.
+pub(super) struct Field {
+    name: String,
+    light: LightField,
+    probes: usize,
+    /// Of so many samples a probe as an update has.
+    update_seconds: f64,
+}
+
+impl BenchQuality {
+    pub(super) fn field(
+        &self,
+        subject: &Subject<'_>,
+        spec: VolumeSpec,
+        bounces: u32,
+    ) -> Result<Field> {
+        let (samples, clamp) = (self.probe_samples, self.clamp);
+        let computed = Computed { samples, bounces, clamp, tracing: self.picture.tracing() };
+        let start = Instant::now();
+        let light = LightField::new(computed.volumes(&subject.snapshot, &[spec])?);
+        let seconds = start.elapsed().as_secs_f64();
+        Ok(Field {
+            name: format!("{} L{} {bounces} bounces", cells(&spec), u8::from(spec.order)),
+            light,
+            probes: spec.grid.probe_count(),
+            update_seconds: seconds * f64::from(UPDATE) / f64::from(samples),
+        })
+    }
+}
+
+/// What pictures are drawn by.
+pub(super) struct Canvas<'a> {
+    pub(super) renderer: &'a mut Renderer,
+    pub(super) view: View,
+    pub(super) settings: Settings,
+    pub(super) offset: OffsetPolicy,
+}
+
+impl Canvas<'_> {
+    /// Of direct light alone.
+    pub(super) fn direct(&mut self, judge: &Judge) -> Result<Errors> {
+        let direct = draw(self.renderer, self.view, &self.settings, Lighting::DIRECT)?;
+        Ok(Errors::of(&judge.compare(&sum(&direct, &judge.reference.indirect))?))
+    }
+
+    /// Of a picture under a field. What only a first picture takes, its indirect part alone has taken
+    /// before the whole one is timed.
+    pub(super) fn row(&mut self, field: &Field, judge: &Judge) -> Result<Row> {
+        self.renderer.set_light(&field.light, self.offset)?;
+        let indirect = draw(self.renderer, self.view, &self.settings, Lighting::INDIRECT)?;
+        let start = Instant::now();
+        let whole = draw(self.renderer, self.view, &self.settings, Lighting::FIELD)?;
+        let picture_seconds = start.elapsed().as_secs_f64();
+        let indirect = judge.compare(&sum(&judge.reference.direct, &indirect))?;
+        Ok(Row {
+            indirect: Some(Errors::of(&indirect)),
+            probes: Some(field.probes),
+            ..Row::new(
+                field.name.clone(),
+                [field.update_seconds, picture_seconds],
+                judge.compare(&whole)?,
+                whole,
+            )
+        })
+    }
+}

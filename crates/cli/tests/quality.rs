@@ -1,0 +1,107 @@
+//! `lumencast bench quality`: what it measures, and what it writes.
+
+mod common;
+
+use std::path::Path;
+
+use common::{Folder, Ran, run};
+use lumencast_picture::{Loaded, compare};
+use serde_json::Value;
+
+fn bench(arguments: &[&str]) -> Ran {
+    let mut all = vec!["bench", "quality", "cornell", "--size", "72x48", "--volume", "4x4x4"];
+    all.extend(["--reference-spp", "64", "--probe-samples", "256", "--samples", "4"]);
+    all.extend(arguments);
+    let ran = run(&all);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    ran
+}
+
+fn number(report: &Value, pointer: &str) -> f64 {
+    let found = report.pointer(pointer).and_then(Value::as_f64);
+    found.unwrap_or_else(|| panic!("{pointer}: {report}"))
+}
+
+#[test]
+fn fields_and_the_baseline_are_judged() {
+    let folder = Folder::new("quality");
+    let [kept, out] = ["kept", "out"].map(|name| folder.0.join(name));
+    let [kept, out] = [&kept, &out].map(|path| path.to_str().expect("text"));
+    let mut arguments = vec!["--orders", "1,2", "--keep", kept, "--json"];
+    let report = bench(
+        &[&arguments[..], &["--baseline-frames", "24", "--resolutions", "16,48", "-o", out]]
+            .concat(),
+    )
+    .json();
+
+    // Two orders, and the first with a bounce more.
+    let fields = report["fields"].as_array().expect("rows");
+    let names: Vec<_> = fields.iter().map(|row| row["name"].as_str().expect("a name")).collect();
+    assert_eq!(names, ["4x4x4 L1 3 bounces", "4x4x4 L2 3 bounces", "4x4x4 L1 4 bounces"]);
+    for row in 0..3 {
+        let psnr = number(&report, &format!("/fields/{row}/whole/psnr"));
+        assert!((20.0..40.0).contains(&psnr), "{report}");
+    }
+    let [raw, denoised] = [0, 1].map(|n| number(&report, &format!("/baseline/{n}/whole/psnr")));
+    assert!((5.0..22.0).contains(&raw), "{report}");
+    assert!(denoised > raw + 5.0, "{report}");
+    let ssim = |n| number(&report, &format!("/baseline/{n}/whole/ssim"));
+    assert!(ssim(1) > ssim(0) + 0.2, "{report}");
+    for (n, side) in [16, 48].into_iter().enumerate() {
+        let at = &report["resolutions"][n];
+        assert_eq!(at["side"], side);
+        assert_eq!(at["field"]["name"], "4x4x4 L1 3 bounces");
+        assert_eq!(at["field"]["light_seconds"], fields[0]["light_seconds"], "one update for all");
+        assert!(
+            number(at, "/field/whole/psnr") > 18.0 && number(at, "/baseline/whole/psnr") > 10.0
+        );
+    }
+    let traced = |n| number(&report, &format!("/resolutions/{n}/baseline/light_seconds"));
+    assert!(traced(1) > traced(0), "nine times the paths: {report}");
+    what_was_written_is_what_was_measured(&report, Path::new(out));
+
+    // The reference is kept: the second run took no time for another.
+    arguments.extend(["--baseline-frames", "0"]);
+    let again = bench(&arguments).json();
+    assert_eq!(again["reference"], report["reference"]);
+    assert_eq!(again["fields"][1]["whole"], report["fields"][1]["whole"]);
+    assert_eq!(again["baseline"], Value::Array(Vec::new()));
+}
+
+/// Every picture that quality.md shows is there, and as far from the reference as the table says.
+fn what_was_written_is_what_was_measured(report: &Value, folder: &Path) {
+    let text = std::fs::read_to_string(folder.join("quality.md")).expect("the tables");
+    let shown: Vec<_> = text.split("](").skip(1).filter_map(|s| s.split(')').next()).collect();
+    assert_eq!(shown.len(), 1 + 2 * 5 + 2, "{text}");
+    for name in &shown {
+        assert!(folder.join(name).is_file(), "{name}");
+    }
+    let picture = |name: &str| Loaded::read(folder.join(name)).expect("a picture");
+    let reference = picture("reference.png");
+    let rows = ["/fields/1", "/baseline/0", "/baseline/1"]
+        .map(|row| &report.pointer(row).expect("it")["whole"]);
+    let files = ["4x4x4-L2-3-bounces.png", "1-spp.png", "1-spp-BMFR.png"];
+    let psnr =
+        files.map(|name| compare(&reference, &picture(name), None, 67.0).expect("sizes").psnr);
+    for (psnr, row) in psnr.iter().zip(rows) {
+        let told = row["psnr"].as_f64().expect("a number");
+        assert!((psnr - told).abs() < 0.1, "{psnr} of 8 bits, {told} told");
+        assert!(text.contains(&format!("| {told:.2} |")), "{told} is missing: {text}");
+    }
+    assert!((psnr[1] - psnr[2]).abs() > 1.0, "the check has no teeth");
+    for (name, words) in [("frame-time.svg", ["ms", ">48<"]), ("psnr.svg", ["PSNR, dB", ">48<"])] {
+        let svg = std::fs::read_to_string(folder.join(name)).expect("a plot");
+        assert!(words.iter().all(|word| svg.contains(word)), "{svg}");
+        assert!(svg.contains("1 spp, BMFR") && svg.contains("4x4x4 L1 3 bounces"), "{svg}");
+    }
+}
+
+#[test]
+fn tables_are_for_people_too() {
+    let ran = bench(&["--orders", "2", "--baseline-frames", "2"]);
+    for words in ["| 4x4x4 L2 3 bounces |", "| 1 spp |", "| 1 spp, BMFR |", "direct light alone:"] {
+        assert!(ran.stdout.contains(words), "{words:?} is missing: {ran:?}");
+    }
+    let ran = run(&["bench", "quality", "cornell", "--resolutions", "0"]);
+    assert_eq!(ran.code, Some(2), "{ran:?}");
+}
