@@ -78,7 +78,7 @@ pub(crate) struct BenchQuality {
           value_parser = clap::value_parser!(u32).range(0..=100_000))]
     baseline_frames: u32,
     /// Sides of square pictures that the first grid's first order and the baseline are measured in too,
-    /// pixels shaded once.
+    /// pixels shaded once, at the same exposure.
     #[arg(long, value_name = "PIXELS,…", value_delimiter = ',',
           value_parser = clap::value_parser!(u32).range(1..=16_384))]
     resolutions: Vec<u32>,
@@ -121,10 +121,12 @@ impl BenchQuality {
         renderer.set_scene(&subject.snapshot);
         let fields = self.fields(&subject, &grids)?;
         let table = self.table(&subject, &mut renderer, &fields)?;
-        let sides = self.resolutions.iter();
-        let resolutions = sides
-            .map(|&side| self.at_resolution(&subject, &mut renderer, &fields[0], side))
-            .collect::<Result<_>>()?;
+        let mut resolutions = Vec::new();
+        for &side in &self.resolutions {
+            let first = &fields[0];
+            let exposure = table.exposure;
+            resolutions.push(self.at_resolution(&subject, &mut renderer, first, side, exposure)?);
+        }
         let report = Report {
             scene: scene.name().to_owned(),
             adapter: renderer.gpu().name(),
@@ -167,7 +169,7 @@ impl BenchQuality {
         fields: &[Field],
     ) -> Result<Table> {
         let size = self.picture.size;
-        let judge = Judge::new(self.reference(subject, size)?);
+        let judge = Judge::new(self.reference(subject, size, None)?, None);
         let settings = self.settings(size, Shading::Samples, &judge);
         let mut canvas = Canvas { renderer, view: subject.view, settings, offset: self.offset };
         let direct = canvas.direct(&judge)?;
@@ -190,9 +192,11 @@ impl BenchQuality {
         renderer: &mut Renderer,
         field: &Field,
         side: u32,
+        exposure: f32,
     ) -> Result<AtResolution> {
         let size = UVec2::splat(side);
-        let judge = Judge::new(self.reference(subject, size)?);
+        let exposure = Some(exposure);
+        let judge = Judge::new(self.reference(subject, size, exposure)?, exposure);
         let settings = self.settings(size, Shading::Pixels, &judge);
         let mut canvas = Canvas { renderer, view: subject.view, settings, offset: self.offset };
         Ok(AtResolution {

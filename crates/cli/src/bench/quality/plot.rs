@@ -10,8 +10,8 @@ const FRAME: [f64; 4] = [64.0, 96.0, 620.0, 344.0];
 /// on light and on dark ground, and marks that are told apart without colours.
 const LINES: [(&str, &str, Mark); 4] = [
     ("#0072b2", "#56b4e9", Mark::Circle),
-    ("#767676", "#a8a8a8", Mark::Diamond),
     ("#d55e00", "#e69f00", Mark::Square),
+    ("#767676", "#a8a8a8", Mark::Diamond),
     ("#009e73", "#2bcf9f", Mark::Circle),
 ];
 
@@ -118,7 +118,7 @@ impl Axes {
         }
         push(svg, format_args!("<path class=\"axis\" d=\"M{left} {bottom}H{right}\"/>\n"));
         text(svg, (0.5 * (left + right), bottom + 42.0), "middle", &plot.x);
-        text(svg, (left - 8.0, top - 14.0), "end", &plot.y);
+        text(svg, (12.0, top - 14.0), "", &plot.y);
     }
 
     fn line(&self, svg: &mut String, style: usize, series: &Series) {

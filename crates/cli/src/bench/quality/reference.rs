@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use glam::UVec2;
 use lumencast_gather::reference::{Film, Parts, PictureSettings, Renderer};
-use lumencast_picture::{Comparison, Loaded, PIXELS_PER_DEGREE, Picture, compare, exposure};
+use lumencast_picture::{Comparison, Loaded, PIXELS_PER_DEGREE, Picture, compare};
 use serde::{Deserialize, Serialize};
 
 use super::{BenchQuality, Subject, sum};
@@ -34,13 +34,16 @@ pub(super) struct Judge {
     pub(super) reference: Reference,
     /// All of its light.
     pub(super) whole: Picture,
+    /// Of the camera, and so of its pictures of all sizes.
     pub(super) exposure: f32,
 }
 
 impl Judge {
-    pub(super) fn new(reference: Reference) -> Self {
+    /// At the exposure given, or else the reference's own.
+    pub(super) fn new(reference: Reference, exposure: Option<f32>) -> Self {
         let whole = sum(&reference.direct, &reference.indirect);
-        Self { exposure: exposure(&whole), whole, reference }
+        let exposure = exposure.unwrap_or_else(|| lumencast_picture::exposure(&whole));
+        Self { exposure, whole, reference }
     }
 
     pub(super) fn compare(&self, picture: &Picture) -> Result<Comparison> {
@@ -50,8 +53,14 @@ impl Judge {
 }
 
 impl BenchQuality {
-    /// The reference of a size: from the folder where it is kept, or else traced.
-    pub(super) fn reference(&self, subject: &Subject<'_>, size: UVec2) -> Result<Reference> {
+    /// The reference of a size: from the folder where it is kept, or else traced. Its noise is told
+    /// at the exposure given, or else its own.
+    pub(super) fn reference(
+        &self,
+        subject: &Subject<'_>,
+        size: UVec2,
+        exposure: Option<f32>,
+    ) -> Result<Reference> {
         let name = self.reference_name(subject, size);
         let known = self.keep.as_ref().map(|folder| folder.join(name));
         if let Some(base) = &known
@@ -64,10 +73,10 @@ impl BenchQuality {
         let indirect = self.trace(subject, size, Parts::Indirect, "Tracing indirect light")?;
         let picture = |film: &Film| Picture::new(size.x, size.y, film.picture());
         let (direct_picture, indirect_picture) = (picture(&direct)?, picture(&indirect)?);
-        let exposure = exposure(&sum(&direct_picture, &indirect_picture));
+        let own = || lumencast_picture::exposure(&sum(&direct_picture, &indirect_picture));
         let told = Told {
             samples: self.reference_spp,
-            noise_psnr: noise_psnr(&direct, &indirect, exposure),
+            noise_psnr: noise_psnr(&direct, &indirect, exposure.unwrap_or_else(own)),
             seconds: start.elapsed().as_secs_f64(),
         };
         let reference = Reference { direct: direct_picture, indirect: indirect_picture, told };

@@ -14,7 +14,7 @@ pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
     let mut text = format!("# {}: how near a client's pictures come\n\n", report.scene);
     text += &report.text();
     text += "\nLight: an update of 512 samples a probe, or a path a pixel. Picture: drawing it, or \
-             denoising it.\n\n## Pictures\n\nAs they are judged: codes v^(1/2.2), clamped. Below each \
+             denoising it; BMFR's pictures end at white.\n\n## Pictures\n\nAs they are judged: codes v^(1/2.2), clamped. Below each \
              its FLIP difference from the reference, black where there is none.\n\n";
     write_pictures(report, folder)?;
     text += &gallery(report);
@@ -73,8 +73,8 @@ fn plots(rows: &[AtResolution]) -> [Plot; 2] {
         from_zero: true,
         series: vec![
             series(&format!("{name}: update and drawing"), of_field(milliseconds)),
-            series("its update alone", of_field(|row| 1e3 * row.light_seconds)),
             series("1 spp, BMFR", of_baseline(milliseconds)),
+            series(&format!("{name}: update alone"), of_field(|row| 1e3 * row.light_seconds)),
         ],
     };
     let quality = Plot {
