@@ -86,31 +86,9 @@ pub(crate) struct Deformer {
 
 impl Deformer {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let of_compute = |(binding, ty)| wgpu::BindGroupLayoutEntry {
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ..bindings::entry(binding, ty)
-        };
-        let read = [bindings::UNIFORM].into_iter().chain([bindings::STORAGE; 5]);
-        let types = read.chain([bindings::WRITTEN]);
-        let entries: Vec<_> = (0..).zip(types).map(of_compute).collect();
-        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("deform"),
-            entries: &entries,
-        });
-        let pipeline_layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("deform"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let module = gpu.shader("deform", deform());
-        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("deform"),
-            layout: Some(&pipeline_layout),
-            module: &module,
-            entry_point: Some("deform_vertices"),
-            compilation_options: Default::default(),
-            cache: None,
-        });
+        use bindings::{STORAGE, UNIFORM, WRITTEN};
+        let types = [UNIFORM, STORAGE, STORAGE, STORAGE, STORAGE, STORAGE, WRITTEN];
+        let (layout, pipeline) = gpu.compute("deform", deform(), "deform_vertices", &types);
         Self { layout, pipeline }
     }
 

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::UVec2;
 
 use crate::ShadeError;
+use crate::bindings::entry;
 
 /// What colours are drawn in before they are shown: linear, pre-exposed.
 pub(crate) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -188,6 +189,41 @@ impl Gpu {
             label: Some(label),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         })
+    }
+
+    /// A pipeline that computes, and the layout of its one group, whose bindings are of these types.
+    pub(crate) fn compute(
+        &self,
+        label: &str,
+        source: String,
+        entry_point: &str,
+        types: &[wgpu::BindingType],
+    ) -> (wgpu::BindGroupLayout, wgpu::ComputePipeline) {
+        let module = self.shader(label, source);
+        let label = Some(label);
+        let visibility = wgpu::ShaderStages::COMPUTE;
+        let entries: Vec<_> = (0..)
+            .zip(types)
+            .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry { visibility, ..entry(binding, ty) })
+            .collect();
+        let layout = self.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label,
+            entries: &entries,
+        });
+        let pipeline_layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label,
+            layout: Some(&pipeline_layout),
+            module: &module,
+            entry_point: Some(entry_point),
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        (layout, pipeline)
     }
 
     /// A buffer with contents; of at least `least` bytes, since bindings may not be empty.

@@ -22,28 +22,8 @@ pub(crate) struct Meter {
 
 impl Meter {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let of_compute = |binding, ty| wgpu::BindGroupLayoutEntry {
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ..bindings::entry(binding, ty)
-        };
-        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("meter"),
-            entries: &[of_compute(0, bindings::PICTURE), of_compute(1, bindings::WRITTEN)],
-        });
-        let pipeline_layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("meter"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let module = gpu.shader("meter", meter());
-        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("meter"),
-            layout: Some(&pipeline_layout),
-            module: &module,
-            entry_point: Some("meter"),
-            compilation_options: Default::default(),
-            cache: None,
-        });
+        let types = [bindings::PICTURE, bindings::WRITTEN];
+        let (layout, pipeline) = gpu.compute("meter", meter(), "meter", &types);
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let histogram = gpu.buffer("histogram", usage, &[], SIZE);
         Self { layout, pipeline, histogram }

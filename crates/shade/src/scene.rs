@@ -127,6 +127,9 @@ impl GpuScene {
     /// Brings the vertices of deforming instances to this moment.
     fn deform(&mut self, gpu: &Gpu, snapshot: &Snapshot) {
         let mut before = std::mem::take(&mut self.deformed);
+        if snapshot.instances.iter().all(|instance| instance.deformation.is_none()) {
+            return;
+        }
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("deform"),
