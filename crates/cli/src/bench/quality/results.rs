@@ -6,6 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use lumencast_picture::{Picture, ToneMap};
 
+use super::field::UPDATE;
 use super::plot::{Plot, Series};
 use super::report::{AtResolution, Report, Row};
 
@@ -13,9 +14,12 @@ use super::report::{AtResolution, Report, Row};
 pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
     let mut text = format!("# {}: how near a client's pictures come\n\n", report.scene);
     text += &report.text();
-    text += "\nLight: an update of 512 samples a probe, or a path a pixel. Picture: drawing it, or \
-             denoising it; BMFR's pictures end at white.\n\n## Pictures\n\nAs they are judged: codes v^(1/2.2), clamped. Below each \
-             its FLIP difference from the reference, black where there is none.\n\n";
+    text += &format!(
+        "\nLight: an update of {UPDATE} samples a probe, or a path a pixel. Picture: drawing it, or \
+         denoising it; BMFR's pictures end at white.\n\n## Pictures\n\nAs they are judged: codes \
+         v^(1/2.2), clamped. Below each its FLIP difference from the reference, black where there is \
+         none.\n\n"
+    );
     write_pictures(report, folder)?;
     text += &gallery(report);
     if !report.resolutions.is_empty() {
