@@ -68,29 +68,50 @@ impl Grid {
     }
 }
 
-impl ProbeVolume {
-    /// Light at a world position on a surface with a world `normal` (zero in free space): trilinear
-    /// between the eight probes about the moved point, which is first clamped to the outermost
-    /// probes.
-    pub fn sample(&self, position: Vec3, normal: Vec3, offset: OffsetPolicy) -> Sh {
-        let cell = offset.cell_from_world(&self.grid, position, normal);
-        let last = (self.grid.resolution - 1).as_vec3();
-        // Positions that are not finite read the first probe.
-        let cell = if cell.is_finite() { cell.clamp(Vec3::ZERO, last) } else { Vec3::ZERO };
-        let low = cell.floor();
-        let t = cell - low;
+/// The probes that light at a point is read from: trilinear between the eight about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corners {
+    /// Indices of the probes; at the border one may stand here more than once.
+    pub probes: [usize; 8],
+    /// What each of them counts; together 1.
+    pub shares: [f32; 8],
+    /// Whether the point, moved along the normal, lies within the box; otherwise the outermost probes
+    /// stand in for it.
+    pub inside: bool,
+}
+
+impl Grid {
+    /// Where light is read for a point of a surface with a world `normal` (zero in free space).
+    /// Points that are not finite read the first probe.
+    pub fn corners(&self, position: Vec3, normal: Vec3, offset: OffsetPolicy) -> Corners {
+        let cell = offset.cell_from_world(self, position, normal);
+        let last = (self.resolution - 1).as_vec3();
+        let clamped = if cell.is_finite() { cell.clamp(Vec3::ZERO, last) } else { Vec3::ZERO };
+        let low = clamped.floor();
+        let t = clamped - low;
         let (low, high) = (low.as_uvec3(), (low + 1.0).min(last).as_uvec3());
+        let far = |corner: usize, axis: usize| corner >> axis & 1 != 0;
+        let pick = |corner, axis: usize| if far(corner, axis) { high[axis] } else { low[axis] };
+        let share = |corner, axis: usize| if far(corner, axis) { t[axis] } else { 1.0 - t[axis] };
+        Corners {
+            probes: std::array::from_fn(|c| {
+                self.index(UVec3::new(pick(c, 0), pick(c, 1), pick(c, 2)))
+            }),
+            shares: std::array::from_fn(|c| share(c, 0) * share(c, 1) * share(c, 2)),
+            inside: cell.cmpge(Vec3::splat(-0.5)).all() && cell.cmple(last + 0.5).all(),
+        }
+    }
+}
+
+impl ProbeVolume {
+    /// Light at a world position on a surface with a world `normal` (zero in free space), read as
+    /// [`Grid::corners`] says.
+    pub fn sample(&self, position: Vec3, normal: Vec3, offset: OffsetPolicy) -> Sh {
+        let Corners { probes, shares, .. } = self.grid.corners(position, normal, offset);
         let mut light = Sh::dark(self.order);
-        for corner in 0..8_u32 {
-            let far = [corner & 1 != 0, corner & 2 != 0, corner & 4 != 0];
-            let pick = |axis: usize| if far[axis] { high[axis] } else { low[axis] };
-            let share = |axis: usize| if far[axis] { t[axis] } else { 1.0 - t[axis] };
-            let weight = share(0) * share(1) * share(2);
-            if weight > 0.0 {
-                let index = self.grid.index(UVec3::new(pick(0), pick(1), pick(2)));
-                for (sum, c) in light.coefficients.iter_mut().zip(self.probe(index)) {
-                    *sum += *c * weight;
-                }
+        for (probe, share) in probes.into_iter().zip(shares).filter(|(_, share)| *share > 0.0) {
+            for (sum, c) in light.coefficients.iter_mut().zip(self.probe(probe)) {
+                *sum += *c * share;
             }
         }
         light

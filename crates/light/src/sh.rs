@@ -103,8 +103,15 @@ pub fn basis(order: Order, d: Vec3) -> [f32; MAX_COEFFICIENTS] {
     b
 }
 
+/// What irradiance on a surface with the unit vector `normal` takes of each coefficient.
+pub fn cosine_basis(order: Order, normal: Vec3) -> [f32; MAX_COEFFICIENTS] {
+    let mut basis = basis(order, normal);
+    basis.iter_mut().zip(BAND).for_each(|(b, l)| *b *= COSINE[l]);
+    basis
+}
+
 /// The band l of each coefficient.
-pub(crate) const BAND: [usize; MAX_COEFFICIENTS] = {
+pub const BAND: [usize; MAX_COEFFICIENTS] = {
     let mut band = [0; MAX_COEFFICIENTS];
     let mut i = 1;
     while i < MAX_COEFFICIENTS {
@@ -165,8 +172,7 @@ impl Sh {
     /// Irradiance on a surface with the unit vector `normal`, lux. Reflected by a Lambert surface
     /// of albedo ρ it is the radiance ρ/π times this.
     pub fn irradiance(&self, normal: Vec3) -> Vec3 {
-        let basis = basis(self.order, normal);
-        self.values().iter().zip(basis).zip(BAND).map(|((c, b), l)| *c * (b * COSINE[l])).sum()
+        self.values().iter().zip(cosine_basis(self.order, normal)).map(|(c, b)| *c * b).sum()
     }
 
     /// Adds `weight` times `other`, whose order may be another; the higher one holds.
