@@ -97,15 +97,27 @@ impl History {
         self.receivers[receiver].ratio = ratio.clamp(f32::MIN_POSITIVE, 1.0);
     }
 
+    /// Forgets all that is known of one receiver.
+    pub fn forget(&mut self, receiver: usize) {
+        let ladder = &mut self.receivers[receiver];
+        *ladder = Ladder::new(ladder.ratio, ladder.coefficients());
+    }
+
     /// Takes an update, one entry a receiver in order. Entries without samples, or with numbers that
     /// are not finite, change nothing.
     pub fn update(&mut self, sums: &[Sums]) {
+        self.update_at(0..self.len(), sums);
+    }
+
+    /// Takes an update of the receivers with these numbers, one entry each.
+    pub fn update_at(&mut self, receivers: impl IntoIterator<Item = usize>, sums: &[Sums]) {
         let mut significance = self.settings.significance;
         if self.expecting > 0 && significance.is_finite() {
             significance = significance.min(EXPECTED);
         }
         self.expecting = self.expecting.saturating_sub(1);
-        for (ladder, sums) in self.receivers.iter_mut().zip(sums) {
+        for (receiver, sums) in receivers.into_iter().zip(sums) {
+            let ladder = &mut self.receivers[receiver];
             if let Some(update) = Update::new(sums, ladder.coefficients()) {
                 ladder.update(&update, significance);
             }

@@ -6,6 +6,7 @@
 mod accel;
 pub mod blend;
 mod bsdf;
+pub mod fit;
 mod lights;
 pub mod measure;
 pub mod path_trace;
@@ -43,13 +44,15 @@ pub struct Job {
     /// Asks for [`Sums::distances`]: up to how many metres a distance counts. What is farther, or
     /// nowhere, counts as so far.
     pub distances: Option<f32>,
+    /// Asks for [`Sums::surfaces`].
+    pub surfaces: bool,
     /// Rotates the lattice and seeds the sampler: another tick, other directions. Results depend on
     /// it and on the receivers, never on the number of threads.
     pub seed: u64,
 }
 
 impl Job {
-    /// A job of L2 with three bounces, without clamp, distances, or light from before.
+    /// A job of L2 with three bounces, without clamp, distances, surfaces, or light from before.
     pub fn new(scene: Arc<Snapshot>, receivers: impl Into<Arc<[Receiver]>>) -> Self {
         Self {
             scene,
@@ -59,6 +62,7 @@ impl Job {
             bounces: 3,
             clamp: f32::INFINITY,
             distances: None,
+            surfaces: false,
             seed: 0,
         }
     }
@@ -128,6 +132,8 @@ pub struct Sums {
     /// Sums over samples of terms times the distance to the first surface, and times its square
     /// (metres, square metres); empty unless [`Job::distances`] asks for them.
     pub distances: Vec<[f32; 2]>,
+    /// The surface that each sample met first, if any; empty unless [`Job::surfaces`] asks for them.
+    pub surfaces: Vec<Option<SurfacePoint>>,
 }
 
 impl Sums {
@@ -135,6 +141,17 @@ impl Sums {
     pub fn mean(&self) -> impl Iterator<Item = Vec3> + '_ {
         self.sum.iter().map(|sum| sum / self.count as f32)
     }
+}
+
+/// A point of a surface, as it is seen from somewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// World, metres.
+    pub position: Vec3,
+    /// World unit normal of the triangle, on the side that is seen.
+    pub normal: Vec3,
+    /// Whether that side is the triangle's front, by its winding, whatever its material shows.
+    pub front: bool,
 }
 
 /// A submitted job.

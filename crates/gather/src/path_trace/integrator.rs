@@ -48,13 +48,23 @@ pub(crate) struct Seen {
     pub(crate) indirect: Vec3,
     /// Metres to the first surface; infinite where there is none.
     pub(crate) distance: f32,
+    /// Unit normal of the first surface on the side that is seen; zero where there is none.
+    pub(crate) normal: Vec3,
+    /// The first surface is seen from its front.
+    pub(crate) front: bool,
     /// The first surface shows a back that nobody is meant to see.
     pub(crate) back: bool,
 }
 
 impl Seen {
-    const NOTHING: Self =
-        Self { direct: Vec3::ZERO, indirect: Vec3::ZERO, distance: f32::INFINITY, back: false };
+    const NOTHING: Self = Self {
+        direct: Vec3::ZERO,
+        indirect: Vec3::ZERO,
+        distance: f32::INFINITY,
+        normal: Vec3::ZERO,
+        front: false,
+        back: false,
+    };
 
     /// Arriving radiance, cd/m².
     pub(crate) fn radiance(&self) -> Vec3 {

@@ -7,9 +7,9 @@ use lumencast_light::sh;
 use rayon::prelude::*;
 
 use super::aim::Aim;
-use super::integrator::{Integrator, Paths};
+use super::integrator::{Integrator, Look, Paths};
 use crate::world::World;
-use crate::{Job, Sums};
+use crate::{Job, Sums, SurfacePoint};
 
 /// Samples of one receiver that a thread takes at a time. Sums are grouped by it, so results do not
 /// depend on how many threads there are.
@@ -37,6 +37,7 @@ struct TileSums {
     squares: [Vec3; sh::MAX_COEFFICIENTS],
     /// Of distances and their squares.
     distances: [Vec2; sh::MAX_COEFFICIENTS],
+    surfaces: Vec<Option<SurfacePoint>>,
     backs: u32,
     rays: u64,
 }
@@ -98,6 +99,7 @@ fn trace(job: &Job, tile: &Tile, integrator: &mut Integrator<'_>) -> TileSums {
         sum: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
         squares: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
         distances: [Vec2::ZERO; sh::MAX_COEFFICIENTS],
+        surfaces: Vec::new(),
         backs: 0,
         rays: 0,
     };
@@ -117,6 +119,14 @@ fn trace(job: &Job, tile: &Tile, integrator: &mut Integrator<'_>) -> TileSums {
             for (sum, factor) in t.distances.iter_mut().zip(terms) {
                 *sum += *factor * Vec2::new(distance, distance * distance);
             }
+        }
+        if job.surfaces {
+            let Look { origin, direction, .. } = aim.look(sample);
+            t.surfaces.push((seen.normal != Vec3::ZERO).then(|| SurfacePoint {
+                position: origin + seen.distance * direction,
+                normal: seen.normal,
+                front: seen.front,
+            }));
         }
         t.backs += u32::from(seen.back);
     }
@@ -141,5 +151,6 @@ fn reduce(job: &Job, terms: usize, tiles: &[(u32, &TileSums)]) -> Sums {
         count,
         back_face_fraction: backs as f32 / count.max(1) as f32,
         distances: job.distances.map_or_else(Vec::new, |_| (0..terms).map(distances).collect()),
+        surfaces: tiles.iter().flat_map(|(_, t)| &t.surfaces).copied().collect(),
     }
 }

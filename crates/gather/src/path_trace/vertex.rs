@@ -41,6 +41,8 @@ impl Shader<'_> {
         let point = world.point(hit, path.segment.ray.direction)?;
         if depth == 0 {
             path.seen.distance = hit.t;
+            path.seen.normal = point.normal;
+            path.seen.front = point.front;
             path.seen.back = !point.front && !point.material.double_sided;
         }
         let emitted = path.throughput * self.emission(&point, &path.segment);
