@@ -12,7 +12,7 @@ use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, MaterialModel, Options};
 use lumencast_light::{Grid, OffsetPolicy, Order};
 use lumencast_scene::{Edit, Scene, Script, VolumeSpec};
-use lumencast_server::{GatherOptions, SampleRange, TickOptions};
+use lumencast_server::{FitOptions, GatherOptions, SampleRange, TickOptions};
 use lumencast_shade::Occlusion;
 
 use crate::environment::EnvironmentArgument;
@@ -85,11 +85,15 @@ pub(crate) struct GatherArguments {
     /// How surfaces reflect: as their materials say, or all as opaque two-sided Lambert.
     #[arg(long, value_enum, default_value_t = Materials::Full)]
     pub(crate) materials: Materials,
+    #[command(flatten)]
+    pub(crate) fit: FitArguments,
 }
 
 impl GatherArguments {
-    pub(crate) fn options(&self, blend: BlendSettings) -> GatherOptions {
-        GatherOptions { bounces: self.bounces, clamp: self.clamp, blend }
+    /// Of a server, whose clients read volumes at `offset`.
+    fn options(&self, blend: BlendSettings, offset: OffsetPolicy) -> GatherOptions {
+        let fit = self.fit.options(SERVED_POINTS, offset);
+        GatherOptions { bounces: self.bounces, clamp: self.clamp, blend, fit }
     }
 
     /// What computes the light, for the catalog.
@@ -101,6 +105,27 @@ impl GatherArguments {
         let options = Options { materials: self.materials.model(), threads: None };
         let tracer = CpuPathTracer::new(options).context("cannot start the threads that trace")?;
         Ok(Box::new(tracer))
+    }
+}
+
+/// Points a probe unless told otherwise: of a server, and of light that is computed once.
+const SERVED_POINTS: u32 = 0;
+pub(crate) const BAKED_POINTS: u32 = 256;
+
+/// Whether probes are fitted to surfaces.
+#[derive(Debug, Args)]
+pub(crate) struct FitArguments {
+    /// Fits probes to the surfaces about them, so that light leaks through no walls: so many points of
+    /// surfaces a probe, 0 to leave probes with what arrives at them. Takes as many samples again.
+    #[arg(long, value_name = "POINTS", value_parser = clap::value_parser!(u32).range(0..=4096))]
+    fit: Option<u32>,
+}
+
+impl FitArguments {
+    /// For clients that read volumes at `offset`.
+    pub(crate) fn options(&self, points: u32, offset: OffsetPolicy) -> Option<FitOptions> {
+        let points = self.fit.unwrap_or(points);
+        (points > 0).then_some(FitOptions { points, offset })
     }
 }
 
@@ -136,13 +161,14 @@ impl TickArguments {
         scene: &Scene,
         volumes: &SceneArguments,
         gather: &GatherArguments,
+        offset: OffsetPolicy,
     ) -> Result<TickOptions> {
         let blend = BlendSettings { ratio: self.ratio, significance: self.significance };
         let feedback = if self.feedback { ", feedback" } else { "" };
         Ok(TickOptions {
             period: 1.0 / self.rate,
             samples: self.samples,
-            gather: gather.options(blend),
+            gather: gather.options(blend, offset),
             feedback: self.feedback,
             volumes: volumes.volumes(scene)?,
             script: self.edits.as_deref().map(read_script).transpose()?,

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 use lumencast_codec::{Epoch, LightFile, SceneInfo, UpdateInfo};
-use lumencast_gather::blend::BlendSettings;
+use lumencast_light::OffsetPolicy;
+use lumencast_server::GatherOptions;
 use serde_json::json;
 
-use crate::arguments::{GatherArguments, SceneArguments};
+use crate::arguments::{BAKED_POINTS, GatherArguments, SceneArguments, parse_offset};
 use crate::output;
 
 /// Computes a scene's light until it has converged and writes it to a file.
@@ -31,6 +32,9 @@ pub(crate) struct Bake {
     /// Samples a probe: four times as many halve the noise.
     #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     samples: u32,
+    /// Where in front of a surface clients will read the field: none, half-cell or metres.
+    #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
+    offset: OffsetPolicy,
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
@@ -43,13 +47,19 @@ impl Bake {
         let volumes = self.scene.volumes(&scene)?;
         let snapshot = scene.snapshot();
         let mut gatherer = self.gather.gatherer()?;
+        let options = GatherOptions {
+            bounces: self.gather.bounces,
+            clamp: self.gather.clamp,
+            fit: self.gather.fit.options(BAKED_POINTS, self.offset),
+            ..GatherOptions::default()
+        };
         let bar = output::bar(1000, "Baking");
         let light = lumencast_server::bake(
             &snapshot,
             &volumes,
             &mut *gatherer,
             self.samples,
-            self.gather.options(BlendSettings::default()),
+            options,
             |done| bar.set_position((done * 1000.0) as u64),
         );
         bar.finish_and_clear();

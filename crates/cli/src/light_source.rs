@@ -9,7 +9,7 @@ use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::ProbeVolume;
 use lumencast_scene::{Scene, Snapshot, VolumeSpec};
-use lumencast_server::GatherOptions;
+use lumencast_server::{FitOptions, GatherOptions};
 
 use crate::{output, remote};
 
@@ -46,6 +46,8 @@ pub(crate) struct Computed {
     pub(crate) bounces: u32,
     /// Upper limit of one path vertex's contribution, cd/m².
     pub(crate) clamp: f32,
+    /// Whether probes are fitted to surfaces.
+    pub(crate) fit: Option<FitOptions>,
     pub(crate) tracing: Options,
 }
 
@@ -62,6 +64,7 @@ impl Computed {
             bounces: self.bounces,
             clamp: self.clamp,
             blend: BlendSettings::default(),
+            fit: self.fit,
         };
         let bar = output::share_bar("Computing the light field");
         let progress =

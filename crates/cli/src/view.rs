@@ -176,7 +176,7 @@ impl View {
         let replica = scene.pristine(0.0);
         let loopback = std::net::SocketAddr::from(([127, 0, 0, 1], 0));
         let mut config = ServerConfig::new(lumencast_transport::ServerConfig::new(loopback));
-        config.tick = self.tick.options(&scene, &self.scene, &self.gather)?;
+        config.tick = self.tick.options(&scene, &self.scene, &self.gather, self.offset)?;
         let gatherer = self.gather.gatherer()?;
         let (address, running) = runtime.block_on(async {
             let server = Server::bind(scene, gatherer, config).await?;

@@ -6,11 +6,12 @@ use glam::{IVec3, Vec3};
 use lumencast_codec::{self as codec, EncodedRegion, ProbeEncoder, UpdateInfo, limits};
 use lumencast_gather::blend::{BlendSettings, History};
 use lumencast_gather::{Gathered, Job, Receiver};
-use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
+use lumencast_light::{LightField, ProbeVolume, VolumeId};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
-use crate::tick::GatherOptions;
+use crate::surfaces::Surfaces;
+use crate::tick::{FitOptions, GatherOptions};
 use crate::walls::Buried;
 
 /// A volume with all that turns sums into frames.
@@ -18,11 +19,14 @@ use crate::walls::Buried;
 /// Costs, in memory, for a probe of L2: 108 bytes of published light, twice that of
 /// reconstructions, and 432 of history.
 pub(crate) struct Field {
-    /// What is published: the history's estimates, with probes inside walls filled in.
+    /// What arrives at the probes: the history's estimates, with probes inside walls filled in.
+    arriving: ProbeVolume,
+    /// What is published: the same, or fitted to surfaces.
     volume: ProbeVolume,
     positions: Vec<Vec3>,
     history: History,
     buried: Buried,
+    surfaces: Option<Surfaces>,
     encoder: ProbeEncoder,
     /// Number of the next update.
     update: u64,
@@ -34,18 +38,26 @@ impl Field {
     pub(crate) fn all(
         volumes: &[VolumeSpec],
         blend: BlendSettings,
+        fit: Option<FitOptions>,
     ) -> Result<Vec<Self>, ServerError> {
-        let new =
-            |(id, spec): (u32, VolumeSpec)| Self::new(VolumeId(id), spec.grid, spec.order, blend);
+        let new = |(id, spec)| Self::new(VolumeId(id), spec, blend, fit);
         Ok((0..).zip(pieces(volumes)?).map(new).collect())
     }
 
-    fn new(id: VolumeId, grid: Grid, order: Order, blend: BlendSettings) -> Self {
+    fn new(
+        id: VolumeId,
+        VolumeSpec { grid, order }: VolumeSpec,
+        blend: BlendSettings,
+        fit: Option<FitOptions>,
+    ) -> Self {
+        let dark = ProbeVolume::dark(id, grid, order);
         Self {
-            volume: ProbeVolume::dark(id, grid, order),
+            arriving: dark.clone(),
+            volume: dark,
             positions: grid.positions().collect(),
             history: History::new(blend, grid.probe_count(), order.coefficients()),
             buried: Buried::new(grid.probe_count()),
+            surfaces: fit.map(|fit| Surfaces::new(fit, blend, grid.probe_count())),
             encoder: ProbeEncoder::new(grid.resolution, order),
             update: 0,
         }
@@ -93,9 +105,23 @@ impl Field {
         self.buried.count()
     }
 
-    /// What to gather for every probe.
+    /// What to ask for before [`Self::job`], so that it knows of the surfaces: only where probes are
+    /// fitted, and the scene is another one.
+    pub(crate) fn look(&self, scene: &Arc<Snapshot>) -> Option<Job> {
+        self.surfaces.as_ref()?.look(scene, &self.positions)
+    }
+
+    /// Takes in what a look has found.
+    pub(crate) fn found(&mut self, gathered: &Gathered) {
+        let cell = self.volume.grid.spacing().min_element();
+        if let Some(surfaces) = &mut self.surfaces {
+            surfaces.found(&gathered.sums, gathered.scene_version, cell);
+        }
+    }
+
+    /// What to gather for every probe, and for the surfaces about them.
     pub(crate) fn job(
-        &self,
+        &mut self,
         scene: Arc<Snapshot>,
         previous: Option<Arc<LightField>>,
         samples: u32,
@@ -103,7 +129,10 @@ impl Field {
         seed: u64,
     ) -> Job {
         let probe = |&position: &Vec3| Receiver::probe(position, samples);
-        let receivers: Vec<_> = self.positions.iter().map(probe).collect();
+        let mut receivers: Vec<_> = self.positions.iter().map(probe).collect();
+        if let Some(surfaces) = &mut self.surfaces {
+            receivers.extend(surfaces.receivers(samples));
+        }
         let GatherOptions { bounces, clamp, .. } = options;
         let order = self.volume.order;
         Job { previous, order, bounces, clamp, seed, ..Job::new(scene, receivers) }
@@ -112,16 +141,30 @@ impl Field {
     /// The scene was edited: light may be another from now on.
     pub(crate) fn expect_change(&mut self) {
         self.history.expect_change();
+        self.surfaces.iter_mut().for_each(Surfaces::expect_change);
     }
 
-    /// Blends new light into the history and brings up to date what is to be published.
+    /// Blends new light into the histories.
     pub(crate) fn blend(&mut self, gathered: &Gathered) {
-        self.history.update(&gathered.sums);
+        let (probes, points) = gathered.sums.split_at(self.positions.len());
+        self.history.update(probes);
         for probe in 0..self.history.len() {
-            self.volume.probe_mut(probe).copy_from_slice(self.history.coefficients(probe));
+            self.arriving.probe_mut(probe).copy_from_slice(self.history.coefficients(probe));
         }
-        self.buried.record(gathered.sums.iter().map(|sums| sums.back_face_fraction));
-        self.buried.fill(&mut self.volume);
+        self.buried.record(probes.iter().map(|sums| sums.back_face_fraction));
+        self.buried.fill(&mut self.arriving);
+        if let Some(surfaces) = &mut self.surfaces {
+            surfaces.blend(points);
+        }
+    }
+
+    /// Brings up to date what is to be published. Where probes are fitted, it takes the effort of so
+    /// many rounds of so many steps.
+    pub(crate) fn publish(&mut self, effort: (u32, u32)) {
+        match &self.surfaces {
+            Some(surfaces) => surfaces.fit(&mut self.volume, &self.arriving, effort),
+            None => self.volume.coefficients.copy_from_slice(&self.arriving.coefficients),
+        }
     }
 
     /// The frames of the regions that somebody watches.

@@ -20,6 +20,7 @@ mod page;
 mod publish;
 mod report;
 mod server;
+mod surfaces;
 mod tick;
 mod walls;
 
@@ -32,4 +33,4 @@ pub use page::is_embedded as page_is_embedded;
 pub use publish::Outlet;
 pub use report::{Report, Stage};
 pub use server::{Server, ServerConfig};
-pub use tick::{GatherOptions, Tick, TickOptions};
+pub use tick::{FitOptions, GatherOptions, Tick, TickOptions};

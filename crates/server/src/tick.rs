@@ -10,7 +10,7 @@ use lumencast_codec::{
 };
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::{Gather, Gathered};
-use lumencast_light::{LightField, ProbeVolume};
+use lumencast_light::{LightField, OffsetPolicy, ProbeVolume};
 use lumencast_scene::{Edit, Environment, InstanceSource, Scene, Script, Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
@@ -64,14 +64,30 @@ pub struct GatherOptions {
     pub clamp: f32,
     /// How updates are blended over time.
     pub blend: BlendSettings,
+    /// Whether, and how, probes are fitted to the surfaces about them; otherwise they hold the light
+    /// that arrives at them.
+    pub fit: Option<FitOptions>,
 }
 
 impl Default for GatherOptions {
     fn default() -> Self {
-        Self { bounces: 3, clamp: f32::INFINITY, blend: BlendSettings::default() }
+        Self { bounces: 3, clamp: f32::INFINITY, blend: BlendSettings::default(), fit: None }
     }
 }
 
+/// How probes are fitted to surfaces ([`lumencast_gather::fit`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitOptions {
+    /// Directions a probe in which points of surfaces are looked for, at least 1; fewer where a volume
+    /// has so many probes that there would be more than a million points. Gathering at them takes as
+    /// many samples as gathering at the probes, in all.
+    pub points: u32,
+    /// Where clients read the volumes.
+    pub offset: OffsetPolicy,
+}
+
+/// Rounds and steps of a tick's fit, which goes on from the last one's.
+const FIT_EFFORT: (u32, u32) = (1, 4);
 /// A snapshot of the scene goes out at least every so many ticks, for those who join.
 const SNAPSHOT_EVERY: u64 = 64;
 /// Ticks from one catalog to the next at least: light that flickers is not to fill slow links with
@@ -125,7 +141,7 @@ impl Tick {
         }
         let volumes =
             if options.volumes.is_empty() { scene.volumes() } else { options.volumes.clone() };
-        let fields = Field::all(&volumes, options.gather.blend)?;
+        let fields = Field::all(&volumes, options.gather.blend, options.gather.fit)?;
         let told_scales = fields.iter().map(Field::scale_log2).collect();
         let budget = Budget::new(options.period, options.samples);
         let last = Report::default();
@@ -210,6 +226,7 @@ impl Tick {
 
         for (field, gathered) in self.fields.iter_mut().zip(&gathered) {
             field.blend(gathered);
+            field.publish(FIT_EFFORT);
         }
         report.seconds[Stage::Blend as usize] = watch.lap();
 
@@ -280,11 +297,12 @@ impl Tick {
 
     /// Light for every field, all fields' jobs under way at once.
     fn gather(&mut self, scene: &Arc<Snapshot>) -> Vec<Gathered> {
+        look(&mut self.fields, &mut *self.gatherer, scene);
         let samples = self.budget.samples();
         let previous = self.options.feedback.then(|| Arc::new(self.light()));
         let tickets: Vec<_> = self
             .fields
-            .iter()
+            .iter_mut()
             .map(|field| {
                 let seed = self.number << 8 | u64::from(field.id().0);
                 let job =
@@ -369,6 +387,17 @@ impl Tick {
         self.last_now = Some(now);
         self.last = report.clone();
         report
+    }
+}
+
+/// Lets the fields that want to know find the scene's surfaces.
+pub(crate) fn look(fields: &mut [Field], gatherer: &mut dyn Gather, scene: &Arc<Snapshot>) {
+    let tickets: Vec<_> =
+        fields.iter().map(|field| Some(gatherer.submit(field.look(scene)?))).collect();
+    for (field, ticket) in fields.iter_mut().zip(tickets) {
+        if let Some(found) = ticket.and_then(|ticket| gatherer.wait(ticket)) {
+            field.found(&found);
+        }
     }
 }
 

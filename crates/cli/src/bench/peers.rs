@@ -16,7 +16,7 @@ use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading};
 use serde_json::{Value, json};
 
 use super::{cells, draw};
-use crate::arguments::{SceneArguments, parse_offset};
+use crate::arguments::{FitArguments, SceneArguments, parse_offset};
 use crate::camera;
 use crate::light_source::Computed;
 use crate::output;
@@ -57,6 +57,8 @@ pub(crate) struct BenchPeers {
     /// Where in front of a surface the field is read: none, half-cell or metres.
     #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
     offset: OffsetPolicy,
+    #[command(flatten)]
+    fit: FitArguments,
     /// Samples a probe.
     #[arg(long, value_name = "N", default_value_t = PROBE_SAMPLES,
           value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
@@ -115,7 +117,8 @@ impl BenchPeers {
     fn light(&self, snapshot: &Arc<Snapshot>, grid: VolumeSpec) -> Result<LightField> {
         let tracing = Options { materials: MaterialModel::Lambert, threads: None };
         let (samples, bounces) = (self.probe_samples, self.bounces);
-        let computed = Computed { samples, bounces, clamp: f32::INFINITY, tracing };
+        let fit = self.fit.options(0, self.offset);
+        let computed = Computed { samples, bounces, clamp: f32::INFINITY, fit, tracing };
         Ok(LightField::new(computed.volumes(snapshot, &[grid])?))
     }
 

@@ -12,7 +12,9 @@ use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadow
 use serde_json::json;
 
 use super::{Lighting, PartsArgument, Render};
-use crate::arguments::{occlusion, parse_occlusion, parse_offset, parse_positive};
+use crate::arguments::{
+    BAKED_POINTS, FitArguments, occlusion, parse_occlusion, parse_offset, parse_positive,
+};
 use crate::light_source::{self, Computed};
 use crate::output;
 
@@ -38,6 +40,8 @@ pub(crate) struct RasterArguments {
     /// Where in front of a surface the field is read: none, half-cell or metres.
     #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
     offset: OffsetPolicy,
+    #[command(flatten)]
+    fit: FitArguments,
     /// Takes ringing out of the field by a Hann window that ends at this band; 3 leaves order 2 a
     /// quarter of its band 2. None unless given.
     #[arg(long, value_name = "BAND", value_parser = parse_positive)]
@@ -164,6 +168,7 @@ impl Render {
             samples: self.raster.probe_samples,
             bounces: self.picture.bounces.saturating_sub(1),
             clamp: self.clamp,
+            fit: self.raster.fit.options(BAKED_POINTS, self.raster.offset),
             tracing: self.picture.tracing(),
         };
         computed.volumes(&scene.snapshot(), &specs)

@@ -33,12 +33,15 @@ impl BenchQuality {
         bounces: u32,
     ) -> Result<Field> {
         let (samples, clamp) = (self.probe_samples, self.clamp);
-        let computed = Computed { samples, bounces, clamp, tracing: self.picture.tracing() };
+        let fit = self.fit.options(0, self.offset);
+        let how = if fit.is_some() { ", fitted" } else { "" };
+        let tracing = self.picture.tracing();
+        let computed = Computed { samples, bounces, clamp, fit, tracing };
         let start = Instant::now();
         let light = LightField::new(computed.volumes(&subject.snapshot, &[spec])?);
         let seconds = start.elapsed().as_secs_f64();
         Ok(Field {
-            name: format!("{} L{} {bounces} bounces", cells(&spec), u8::from(spec.order)),
+            name: format!("{} L{} {bounces} bounces{how}", cells(&spec), u8::from(spec.order)),
             light,
             probes: spec.grid.probe_count(),
             update_seconds: seconds * f64::from(UPDATE) / f64::from(samples),

@@ -19,7 +19,7 @@ use lumencast_picture::Picture;
 use lumencast_scene::{Scene, Snapshot, View, VolumeSpec};
 use lumencast_shade::{Gpu, Renderer, Settings, Shading, Shadows};
 
-use crate::arguments::{SceneArguments, parse_offset, parse_positive};
+use crate::arguments::{FitArguments, SceneArguments, parse_offset, parse_positive};
 use crate::camera::{self, PictureArguments};
 use crate::output;
 use field::{Canvas, Field};
@@ -85,6 +85,8 @@ pub(crate) struct BenchQuality {
     /// Where in front of a surface the field is read: none, half-cell or metres.
     #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
     offset: OffsetPolicy,
+    #[command(flatten)]
+    fit: FitArguments,
     /// Keeps the references in this folder, and takes them from there the next time.
     #[arg(long, value_name = "FOLDER")]
     keep: Option<PathBuf>,

@@ -1,0 +1,125 @@
+//! The surfaces about a volume, to which its probes are fitted.
+
+use std::sync::Arc;
+
+use lumencast_gather::blend::{BlendSettings, History};
+use lumencast_gather::fit::{FitSettings, Surroundings};
+use lumencast_gather::{Job, Receiver, Sums, SurfacePoint};
+use lumencast_light::ProbeVolume;
+use lumencast_scene::Snapshot;
+
+use crate::tick::FitOptions;
+
+/// What a point's light is known from begins anew when the point has moved by more than this share of
+/// a cell, or its normal turned by more than the angle of this cosine.
+const MOVED: f32 = 0.1;
+const TURNED: f32 = 0.95;
+/// The directions in which surfaces are looked for are always the same, so that points stay where
+/// nothing moves.
+const SEED: u64 = 0x5f17;
+/// Points of a volume, at most; where it has many probes, each has the fewer. They cost a kilobyte
+/// each.
+const MOST_POINTS: usize = 1 << 20;
+/// Samples that a point takes at a time, at least: with fewer for all of them, points take turns.
+const SAMPLES_A_TURN: u32 = 4;
+
+/// Points of surfaces, with what is known of the light there.
+pub(crate) struct Surfaces {
+    options: FitOptions,
+    around: Surroundings,
+    /// Where the points were when their histories began.
+    began: Vec<Option<SurfacePoint>>,
+    history: History,
+    /// The points that the job under way gathers at.
+    gathered: Vec<usize>,
+    /// [`Snapshot::version`] of the scene that was looked at.
+    seen: Option<u64>,
+    /// Number of the next turn.
+    turn: usize,
+}
+
+impl Surfaces {
+    pub(crate) fn new(options: FitOptions, blend: BlendSettings, probes: usize) -> Self {
+        let each = (options.points as usize).min(MOST_POINTS / probes.max(1)).max(1);
+        let points = probes * each;
+        Self {
+            options: FitOptions { points: each as u32, ..options },
+            around: Surroundings::default(),
+            began: vec![None; points],
+            history: History::new(blend, points, 1),
+            gathered: Vec::new(),
+            seen: None,
+            turn: 0,
+        }
+    }
+
+    /// What to ask for to find the surfaces of a scene; `None` while it is the one that was seen.
+    pub(crate) fn look(&self, scene: &Arc<Snapshot>, probes: &[glam::Vec3]) -> Option<Job> {
+        let probe = |position: &glam::Vec3| Receiver::probe(*position, self.options.points);
+        (self.seen != Some(scene.version)).then(|| Job {
+            bounces: 0,
+            surfaces: true,
+            seed: SEED,
+            ..Job::new(scene.clone(), probes.iter().map(probe).collect::<Vec<_>>())
+        })
+    }
+
+    /// Takes in what a look has found. `cell` is the shortest side of a cell, metres.
+    pub(crate) fn found(&mut self, sums: &[Sums], scene_version: u64, cell: f32) {
+        self.around = Surroundings::new(sums);
+        self.seen = Some(scene_version);
+        for (number, now) in self.around.points().iter().enumerate() {
+            let same = match (self.began[number], now) {
+                (Some(was), Some(now)) => {
+                    was.position.distance(now.position) <= MOVED * cell
+                        && was.normal.dot(now.normal) >= TURNED
+                }
+                (was, now) => was.is_none() && now.is_none(),
+            };
+            if !same {
+                self.began[number] = *now;
+                self.history.forget(number);
+            }
+        }
+    }
+
+    /// Where to gather next, `samples` a probe in all: at all points, or at those whose turn it is.
+    pub(crate) fn receivers(&mut self, samples: u32) -> Vec<Receiver> {
+        let points = self.options.points;
+        let turns = (SAMPLES_A_TURN * points).div_ceil(samples.max(1)).max(1);
+        let each = (samples * turns).div_ceil(points);
+        let turn = self.turn % turns as usize;
+        self.turn += 1;
+        let all = self.around.receivers(each).filter(|(point, _)| point % turns as usize == turn);
+        let (gathered, receivers) = all.unzip();
+        self.gathered = gathered;
+        receivers
+    }
+
+    /// The scene was edited: light may be another from now on.
+    pub(crate) fn expect_change(&mut self) {
+        self.history.expect_change();
+    }
+
+    /// Blends in what arrived at the [receivers](Self::receivers).
+    pub(crate) fn blend(&mut self, sums: &[Sums]) {
+        self.history.update_at(self.gathered.drain(..), sums);
+    }
+
+    /// Fits a volume that holds the last fit to the light that was gathered at its probes and here,
+    /// with the effort of so many rounds of so many steps.
+    pub(crate) fn fit(
+        &self,
+        volume: &mut ProbeVolume,
+        gathered: &ProbeVolume,
+        (rounds, steps): (u32, u32),
+    ) {
+        let offset = self.options.offset;
+        let settings = FitSettings { offset, rounds, steps, ..FitSettings::default() };
+        let irradiance = |point| {
+            let known = self.history.effective_samples(point) > 0.0;
+            known.then(|| self.history.coefficients(point)[0])
+        };
+        self.around.fit(volume, gathered, irradiance, &settings);
+    }
+}
