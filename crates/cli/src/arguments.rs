@@ -248,7 +248,7 @@ pub(crate) struct VolumeArgument {
 
 impl VolumeArgument {
     /// The volume in a scene: without a place of its own it spans the scene's bounds.
-    fn in_scene(&self, scene: &Scene) -> Result<VolumeSpec> {
+    pub(crate) fn in_scene(&self, scene: &Scene) -> Result<VolumeSpec> {
         let bounds = scene.bounds();
         let (center, size) = self.place.unwrap_or((
             0.5 * (bounds.min + bounds.max),

@@ -5,6 +5,7 @@ use std::time::Instant;
 use anyhow::Result;
 use lumencast_light::{LightField, OffsetPolicy};
 use lumencast_scene::{View, VolumeSpec};
+use lumencast_server::FitOptions;
 use lumencast_shade::{Lighting, Renderer, Settings};
 
 use super::reference::Judge;
@@ -31,9 +32,9 @@ impl BenchQuality {
         subject: &Subject<'_>,
         spec: VolumeSpec,
         bounces: u32,
+        fit: Option<FitOptions>,
     ) -> Result<Field> {
         let (samples, clamp) = (self.probe_samples, self.clamp);
-        let fit = self.fit.options(0, self.offset);
         let how = if fit.is_some() { ", fitted" } else { "" };
         let tracing = self.picture.tracing();
         let computed = Computed { samples, bounces, clamp, fit, tracing };

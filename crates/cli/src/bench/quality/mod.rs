@@ -19,7 +19,7 @@ use lumencast_picture::Picture;
 use lumencast_scene::{Scene, Snapshot, View, VolumeSpec};
 use lumencast_shade::{Gpu, Renderer, Settings, Shading, Shadows};
 
-use crate::arguments::{FitArguments, SceneArguments, parse_offset, parse_positive};
+use crate::arguments::{BAKED_POINTS, FitArguments, SceneArguments, parse_offset, parse_positive};
 use crate::camera::{self, PictureArguments};
 use crate::output;
 use field::{Canvas, Field};
@@ -37,9 +37,10 @@ Examples:
   lumencast bench quality breakfast.glb --volume 8x4x8 --orders 2,3,4 --keep references -o results
   lumencast bench quality breakfast.glb --volume 8x4x8 --resolutions 64,128,256,512 -o results
 
-Every --volume is a grid to be measured by itself. A row is a grid and an order; the first grid is also
-measured with as many bounces in its probes as the picture has, the second paper's way, where a probe
-sees one more than a camera. Two rows are the baseline: one path a pixel, as it is, and after as many
+Every --volume is a grid to be measured by itself. A row is a grid and an order, as its light is
+gathered, and, unless --fit is 0, another one fitted to surfaces; the first grid is also measured with as
+many bounces in its probes as the picture has, the second paper's way, where a probe sees one more than a
+camera. Two rows are the baseline: one path a pixel, as it is, and after as many
 frames denoised by BMFR (Koskela et al. 2019), whose pictures end at white.
 
 PSNR is of codes v^(1/2.2), clamped, at the reference's exposure. Beside the whole picture's it is
@@ -154,11 +155,16 @@ impl BenchQuality {
     fn fields(&self, subject: &Subject<'_>, grids: &[VolumeSpec]) -> Result<Vec<Field>> {
         let mut fields = Vec::new();
         let below = self.picture.bounces.saturating_sub(1);
-        let orders = || self.orders.iter().map(move |order| (*order, below));
+        let fit = self.fit.options(BAKED_POINTS, self.offset);
         for (number, grid) in grids.iter().enumerate() {
-            let as_in_the_paper = (number == 0).then_some((self.orders[0], self.picture.bounces));
-            for (order, bounces) in orders().chain(as_in_the_paper) {
-                fields.push(self.field(subject, VolumeSpec { order, ..*grid }, bounces)?);
+            let each = |order: &Order| [(*order, below, None), (*order, below, fit)];
+            let as_in_the_paper =
+                (number == 0).then_some((self.orders[0], self.picture.bounces, None));
+            let mut rows: Vec<_> =
+                self.orders.iter().flat_map(each).chain(as_in_the_paper).collect();
+            rows.dedup();
+            for (order, bounces, fit) in rows {
+                fields.push(self.field(subject, VolumeSpec { order, ..*grid }, bounces, fit)?);
             }
         }
         Ok(fields)

@@ -1,0 +1,209 @@
+//! `lumencast bench peers`: our pictures by the protocol by which the second paper's published
+//! implementation was measured.
+
+mod judge;
+mod reference;
+mod report;
+mod subjects;
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use glam::Vec3;
+use lumencast_gather::path_trace::{MaterialModel, Options};
+use lumencast_light::{LightField, OffsetPolicy};
+use lumencast_picture::{Picture, ToneMap};
+use lumencast_scene::{Environment, Material, Scene, Snapshot, View, VolumeSpec};
+use lumencast_server::FitOptions;
+use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading};
+
+use super::{cells, draw};
+use crate::arguments::{BAKED_POINTS, FitArguments, VolumeArgument, parse_offset};
+use crate::light_source::Computed;
+use crate::{camera, output};
+use judge::Judge;
+use reference::References;
+use report::{Fault, Field, Report, Table};
+use subjects::{SIZE, SUBJECTS, Subject};
+
+/// Samples a probe: 64 updates of 512.
+const PROBE_SAMPLES: u32 = 64 * 512;
+
+/// Judges our pictures as those of the published implementation were judged: 320×180, all materials
+/// Lambert, against Mitsuba 3.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  lumencast bench peers ../shared/scenes --references refs --tools ../shared/tools/mitsuba --python VENV/bin/python
+  lumencast bench peers ../shared/scenes --references refs --scene sponza --volume 30x18x21 --fit 64 -o pictures
+
+Grids are the published ones, over the scenes' bounds, unless others are given. Each is judged as its
+light is gathered and, unless --fit is 0, fitted to surfaces. References are pictures by Mitsuba 3 of
+1024 samples a pixel and 4 bounces, of the first camera. Probes have 3 bounces and 64 × 512 samples
+unless told otherwise. PSNR is of codes v^(1/2.2) clamped to 0 to 1 at exposure 1, over pixels that
+show nothing but surfaces; in brackets after a filter of 4×4 pixels. Faults that the published
+implementation shows are looked for where it shows them: mean and root mean square of what is too
+much there, in codes of 0 to 255 after the filter.")]
+pub(crate) struct BenchPeers {
+    /// The folder of the scenes: cornell, breakfast_room and sponza.
+    #[arg(value_name = "FOLDER")]
+    scenes: PathBuf,
+    /// Only this scene: cornell, breakfast or sponza. May be given several times.
+    #[arg(long = "scene", value_name = "NAME", value_parser = SUBJECTS.map(|s| s.name))]
+    only: Vec<String>,
+    #[command(flatten)]
+    references: References,
+    /// A grid in place of the published one. May be given several times.
+    #[arg(long = "volume", value_name = "NXxNYxNZ[@X,Y,Z:SX,SY,SZ]")]
+    volumes: Vec<VolumeArgument>,
+    /// Where in front of a surface the field is read: none, half-cell or metres.
+    #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
+    offset: OffsetPolicy,
+    #[command(flatten)]
+    fit: FitArguments,
+    /// Samples a probe.
+    #[arg(long, value_name = "N", default_value_t = PROBE_SAMPLES,
+          value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    probe_samples: u32,
+    /// Bounces of the probes.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=64))]
+    bounces: u32,
+    /// Writes the pictures, and how they differ from the reference, into this folder: grey where
+    /// they do not, brighter where they are too bright, twice enlarged.
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// Prints JSON only.
+    #[arg(long)]
+    json: bool,
+}
+
+impl BenchPeers {
+    pub(crate) fn run(self) -> Result<()> {
+        if let Some(folder) = &self.output {
+            fs::create_dir_all(folder)
+                .with_context(|| format!("cannot make {}", folder.display()))?;
+        }
+        let wanted = |s: &&Subject| self.only.is_empty() || self.only.iter().any(|n| n == s.name);
+        let subjects: Vec<&Subject> = SUBJECTS.iter().filter(wanted).collect();
+        for subject in &subjects {
+            let path = self.scenes.join(subject.file);
+            ensure!(path.is_file(), "{} is not there", path.display());
+        }
+        let settings = Settings {
+            size: SIZE,
+            samples: 64,
+            shading: Shading::Samples,
+            materials: Materials::Lambert,
+            ..Settings::default()
+        };
+        let mut renderer = Renderer::new(Gpu::new()?, &settings);
+        let mut tables = Vec::new();
+        for subject in subjects {
+            tables.push(self.table(subject, &mut renderer, &settings)?);
+        }
+        let report = Report {
+            adapter: renderer.gpu().name(),
+            probe_samples: self.probe_samples,
+            bounces: self.bounces,
+            scenes: tables,
+        };
+        if self.json {
+            return output::json(&serde_json::to_value(&report)?);
+        }
+        print!("{}", report.text());
+        Ok(())
+    }
+
+    fn table(
+        &self,
+        subject: &'static Subject,
+        renderer: &mut Renderer,
+        settings: &Settings,
+    ) -> Result<Table> {
+        let path = self.scenes.join(subject.file);
+        let reference = self.references.read(subject, &path)?;
+        let mut scene = Scene::open(&path.to_string_lossy())?;
+        let view = camera::view(&scene, None)?;
+        let snapshot = scene.snapshot();
+        let judge = Judge::new(reference, covered(renderer, &snapshot, view, settings)?)?;
+        self.write(subject, "reference", judge.reference())?;
+        renderer.set_scene(&snapshot);
+        let direct = draw(renderer, view, settings, Lighting::DIRECT)?;
+
+        let published = [VolumeArgument { resolution: subject.cells, place: None }];
+        let grids = if self.volumes.is_empty() { &published[..] } else { &self.volumes };
+        let fit = self.fit.options(BAKED_POINTS, self.offset);
+        let fits = [None, fit];
+        let mut fields = Vec::new();
+        for grid in grids {
+            let grid = grid.in_scene(&scene).context("--volume")?;
+            for fit in &fits[..if fit.is_some() { 2 } else { 1 }] {
+                let light = self.light(&snapshot, grid, *fit)?;
+                renderer.set_light(&light, self.offset)?;
+                let picture = draw(renderer, view, settings, Lighting::FIELD)?;
+                let how = if fit.is_some() { "fitted" } else { "gathered" };
+                let name = format!("{}-{how}", cells(&grid));
+                self.write(subject, &name, &picture)?;
+                self.write(subject, &format!("{name}-difference"), &judge.difference(&picture))?;
+                fields.push(Field {
+                    grid: cells(&grid),
+                    order: grid.order,
+                    fit: fit.map(|fit| fit.points),
+                    psnr: judge.psnr(&picture)?,
+                    faults: faults(subject, &judge, &picture),
+                });
+            }
+        }
+        Ok(Table {
+            scene: subject.name,
+            published: subject.published,
+            without_indirect: judge.psnr(&direct)?,
+            fields,
+        })
+    }
+
+    fn light(
+        &self,
+        snapshot: &Arc<Snapshot>,
+        grid: VolumeSpec,
+        fit: Option<FitOptions>,
+    ) -> Result<LightField> {
+        let tracing = Options { materials: MaterialModel::Lambert, threads: None };
+        let (samples, bounces) = (self.probe_samples, self.bounces);
+        let computed = Computed { samples, bounces, clamp: f32::INFINITY, fit, tracing };
+        Ok(LightField::new(computed.volumes(snapshot, &[grid])?))
+    }
+
+    fn write(&self, subject: &Subject, name: &str, picture: &Picture) -> Result<()> {
+        let Some(folder) = &self.output else { return Ok(()) };
+        let path = folder.join(format!("{}-{name}.png", subject.name));
+        Ok(picture.write_png(path, ToneMap::Gamma, 1.0)?)
+    }
+}
+
+fn faults(subject: &'static Subject, judge: &Judge, picture: &Picture) -> Vec<Fault> {
+    let at = |place| judge.deviation(picture, place);
+    subject.places.iter().map(|p| Fault { fault: p.fault, deviation: at(p) }).collect()
+}
+
+/// Which pixels show nothing but surfaces: those where no environment is seen, were there nothing
+/// else that shines.
+fn covered(
+    renderer: &mut Renderer,
+    snapshot: &Snapshot,
+    view: View,
+    settings: &Settings,
+) -> Result<Vec<bool>> {
+    let dark = |m: &Material| Material { emissive: Vec3::ZERO, ..m.clone() };
+    let silhouette = Snapshot {
+        materials: snapshot.materials.iter().map(dark).collect(),
+        environment: Environment::Constant { radiance: Vec3::ONE },
+        ..snapshot.clone()
+    };
+    renderer.set_scene(&Arc::new(silhouette));
+    let picture = draw(renderer, view, settings, Lighting::NONE)?;
+    Ok(picture.pixels().iter().map(|p| *p == Vec3::ZERO).collect())
+}

@@ -1,0 +1,84 @@
+//! What was measured, for machines as it is serialised, for people as text.
+
+use std::fmt::{self, Write};
+
+use lumencast_light::Order;
+use serde::Serialize;
+
+use super::judge::Deviation;
+use super::subjects::{Psnr, Published};
+
+#[derive(Serialize)]
+pub(super) struct Report {
+    pub(super) adapter: String,
+    pub(super) probe_samples: u32,
+    pub(super) bounces: u32,
+    pub(super) scenes: Vec<Table>,
+}
+
+/// Of a scene.
+#[derive(Serialize)]
+pub(super) struct Table {
+    pub(super) scene: &'static str,
+    pub(super) published: Published,
+    pub(super) without_indirect: Psnr,
+    pub(super) fields: Vec<Field>,
+}
+
+/// Of a light field.
+#[derive(Serialize)]
+pub(super) struct Field {
+    pub(super) grid: String,
+    pub(super) order: Order,
+    /// Points a probe that it is fitted to, if it is.
+    pub(super) fit: Option<u32>,
+    pub(super) psnr: Psnr,
+    pub(super) faults: Vec<Fault>,
+}
+
+#[derive(Serialize)]
+pub(super) struct Fault {
+    pub(super) fault: &'static str,
+    #[serde(flatten)]
+    pub(super) deviation: Deviation,
+}
+
+impl Report {
+    pub(super) fn text(&self) -> String {
+        let mut text = String::new();
+        for table in &self.scenes {
+            // Writing to a string does not fail.
+            let _ = table.write(&mut text);
+        }
+        let (samples, adapter) = (self.probe_samples, &self.adapter);
+        text + &format!("{samples} samples a probe, {} bounces; {adapter}\n", self.bounces)
+    }
+}
+
+impl Table {
+    fn write(&self, out: &mut String) -> fmt::Result {
+        let Published { as_it_comes, best_settings } = self.published;
+        writeln!(out, "{}\n  published: {as_it_comes}, best {best_settings}", self.scene)?;
+        writeln!(out, "  without indirect light: {}", self.without_indirect)?;
+        for field in &self.fields {
+            let above = field.psnr.sharp - best_settings.sharp;
+            let how = match field.fit {
+                Some(points) => format!("fitted to {points} points a probe"),
+                None => "as gathered".to_owned(),
+            };
+            let order = u8::from(field.order);
+            writeln!(out, "  {} L{order}, {how}: {}, {above:+.1}", field.grid, field.psnr)?;
+            for Fault { fault, deviation: Deviation { mean, rms } } in &field.faults {
+                let [r, g, b] = mean.to_array();
+                writeln!(out, "    {fault}: {r:+.1} {g:+.1} {b:+.1}, rms {rms:.1}")?;
+            }
+        }
+        writeln!(out)
+    }
+}
+
+impl fmt::Display for Psnr {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.1} ({:.1}) dB", self.sharp, self.filtered)
+    }
+}
