@@ -8,3 +8,4 @@ mod direct_light;
 mod indirect_light;
 mod occlusion;
 mod screen;
+mod shadows;
