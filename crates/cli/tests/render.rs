@@ -214,6 +214,43 @@ fn a_clients_picture_is_near_the_reference() {
     assert_ne!(pair.pixel(15, 20), pair.pixel(55, 20), "the eyes stand apart");
 }
 
+/// Each picture of a grid is what a camera at its place shows by itself.
+#[test]
+fn tiles_are_what_single_cameras_show() {
+    const SIZE: [u32; 2] = [40, 30];
+    let folder = Folder::new("render-tiles");
+    let draw = |name: &str, eye: [f32; 2], more: &[&str]| {
+        let path = folder.0.join(name);
+        let [x, y] = eye;
+        let camera = format!("--camera={x},{y},3.6,{x},{y},0,0.7");
+        let mut all = vec!["render", "cornell", "--lighting", "direct", "--size", "40x30"];
+        all.extend(["--samples", "4", "--exposure", "1", "-o", text(&path), &camera]);
+        all.extend(more);
+        let ran = run(&all);
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        linear(&path)
+    };
+    let grid = draw("grid.exr", [0.0, 1.0], &["--views", "3x2", "--view-spacing", "0.2"]);
+    assert_eq!([grid.width(), grid.height()], [3 * SIZE[0], 2 * SIZE[1]]);
+    // Row by row from the upper left.
+    let eyes = [[-0.2, 1.1], [0.0, 1.1], [0.2, 1.1], [-0.2, 0.9], [0.0, 0.9], [0.2, 0.9]];
+    let difference = |tile: u32, alone: &Picture| {
+        let [left, top] = [tile % 3 * SIZE[0], tile / 3 * SIZE[1]];
+        let differs = |i: &u32| {
+            let [x, y] = [i % SIZE[0], i / SIZE[0]];
+            let (here, there) = (grid.pixel(left + x, top + y), alone.pixel(x, y));
+            here.zip(there).is_none_or(|(a, b)| (a - b).abs().max_element() > 0.02)
+        };
+        (0..SIZE[0] * SIZE[1]).filter(differs).count()
+    };
+    for (tile, eye) in (0..).zip(eyes) {
+        let alone = draw("alone.exr", eye, &[]);
+        let [own, next] = [difference(tile, &alone), difference((tile + 1) % 6, &alone)];
+        // Where edges cross a pixel, its samples may fall to either side.
+        assert!(own <= 6 && next > 60, "tile {tile}: {own} pixels differ, {next} of the next one");
+    }
+}
+
 #[test]
 fn what_cannot_be_drawn_is_said() {
     let folder = Folder::new("render-refused");

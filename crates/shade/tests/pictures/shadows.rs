@@ -224,7 +224,7 @@ fn textures_cut_shadows_out() {
 fn planted_faults_are_counted() {
     let sun = light(LightKind::Directional { angle: 0.0 }, 4.0);
     let lit = |stage: &mut Stage| {
-        stage.light(sun.clone(), Vec3::ZERO, Vec3::new(-0.8, -0.5, -0.3));
+        stage.light(sun, Vec3::ZERO, Vec3::new(-0.8, -0.5, -0.3));
     };
     let none = Shadows { resolution: 0, ..Shadows::default() };
     let scene = furnished(lit);
