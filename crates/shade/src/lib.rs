@@ -38,7 +38,7 @@ mod target;
 mod textures;
 mod timing;
 
-pub use environment_brdf::{environment_brdf, reflected};
+pub use environment_brdf::{Reflected, environment_brdf, reflected};
 pub use error::ShadeError;
 pub use gpu::Gpu;
 pub use renderer::{Drawn, Renderer};

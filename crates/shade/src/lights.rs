@@ -8,7 +8,7 @@ use lumencast_scene::{Environment, HdrImage, Light, LightKind, PlacedLight, Snap
 use lumencast_shaders::layout;
 
 use crate::bindings::{FILTERED, SAMPLER, STORAGE, UNIFORM, entry, texture};
-use crate::environment_brdf::environment_brdf;
+use crate::environment_brdf::{Reflected, environment_brdf};
 use crate::gpu::{DEPTH, Gpu};
 use crate::occlusion::Occluder;
 use crate::shadows::ShadowPlan;
@@ -210,15 +210,20 @@ fn maps(gpu: &Gpu, side: u32, layers: u32) -> wgpu::Texture {
     })
 }
 
-/// The environment BRDF, as halves.
+/// The environment BRDF, as halves: on the left a, b and the mean direction, on the right the bands.
 fn table(gpu: &Gpu) -> wgpu::TextureView {
-    let halves: Vec<[u16; 2]> = environment_brdf(TABLE)
-        .into_iter()
-        .map(|pair| pair.to_array().map(|v| f16::from_f32(v).to_bits()))
+    let entries = environment_brdf(TABLE);
+    let left = |e: &Reflected| [e.albedo.x, e.albedo.y, e.mean.x, e.mean.y];
+    let right = |e: &Reflected| [e.bands.x, e.bands.y, e.bands.z, 0.0];
+    let halves: Vec<u16> = entries
+        .chunks(TABLE)
+        .flat_map(|row| row.iter().map(left).chain(row.iter().map(right)))
+        .flatten()
+        .map(|v| f16::from_f32(v).to_bits())
         .collect();
-    let format = wgpu::TextureFormat::Rg16Float;
+    let format = wgpu::TextureFormat::Rgba16Float;
     let side = TABLE as u32;
-    plane(gpu, "environment BRDF", format, side, side, bytemuck::cast_slice(&halves))
+    plane(gpu, "environment BRDF", format, 2 * side, side, bytemuck::cast_slice(&halves))
 }
 
 /// The environment's picture in f32: suns do not fit halves.

@@ -201,16 +201,16 @@ fn direct_light(b: Bsdf, n: vec3f, v: vec3f, position: vec3f, geometric: vec3f, 
 }
 
 // Light of the field, chapter 4.2.2 of the second paper: diffuse by irradiance, specular by the split
-// sum, the lobe's mean radiance about the mirrored direction times the environment BRDF. The
-// material's occlusion is of the side that is seen: light through a thin surface it leaves alone. So is
+// sum, the mean radiance under the lobe times the environment BRDF. The material's occlusion is of the side that is seen: light through a thin surface it leaves alone. So is
 // `visible`, what ambient occlusion leaves; both tell of the same crevices, of which each counts once.
 fn indirect_light(
     b: Bsdf, n: vec3f, v: vec3f, position: vec3f, roughness: f32, occlusion: f32, visible: f32,
 ) -> vec3f {
     let n_v = dot(n, v);
     let bands = ggx_bands(roughness);
-    let mirrored = reflect(-v, n);
-    let light = field_light(position, n, lobe(n, cosine_bands()), lobe(mirrored, bands));
+    let table = table_at(n_v, roughness);
+    let by = textureSampleLevel(environment_brdf, table_sampler, table, 0.0);
+    let light = field_light(position, n, lobe(n, cosine_bands()), specular_lobe(n, v, by.zw, table));
     let under = 1.0 - reflectance(b, n_v);
     var of_diffuse = vec3f(occlusion);
     var of_specular = occlusion;
@@ -219,13 +219,22 @@ fn indirect_light(
         of_specular = min(of_specular, visible);
     }
     var sum = b.diffuse * under * of_diffuse * light.a / PI;
-    let by = textureSampleLevel(environment_brdf, table_sampler, table_at(n_v, roughness), 0.0).xy;
     sum += (b.f0 * by.x + b.f90 * by.y) * specular_occlusion(n_v, of_specular, b.alpha) * light.b;
     if any(b.transmission > vec3f(0.0)) {
         let behind = field_light(position, -n, lobe(-v, bands), lobe(-v, bands));
         sum += b.transmission * under * behind.a;
     }
     return sum;
+}
+
+// The specular lobe, round about its mean direction, of which the parts along the mirrored direction
+// and across it are given.
+fn specular_lobe(n: vec3f, v: vec3f, mean: vec2f, table: vec2f) -> Lobe {
+    let mirrored = reflect(-v, n);
+    let across = n - dot(n, mirrored) * mirrored;
+    let direction = mean.x * mirrored + mean.y * across * inverseSqrt(max(dot(across, across), 1e-8));
+    let higher = textureSampleLevel(environment_brdf, table_sampler, table + vec2f(0.5, 0.0), 0.0);
+    return lobe(normalize(direction), Bands(1.0, length(mean), higher.x, higher.y, higher.z));
 }
 
 // What ambient occlusion leaves of the light at a place of the picture whose depth changes so much from
@@ -275,8 +284,8 @@ fn specular_occlusion(n_v: f32, occlusion: f32, alpha: f32) -> f32 {
     return saturate(pow(n_v + occlusion, exp2(-16.0 * alpha - 1.0)) - 1.0 + occlusion);
 }
 
-// Where the table has a cosine and a roughness: its outermost texels stand for 0 and 1.
+// Where the left half of the table has a cosine and a roughness: its outermost texels stand for 0 and 1.
 fn table_at(cosine: f32, roughness: f32) -> vec2f {
-    let size = vec2f(textureDimensions(environment_brdf));
-    return (saturate(vec2f(cosine, roughness)) * (size - 1.0) + 0.5) / size;
+    let side = f32(textureDimensions(environment_brdf).y);
+    return (saturate(vec2f(cosine, roughness)) * (side - 1.0) + 0.5) / side * vec2f(0.5, 1.0);
 }

@@ -71,7 +71,8 @@ const PART_INDIRECT: u32 = 4u;
 @group(1) @binding(4) var<storage, read> shadow_views: array<ShadowView>;
 @group(1) @binding(5) var shadow_maps: texture_depth_2d_array;
 @group(1) @binding(6) var shadow_sampler: sampler_comparison;
-// By cosine and roughness: what F0 and F90 are multiplied by.
+// By cosine and roughness: on its left half what F0 and F90 are multiplied by, and the lobe's mean
+// direction; on its right the lobe's bands.
 @group(1) @binding(7) var environment_brdf: texture_2d<f32>;
 @group(1) @binding(8) var table_sampler: sampler;
 // Ambient occlusion: the share of indirect light that arrives, and the depths that it is of.
