@@ -41,6 +41,33 @@ fn check(found: f32, expected: f32, wrong: f32, tolerance: f32) {
     assert!(!near(wrong), "this check cannot fail: it takes {wrong} too");
 }
 
+/// Receivers with few samples are traced together: what each gets does not depend on who comes after
+/// it, and all get what they asked for.
+#[test]
+fn neighbours_change_nothing() {
+    let mut stage = Stage::default();
+    let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ONE));
+    stage.room(BLACK, Vec3::new(2.0, 3.0, 4.0), grey);
+    stage.light(lamp(0.1, 10.0), Vec3::Y, Vec3::NEG_Y);
+    let scene = stage.snapshot();
+    let receiver = |(i, &samples): (usize, &u32)| {
+        let position = Vec3::new(0.03 * i as f32 - 0.9, 0.1, 0.0);
+        let place = Place::Lumel { position, normal: Vec3::Y, footprint: [BLACK; 2] };
+        if i % 3 == 0 { Receiver::probe(position, samples) } else { Receiver { place, samples } }
+    };
+    let counts = [1, 5, 0, 63, 1, 64, 2, 130, 0, 7, 1, 1, 300, 3];
+    let receivers: Vec<Receiver> = counts.iter().enumerate().map(receiver).collect();
+    let job = |receivers: &[Receiver]| Job { surfaces: true, ..Job::new(scene.clone(), receivers) };
+    let all = gather(job(&receivers));
+    for (n, own) in all.iter().enumerate() {
+        assert_eq!((own.count, own.surfaces.len()), (counts[n], counts[n] as usize));
+        let last = gather(job(&receivers[..=n])).pop();
+        assert_eq!(last.as_ref(), Some(own), "receiver {n}");
+    }
+    let lit = all.iter().filter(|sums| sums.sum.iter().any(|c| c.x > 0.0)).count();
+    assert_eq!(lit, counts.iter().filter(|n| **n > 0).count());
+}
+
 /// π, whichever way a lumel faces; a surface that it lies on takes nothing away, near the origin or
 /// far from it, large or small.
 #[test]

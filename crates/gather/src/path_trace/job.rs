@@ -7,12 +7,12 @@ use lumencast_light::sh;
 use rayon::prelude::*;
 
 use super::aim::Aim;
-use super::integrator::{Integrator, Look, Paths};
+use super::integrator::{Integrator, Look, Paths, Seen};
 use crate::world::World;
 use crate::{Job, Sums, SurfacePoint};
 
-/// Samples of one receiver that a thread takes at a time. Sums are grouped by it, so results do not
-/// depend on how many threads there are.
+/// Samples of one receiver that a thread takes at a time, or of several that have fewer. Sums are
+/// grouped by it, so results do not depend on how many threads there are.
 const TILE: u32 = 64;
 
 /// How far a job is.
@@ -30,6 +30,12 @@ struct Tile {
     end: u32,
 }
 
+impl Tile {
+    fn samples(&self) -> u32 {
+        self.end - self.first
+    }
+}
+
 /// What a tile found.
 #[derive(Clone, Debug)]
 struct TileSums {
@@ -39,7 +45,6 @@ struct TileSums {
     distances: [Vec2; sh::MAX_COEFFICIENTS],
     surfaces: Vec<Option<SurfacePoint>>,
     backs: u32,
-    rays: u64,
 }
 
 /// Gathers; `None` when cancelled. Returns the sums and the number of rays.
@@ -52,25 +57,28 @@ pub(super) fn gather(job: &Job, world: &World, watch: &Watch) -> Option<(Vec<Sum
         previous: job.previous.as_deref(),
     };
     let integrator = || Integrator::new(world, paths);
-    let found: Option<Vec<TileSums>> = tiles
-        .par_iter()
-        .map_init(integrator, |integrator, tile| {
+    let found: Option<Vec<(Vec<TileSums>, u64)>> = batches(&tiles)
+        .into_par_iter()
+        .map_init(integrator, |integrator, batch| {
             if watch.cancelled.load(Ordering::Relaxed) {
                 return None;
             }
-            let sums = trace(job, tile, integrator);
-            watch.samples_done.fetch_add(u64::from(tile.end - tile.first), Ordering::Relaxed);
-            Some(sums)
+            let rays_before = integrator.rays;
+            let sums = trace(job, batch, integrator);
+            let samples: u32 = batch.iter().map(Tile::samples).sum();
+            watch.samples_done.fetch_add(u64::from(samples), Ordering::Relaxed);
+            Some((sums, integrator.rays - rays_before))
         })
         .collect();
     let found = found?;
-    let rays = found.iter().map(|t| t.rays).sum();
-    let mut rest = tiles.iter().zip(&found).peekable();
+    let rays = found.iter().map(|(_, rays)| rays).sum();
+    let found = found.iter().flat_map(|(tiles, _)| tiles);
+    let mut rest = tiles.iter().zip(found).peekable();
     let mut sums = Vec::with_capacity(job.receivers.len());
     for receiver in 0..job.receivers.len() as u32 {
         let mut of_receiver = Vec::new();
         while let Some((tile, t)) = rest.next_if(|(tile, _)| tile.receiver == receiver) {
-            of_receiver.push((tile.end - tile.first, t));
+            of_receiver.push((tile.samples(), t));
         }
         sums.push(reduce(
             job,
@@ -91,21 +99,45 @@ fn tiles(job: &Job) -> Vec<Tile> {
     tiles
 }
 
-fn trace(job: &Job, tile: &Tile, integrator: &mut Integrator<'_>) -> TileSums {
-    let aim = Aim::new(job, tile.receiver, integrator.extent());
+/// Tiles that are traced together: as many as have no more samples than a whole one, since rays are
+/// the quicker the more of them are under way.
+fn batches(tiles: &[Tile]) -> Vec<&[Tile]> {
+    let mut batches = Vec::new();
+    let (mut first, mut samples) = (0, 0);
+    for (next, tile) in tiles.iter().enumerate() {
+        if samples + tile.samples() > TILE && next > first {
+            batches.push(&tiles[first..next]);
+            (first, samples) = (next, 0);
+        }
+        samples += tile.samples();
+    }
+    if first < tiles.len() {
+        batches.push(&tiles[first..]);
+    }
+    batches
+}
+
+fn trace(job: &Job, batch: &[Tile], integrator: &mut Integrator<'_>) -> Vec<TileSums> {
+    let extent = integrator.extent();
+    let aims: Vec<Aim> = batch.iter().map(|tile| Aim::new(job, tile.receiver, extent)).collect();
+    let looks = batch.iter().zip(&aims);
+    let looks = looks.flat_map(|(tile, aim)| (tile.first..tile.end).map(|s| aim.look(s)));
+    let mut seen = integrator.radiance(looks);
+    let sum = |(tile, aim)| sum(job, tile, aim, &mut seen);
+    batch.iter().zip(&aims).map(sum).collect()
+}
+
+/// Sums up what a tile's samples have seen, which come next.
+fn sum(job: &Job, tile: &Tile, aim: &Aim, seen: &mut impl Iterator<Item = Seen>) -> TileSums {
     let count = job.receivers[tile.receiver as usize].place.terms(job.order);
-    let rays_before = integrator.rays;
     let mut t = TileSums {
         sum: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
         squares: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
         distances: [Vec2::ZERO; sh::MAX_COEFFICIENTS],
         surfaces: Vec::new(),
         backs: 0,
-        rays: 0,
     };
-    let samples = tile.first..tile.end;
-    let looks = samples.clone().map(|sample| aim.look(sample));
-    for (seen, sample) in integrator.radiance(looks).zip(samples) {
+    for (sample, seen) in (tile.first..tile.end).zip(seen) {
         let radiance = seen.radiance();
         let terms = aim.terms(sample);
         let terms = &terms[..count];
@@ -130,7 +162,6 @@ fn trace(job: &Job, tile: &Tile, integrator: &mut Integrator<'_>) -> TileSums {
         }
         t.backs += u32::from(seen.back);
     }
-    t.rays = integrator.rays - rays_before;
     t
 }
 
