@@ -96,16 +96,17 @@ impl GatherArguments {
         GatherOptions { bounces: self.bounces, clamp: self.clamp, blend, fit }
     }
 
-    /// What computes the light, for the catalog.
-    pub(crate) fn source(&self) -> String {
-        "cpu path tracing".into()
-    }
-
     pub(crate) fn gatherer(&self) -> Result<Box<dyn Gather>> {
         let options = Options { materials: self.materials.model(), threads: None };
         let tracer = CpuPathTracer::new(options).context("cannot start the threads that trace")?;
         Ok(Box::new(tracer))
     }
+}
+
+/// What computes the light, for the catalog.
+pub(crate) fn source(options: &GatherOptions) -> String {
+    let fitted = if options.fit.is_some() { ", fitted to surfaces" } else { "" };
+    format!("cpu path tracing{fitted}")
 }
 
 /// Points a probe unless told otherwise: of a server, and of light that is computed once.
@@ -117,6 +118,7 @@ pub(crate) const BAKED_POINTS: u32 = 256;
 pub(crate) struct FitArguments {
     /// Fits probes to the surfaces about them, so that light leaks through no walls: so many points of
     /// surfaces a probe, 0 to leave probes with what arrives at them. Takes as many samples again.
+    /// Unless given, 256 where light is computed once, and none where it is live.
     #[arg(long, value_name = "POINTS", value_parser = clap::value_parser!(u32).range(0..=4096))]
     fit: Option<u32>,
 }
@@ -165,14 +167,15 @@ impl TickArguments {
     ) -> Result<TickOptions> {
         let blend = BlendSettings { ratio: self.ratio, significance: self.significance };
         let feedback = if self.feedback { ", feedback" } else { "" };
+        let gather = gather.options(blend, offset);
         Ok(TickOptions {
             period: 1.0 / self.rate,
             samples: self.samples,
-            gather: gather.options(blend, offset),
+            source: source(&gather) + feedback,
+            gather,
             feedback: self.feedback,
             volumes: volumes.volumes(scene)?,
             script: self.edits.as_deref().map(read_script).transpose()?,
-            source: gather.source() + feedback,
         })
     }
 }

@@ -9,7 +9,7 @@ use lumencast_light::OffsetPolicy;
 use lumencast_server::GatherOptions;
 use serde_json::json;
 
-use crate::arguments::{BAKED_POINTS, GatherArguments, SceneArguments, parse_offset};
+use crate::arguments::{BAKED_POINTS, GatherArguments, SceneArguments, parse_offset, source};
 use crate::output;
 
 /// Computes a scene's light until it has converged and writes it to a file.
@@ -71,7 +71,7 @@ impl Bake {
             scene_version: snapshot.version,
             ..UpdateInfo::default()
         };
-        let source = format!("{}, baked, {} samples", self.gather.source(), self.samples);
+        let source = format!("{}, baked, {} samples", source(&options), self.samples);
         let bytes = LightFile::of_volumes(Epoch(0), info, 1.0, &source, &light, at).write();
         std::fs::write(&self.output, &bytes)
             .with_context(|| format!("cannot write {}", self.output.display()))?;

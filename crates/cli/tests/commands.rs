@@ -281,15 +281,26 @@ fn what_was_baked_can_be_inspected() {
     assert_eq!(report["scene"]["name"], "cornell");
     let field = &report["fields"][0];
     assert_eq!((&field["probes"], &field["order"]), (&60.into(), &1.into()));
-    assert_eq!(field["source"], "cpu path tracing, baked, 128 samples");
+    assert_eq!(field["source"], "cpu path tracing, fitted to surfaces, baked, 128 samples");
     assert_eq!(field["epoch"], report["epoch"]);
     let words = run(&["inspect", &path]).stdout;
-    assert!(words.contains("source cpu path tracing, baked, 128 samples"), "{words}");
+    assert!(
+        words.contains("source cpu path tracing, fitted to surfaces, baked, 128 samples"),
+        "{words}"
+    );
     let [min, mean, max] = ["min", "mean", "max"].map(|k| field["c0"][k].as_f64().expect(k));
     assert!(0.0 <= min && min < mean && mean < max, "{min} {mean} {max}");
     // The brightest luminance is at most the brightest channel's, and at least a tenth of it.
     let scale = field["scale_log2"].as_f64().expect("a scale").exp2();
     assert!((0.025..2.0).contains(&(max / scale)), "{max} at a scale of {scale}");
+
+    let plain = folder.0.join("plain.light").to_str().expect("text").to_owned();
+    let few = ["--volume", "4x3x5", "--order", "1", "--samples", "128", "--fit", "0"];
+    let ran = run(&[&["bake", "cornell", "-o", &plain], &few[..]].concat());
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let plain = run(&["inspect", &plain, "--json"]).json();
+    assert_eq!(plain["fields"][0]["source"], "cpu path tracing, baked, 128 samples");
+    assert_ne!(plain["fields"][0]["c0"], field["c0"], "a fit changes light");
 
     let cut = folder.file("cut.light", &bytes[..bytes.len() - 7]);
     run(&["inspect", &cut]).failed_saying(&["cut.light"]);

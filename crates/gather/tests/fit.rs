@@ -117,6 +117,42 @@ fn light_does_not_leak_through_a_wall_within_a_cell() {
     assert!(after < 0.5 * before, "{after} of {before} is left");
 }
 
+/// Bands that only specular light reads are those that were gathered; the others, the fit's of L2.
+#[test]
+fn higher_bands_stay() {
+    let scene = rooms();
+    let (low, around) = look(&scene, grid_of_rooms(), 1);
+    let fitted_low = fitted(&scene, &low, &around, 1, &FitSettings::default());
+    for order in [Order::L3, Order::L4] {
+        let mut gathered = ProbeVolume::dark(VolumeId(0), low.grid, order);
+        for probe in 0..low.grid.probe_count() {
+            let light = gathered.probe_mut(probe);
+            light.fill(Vec3::splat(0.3));
+            light[..9].copy_from_slice(low.probe(probe));
+        }
+        let mut volume = ProbeVolume::dark(VolumeId(0), low.grid, order);
+        let irradiance = |point: usize| {
+            let at = around.points()[point]?;
+            Some(
+                fitted_low
+                    .sample(at.position, at.normal, OffsetPolicy::HalfCell)
+                    .irradiance(at.normal),
+            )
+        };
+        around.fit(&mut volume, &gathered, irradiance, &FitSettings::default());
+        let scale = mean(low.grid, &fitted_low);
+        for probe in 0..low.grid.probe_count() {
+            let (all, own) = (volume.probe(probe), gathered.probe(probe));
+            assert_eq!(all[9..], own[9..], "{order:?}");
+        }
+        assert!((mean(low.grid, &volume) / scale - 1.0).abs() < 0.1, "{order:?}");
+    }
+}
+
+fn mean(grid: Grid, volume: &ProbeVolume) -> f32 {
+    (0..grid.probe_count()).map(|probe| volume.probe(probe)[0].y).sum::<f32>()
+}
+
 /// A fit for clients that read elsewhere is another one.
 #[test]
 fn it_is_fitted_for_where_clients_read() {

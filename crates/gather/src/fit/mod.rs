@@ -21,6 +21,8 @@
 //!   free: Aₖ are the cosine's factors, so that it is the squared error of irradiance, over all
 //!   normals, as if sⱼ points of a surface had been there. Free space and moving things are lit by it.
 //!
+//! Bands above 2 stay what was gathered: irradiance hardly depends on them, specular light does.
+//!
 //! The idea of choosing the coefficients of an interpolated light map by least squares is Kavan,
 //! Bargteil and Sloan's (2011, "Least Squares Vertex Baking"). A client has nothing to do for it, and
 //! pays nothing.
@@ -34,7 +36,7 @@ use lumencast_light::{OffsetPolicy, ProbeVolume, sh};
 
 use crate::sampling::luminance;
 use crate::{Place, Receiver, Sums, SurfacePoint};
-use solve::{Row, System};
+use solve::{FREE, Row, System};
 
 /// Share of seen surfaces that show their backs above which a probe counts as being inside of
 /// something, and a point of a surface as well.
@@ -136,6 +138,14 @@ impl Surroundings {
             trust * settings.stiffness * worth(mean_irradiance(gathered.probe(probe)))
         };
         let stiffness: Vec<f32> = self.inside.iter().enumerate().map(stiffness).collect();
+        for probe in 0..stiffness.len() {
+            let own = gathered.probe(probe).iter().zip(sh::BAND);
+            for (c, (g, band)) in volume.probe_mut(probe).iter_mut().zip(own) {
+                if band > FREE {
+                    *c = *g;
+                }
+            }
+        }
         for _ in 0..settings.rounds.max(1) {
             let row = |(at, irradiance): &(SurfacePoint, Vec3)| {
                 let SurfacePoint { position, normal, .. } = *at;

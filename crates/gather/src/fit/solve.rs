@@ -11,6 +11,10 @@ use rayon::prelude::*;
 /// square.
 const ENOUGH: f64 = 1e-7;
 
+/// The highest band that is solved for. Irradiance hardly depends on those above, so that little of it
+/// would be mended by much of them, at the price of specular light.
+pub(super) const FREE: usize = 2;
+
 /// What is read at a point, and what it should be.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
@@ -49,7 +53,8 @@ pub(super) struct System {
     readers: Vec<Vec<(u32, f32)>>,
     /// s A²/4π, of each coefficient.
     hold: Vec<f32>,
-    /// The inverse of the diagonal of the normal equations; 0 where nothing depends on a coefficient.
+    /// The inverse of the diagonal of the normal equations; 0 of coefficients that stay: those on which
+    /// nothing depends, and those above [`FREE`].
     preconditioner: Vec<f32>,
 }
 
@@ -70,7 +75,10 @@ impl System {
         let hold: Vec<f32> = stiffness.iter().flat_map(hold).collect();
         let mut system = Self { order, rows, readers, hold, preconditioner: Vec::new() };
         system.preconditioner = system.diagonal();
-        system.preconditioner.iter_mut().for_each(|d| *d = if *d > 0.0 { 1.0 / *d } else { 0.0 });
+        for (i, d) in system.preconditioner.iter_mut().enumerate() {
+            let moves = *d > 0.0 && sh::BAND[i % n] <= FREE;
+            *d = if moves { 1.0 / *d } else { 0.0 };
+        }
         system
     }
 
