@@ -34,14 +34,22 @@ fn fields_and_the_baseline_are_judged() {
     )
     .json();
 
-    // Two orders, and the first with a bounce more.
+    // Two orders, as gathered and fitted, and the first with a bounce more.
     let fields = report["fields"].as_array().expect("rows");
     let names: Vec<_> = fields.iter().map(|row| row["name"].as_str().expect("a name")).collect();
-    assert_eq!(names, ["4x4x4 L1 3 bounces", "4x4x4 L2 3 bounces", "4x4x4 L1 4 bounces"]);
-    for row in 0..3 {
-        let psnr = number(&report, &format!("/fields/{row}/whole/psnr"));
-        assert!((20.0..40.0).contains(&psnr), "{report}");
+    let expected = [
+        "4x4x4 L1 3 bounces",
+        "4x4x4 L1 3 bounces, fitted",
+        "4x4x4 L2 3 bounces",
+        "4x4x4 L2 3 bounces, fitted",
+        "4x4x4 L1 4 bounces",
+    ];
+    assert_eq!(names, expected);
+    let psnr = |row| number(&report, &format!("/fields/{row}/whole/psnr"));
+    for row in 0..5 {
+        assert!((20.0..40.0).contains(&psnr(row)), "{report}");
     }
+    assert!(psnr(3) > psnr(2) + 0.3, "a fit is nearer: {report}");
     let [raw, denoised] = [0, 1].map(|n| number(&report, &format!("/baseline/{n}/whole/psnr")));
     assert!((5.0..22.0).contains(&raw), "{report}");
     assert!(denoised > raw + 5.0, "{report}");
@@ -72,13 +80,13 @@ fn fields_and_the_baseline_are_judged() {
 fn what_was_written_is_what_was_measured(report: &Value, folder: &Path) {
     let text = std::fs::read_to_string(folder.join("quality.md")).expect("the tables");
     let shown: Vec<_> = text.split("](").skip(1).filter_map(|s| s.split(')').next()).collect();
-    assert_eq!(shown.len(), 1 + 2 * 5 + 2, "{text}");
+    assert_eq!(shown.len(), 1 + 2 * 7 + 2, "{text}");
     for name in &shown {
         assert!(folder.join(name).is_file(), "{name}");
     }
     let picture = |name: &str| Loaded::read(folder.join(name)).expect("a picture");
     let reference = picture("reference.png");
-    let rows = ["/fields/1", "/baseline/0", "/baseline/1"]
+    let rows = ["/fields/2", "/baseline/0", "/baseline/1"]
         .map(|row| &report.pointer(row).expect("it")["whole"]);
     let files = ["4x4x4-L2-3-bounces.png", "1-spp.png", "1-spp-BMFR.png"];
     let psnr =
@@ -98,7 +106,8 @@ fn what_was_written_is_what_was_measured(report: &Value, folder: &Path) {
 
 #[test]
 fn tables_are_for_people_too() {
-    let ran = bench(&["--orders", "2", "--baseline-frames", "2"]);
+    let ran = bench(&["--orders", "2", "--baseline-frames", "2", "--fit", "0"]);
+    assert!(!ran.stdout.contains("fitted"), "{ran:?}");
     for words in ["| 4x4x4 L2 3 bounces |", "| 1 spp |", "| 1 spp, BMFR |", "direct light alone:"] {
         assert!(ran.stdout.contains(words), "{words:?} is missing: {ran:?}");
     }
