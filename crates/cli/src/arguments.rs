@@ -90,9 +90,14 @@ pub(crate) struct GatherArguments {
 }
 
 impl GatherArguments {
-    /// Of a server, whose clients read volumes at `offset`.
-    fn options(&self, blend: BlendSettings, offset: OffsetPolicy) -> GatherOptions {
-        let fit = self.fit.options(SERVED_POINTS, offset);
+    /// For clients that read volumes at `offset`; fitted to `points` a probe unless told otherwise.
+    pub(crate) fn options(
+        &self,
+        blend: BlendSettings,
+        points: u32,
+        offset: OffsetPolicy,
+    ) -> GatherOptions {
+        let fit = self.fit.options(points, offset);
         GatherOptions { bounces: self.bounces, clamp: self.clamp, blend, fit }
     }
 
@@ -128,6 +133,11 @@ impl FitArguments {
     pub(crate) fn options(&self, points: u32, offset: OffsetPolicy) -> Option<FitOptions> {
         let points = self.fit.unwrap_or(points);
         (points > 0).then_some(FitOptions { points, offset })
+    }
+
+    /// What is compared with what: light as it is gathered, and fitted where that is asked for.
+    pub(crate) fn compared(&self, offset: OffsetPolicy) -> Vec<Option<FitOptions>> {
+        [None].into_iter().chain(self.options(BAKED_POINTS, offset).map(Some)).collect()
     }
 }
 
@@ -167,7 +177,7 @@ impl TickArguments {
     ) -> Result<TickOptions> {
         let blend = BlendSettings { ratio: self.ratio, significance: self.significance };
         let feedback = if self.feedback { ", feedback" } else { "" };
-        let gather = gather.options(blend, offset);
+        let gather = gather.options(blend, SERVED_POINTS, offset);
         Ok(TickOptions {
             period: 1.0 / self.rate,
             samples: self.samples,

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 use lumencast_codec::{Epoch, LightFile, SceneInfo, UpdateInfo};
+use lumencast_gather::blend::BlendSettings;
 use lumencast_light::OffsetPolicy;
-use lumencast_server::GatherOptions;
 use serde_json::json;
 
 use crate::arguments::{BAKED_POINTS, GatherArguments, SceneArguments, parse_offset, source};
@@ -47,12 +47,7 @@ impl Bake {
         let volumes = self.scene.volumes(&scene)?;
         let snapshot = scene.snapshot();
         let mut gatherer = self.gather.gatherer()?;
-        let options = GatherOptions {
-            bounces: self.gather.bounces,
-            clamp: self.gather.clamp,
-            fit: self.gather.fit.options(BAKED_POINTS, self.offset),
-            ..GatherOptions::default()
-        };
+        let options = self.gather.options(BlendSettings::default(), BAKED_POINTS, self.offset);
         let bar = output::bar(1000, "Baking");
         let light = lumencast_server::bake(
             &snapshot,

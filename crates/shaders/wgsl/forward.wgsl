@@ -201,8 +201,9 @@ fn direct_light(b: Bsdf, n: vec3f, v: vec3f, position: vec3f, geometric: vec3f, 
 }
 
 // Light of the field, chapter 4.2.2 of the second paper: diffuse by irradiance, specular by the split
-// sum, the mean radiance under the lobe times the environment BRDF. The material's occlusion is of the side that is seen: light through a thin surface it leaves alone. So is
-// `visible`, what ambient occlusion leaves; both tell of the same crevices, of which each counts once.
+// sum, the mean radiance under the lobe times the environment BRDF. The material's occlusion is of the
+// side that is seen: light through a thin surface it leaves alone. So is `visible`, what ambient
+// occlusion leaves; both tell of the same crevices, of which each counts once.
 fn indirect_light(
     b: Bsdf, n: vec3f, v: vec3f, position: vec3f, roughness: f32, occlusion: f32, visible: f32,
 ) -> vec3f {

@@ -29,8 +29,6 @@
 
 mod solve;
 
-use std::f32::consts::PI;
-
 use glam::Vec3;
 use lumencast_light::{OffsetPolicy, ProbeVolume, sh};
 
@@ -38,8 +36,8 @@ use crate::sampling::luminance;
 use crate::{Place, Receiver, Sums, SurfacePoint};
 use solve::{FREE, Row, System};
 
-/// Share of seen surfaces that show their backs above which a probe counts as being inside of
-/// something, and a point of a surface as well.
+/// Share of its directions in which a probe sees backs above which it counts as being inside of
+/// something.
 const INSIDE: f32 = 0.3;
 /// How much such a probe's own light counts beside that of others.
 const INSIDE_TRUST: f32 = 0.05;
@@ -146,21 +144,20 @@ impl Surroundings {
                 }
             }
         }
+        let row = |(at, irradiance): (SurfacePoint, Vec3)| {
+            let corners = volume.grid.corners(at.position, at.normal, settings.offset);
+            corners.inside.then(|| Row {
+                probes: corners.probes.map(|probe| probe as u32),
+                shares: corners.shares,
+                normal: at.normal,
+                weight: 0.0,
+                target: irradiance / mean,
+            })
+        };
+        let rows = points.into_iter().filter_map(row).collect();
+        let mut system = System::new(volume.order, rows, &stiffness);
         for _ in 0..settings.rounds.max(1) {
-            let row = |(at, irradiance): &(SurfacePoint, Vec3)| {
-                let SurfacePoint { position, normal, .. } = *at;
-                let corners = volume.grid.corners(position, normal, settings.offset);
-                let shown = volume.sample(position, normal, settings.offset).irradiance(normal);
-                corners.inside.then(|| Row {
-                    probes: corners.probes.map(|probe| probe as u32),
-                    shares: corners.shares,
-                    normal,
-                    weight: worth(luminance(shown)),
-                    target: *irradiance / mean,
-                })
-            };
-            let rows = points.iter().filter_map(row).collect();
-            let system = System::new(volume.order, rows, &stiffness);
+            system.weigh(&volume.coefficients, |shown| worth(luminance(shown)));
             system.solve(&mut volume.coefficients, &gathered.coefficients, mean, settings.steps);
         }
     }
@@ -168,5 +165,5 @@ impl Surroundings {
 
 /// Luminance of a probe's irradiance, averaged over all normals.
 fn mean_irradiance(probe: &[Vec3]) -> f32 {
-    PI * sh::basis(sh::Order::L1, Vec3::Y)[0] * luminance(probe[0])
+    sh::cosine_basis(sh::Order::L1, Vec3::Y)[0] * luminance(probe[0])
 }

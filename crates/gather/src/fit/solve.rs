@@ -53,9 +53,6 @@ pub(super) struct System {
     readers: Vec<Vec<(u32, f32)>>,
     /// s A²/4π, of each coefficient.
     hold: Vec<f32>,
-    /// The inverse of the diagonal of the normal equations; 0 of coefficients that stay: those on which
-    /// nothing depends, and those above [`FREE`].
-    preconditioner: Vec<f32>,
 }
 
 impl System {
@@ -73,13 +70,25 @@ impl System {
             (0..n).map(factor).collect::<Vec<f32>>()
         };
         let hold: Vec<f32> = stiffness.iter().flat_map(hold).collect();
-        let mut system = Self { order, rows, readers, hold, preconditioner: Vec::new() };
-        system.preconditioner = system.diagonal();
-        for (i, d) in system.preconditioner.iter_mut().enumerate() {
+        Self { order, rows, readers, hold }
+    }
+
+    /// Sets every row's weight from the irradiance that coefficients show there.
+    pub(super) fn weigh(&mut self, coefficients: &[Vec3], weight: impl Fn(Vec3) -> f32 + Sync) {
+        let order = self.order;
+        self.rows.par_iter_mut().for_each(|row| row.weight = weight(row.read(order, coefficients)));
+    }
+
+    /// The inverse of the diagonal of the normal equations; 0 of coefficients that stay: those on which
+    /// nothing depends, and those above [`FREE`].
+    fn preconditioner(&self) -> Vec<f32> {
+        let n = self.order.coefficients();
+        let mut preconditioner = self.diagonal();
+        for (i, d) in preconditioner.iter_mut().enumerate() {
             let moves = *d > 0.0 && sh::BAND[i % n] <= FREE;
             *d = if moves { 1.0 / *d } else { 0.0 };
         }
-        system
+        preconditioner
     }
 
     fn diagonal(&self) -> Vec<f32> {
@@ -124,6 +133,10 @@ impl System {
         mean: f32,
         steps: u32,
     ) {
+        let preconditioner = self.preconditioner();
+        let preconditioned = |residual: &[Vec3]| -> Vec<Vec3> {
+            residual.iter().zip(&preconditioner).map(|(r, p)| *r * *p).collect()
+        };
         let mut x: Vec<Vec3> = coefficients.iter().map(|c| *c / mean).collect();
         let missing: Vec<Vec3> =
             self.read(&x).iter().zip(&self.rows).map(|(read, row)| row.target - read).collect();
@@ -134,7 +147,7 @@ impl System {
             .map(|((x, g), hold)| *hold * (*g / mean - x))
             .collect();
         self.add_transposed(&missing, &mut residual);
-        let mut direction = self.preconditioned(&residual);
+        let mut direction = preconditioned(&residual);
         let mut left = inner(&residual, &direction);
         let enough = left * ENOUGH;
         for _ in 0..steps {
@@ -151,7 +164,7 @@ impl System {
             for (r, i) in residual.iter_mut().zip(&image) {
                 *r -= length * i;
             }
-            let next = self.preconditioned(&residual);
+            let next = preconditioned(&residual);
             let rest = inner(&residual, &next);
             let turn = ratio(rest, left);
             for (d, n) in direction.iter_mut().zip(&next) {
@@ -162,10 +175,6 @@ impl System {
         for (c, x) in coefficients.iter_mut().zip(x) {
             *c = x * mean;
         }
-    }
-
-    fn preconditioned(&self, residual: &[Vec3]) -> Vec<Vec3> {
-        residual.iter().zip(&self.preconditioner).map(|(r, p)| *r * *p).collect()
     }
 }
 

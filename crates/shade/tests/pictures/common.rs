@@ -8,7 +8,7 @@ use lumencast_gather::path_trace::MaterialModel;
 use lumencast_gather::reference::{Film, Parts, PictureSettings};
 use lumencast_picture::{Picture, ToneMap};
 use lumencast_scene::{Snapshot, View};
-use lumencast_shade::{Gpu, Materials, Renderer, Settings};
+use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading};
 
 pub(super) const SIZE: UVec2 = UVec2::new(96, 64);
 
@@ -18,6 +18,17 @@ pub(super) fn renderer(scene: &Arc<Snapshot>, settings: &Settings) -> Renderer {
     let mut renderer = Renderer::new(Gpu::new().expect("an adapter"), settings);
     renderer.set_scene(scene);
     renderer
+}
+
+/// Direct light alone, at every sample of many.
+pub(super) fn direct() -> Settings {
+    Settings {
+        size: SIZE,
+        samples: 16,
+        shading: Shading::Samples,
+        lighting: Lighting::DIRECT,
+        ..Settings::default()
+    }
 }
 
 /// What an adapter draws.

@@ -3,24 +3,14 @@
 
 use std::sync::Arc;
 
-use crate::common::{SIZE, difference, drawn, traced};
+use crate::common::{SIZE, difference, direct as settings, drawn, traced};
 use glam::{Affine3A, Vec3, Vec4};
 use lumencast_gather::reference::Parts;
 use lumencast_scene::{
     AlphaMode, Environment, Light, LightKind, Material, Projection, Scene, Snapshot, View,
 };
-use lumencast_shade::{Lighting, Materials, Settings, Shading, Shadows};
+use lumencast_shade::{Materials, Settings, Shadows};
 use lumencast_testkit::scenes::{Stage, lambert};
-
-fn settings() -> Settings {
-    Settings {
-        size: SIZE,
-        samples: 16,
-        shading: Shading::Samples,
-        lighting: Lighting::DIRECT,
-        ..Settings::default()
-    }
-}
 
 fn light(kind: LightKind, intensity: f32) -> Light {
     Light { kind, color: Vec3::new(1.0, 0.9, 0.7), intensity, range: None }

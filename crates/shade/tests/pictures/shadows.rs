@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::common::{drawn, traced};
+use crate::common::{direct, drawn, traced};
 use glam::{Affine2, UVec2, Vec3};
 use lumencast_gather::reference::Parts;
 use lumencast_picture::{Picture, ToneMap};
@@ -12,7 +12,7 @@ use lumencast_scene::{
     AlphaMode, Filter, Image, Light, LightKind, Material, MaterialId, Snapshot, TextureRef, View,
     Wrap,
 };
-use lumencast_shade::{Lighting, Settings, Shading, Shadows};
+use lumencast_shade::{Settings, Shadows};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 const SIZE: UVec2 = UVec2::new(192, 128);
@@ -25,13 +25,7 @@ const DARK: f32 = 0.03;
 const WRONG: f32 = 0.1;
 
 fn settings() -> Settings {
-    Settings {
-        size: SIZE,
-        samples: 16,
-        shading: Shading::Samples,
-        lighting: Lighting::DIRECT,
-        ..Settings::default()
-    }
+    Settings { size: SIZE, ..direct() }
 }
 
 /// Numbers of pixels.

@@ -21,7 +21,7 @@ use lumencast_server::FitOptions;
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading};
 
 use super::{cells, draw};
-use crate::arguments::{BAKED_POINTS, FitArguments, VolumeArgument, parse_offset};
+use crate::arguments::{FitArguments, VolumeArgument, parse_offset};
 use crate::light_source::Computed;
 use crate::{camera, output};
 use judge::Judge;
@@ -135,12 +135,11 @@ impl BenchPeers {
 
         let published = [VolumeArgument { resolution: subject.cells, place: None }];
         let grids = if self.volumes.is_empty() { &published[..] } else { &self.volumes };
-        let fit = self.fit.options(BAKED_POINTS, self.offset);
-        let fits = [None, fit];
+        let fits = self.fit.compared(self.offset);
         let mut fields = Vec::new();
         for grid in grids {
             let grid = grid.in_scene(&scene).context("--volume")?;
-            for fit in &fits[..if fit.is_some() { 2 } else { 1 }] {
+            for fit in &fits {
                 let light = self.light(&snapshot, grid, *fit)?;
                 renderer.set_light(&light, self.offset)?;
                 let picture = draw(renderer, view, settings, Lighting::FIELD)?;

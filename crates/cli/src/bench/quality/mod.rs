@@ -19,7 +19,7 @@ use lumencast_picture::Picture;
 use lumencast_scene::{Scene, Snapshot, View, VolumeSpec};
 use lumencast_shade::{Gpu, Renderer, Settings, Shading, Shadows};
 
-use crate::arguments::{BAKED_POINTS, FitArguments, SceneArguments, parse_offset, parse_positive};
+use crate::arguments::{FitArguments, SceneArguments, parse_offset, parse_positive};
 use crate::camera::{self, PictureArguments};
 use crate::output;
 use field::{Canvas, Field};
@@ -155,14 +155,13 @@ impl BenchQuality {
     fn fields(&self, subject: &Subject<'_>, grids: &[VolumeSpec]) -> Result<Vec<Field>> {
         let mut fields = Vec::new();
         let below = self.picture.bounces.saturating_sub(1);
-        let fit = self.fit.options(BAKED_POINTS, self.offset);
+        let fits = self.fit.compared(self.offset);
         for (number, grid) in grids.iter().enumerate() {
-            let each = |order: &Order| [(*order, below, None), (*order, below, fit)];
+            let each =
+                |order: &Order| fits.iter().map(|fit| (*order, below, *fit)).collect::<Vec<_>>();
             let as_in_the_paper =
                 (number == 0).then_some((self.orders[0], self.picture.bounces, None));
-            let mut rows: Vec<_> =
-                self.orders.iter().flat_map(each).chain(as_in_the_paper).collect();
-            rows.dedup();
+            let rows = self.orders.iter().flat_map(each).chain(as_in_the_paper);
             for (order, bounces, fit) in rows {
                 fields.push(self.field(subject, VolumeSpec { order, ..*grid }, bounces, fit)?);
             }
