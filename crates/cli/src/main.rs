@@ -9,6 +9,7 @@ mod camera;
 mod compare;
 mod doctor;
 mod environment;
+mod film_file;
 mod fingerprint;
 mod inspect;
 mod interrupt;

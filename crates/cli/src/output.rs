@@ -1,5 +1,6 @@
 //! What goes to the terminal.
 
+use std::borrow::Cow;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::time::Duration;
@@ -54,7 +55,7 @@ pub(crate) fn spinner(message: String) -> ProgressBar {
 }
 
 /// A bar with the time left; on standard error, and only if that is a terminal.
-pub(crate) fn bar(length: u64, message: &'static str) -> ProgressBar {
+pub(crate) fn bar(length: u64, message: impl Into<Cow<'static, str>>) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}, {eta} left")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(length).with_style(style).with_message(message)

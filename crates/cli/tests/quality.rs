@@ -9,8 +9,12 @@ use lumencast_picture::{Loaded, compare};
 use serde_json::Value;
 
 fn bench(arguments: &[&str]) -> Ran {
+    bench_with("64", arguments)
+}
+
+fn bench_with(reference_spp: &str, arguments: &[&str]) -> Ran {
     let mut all = vec!["bench", "quality", "cornell", "--size", "72x48", "--volume", "4x4x4"];
-    all.extend(["--reference-spp", "64", "--probe-samples", "256", "--samples", "4"]);
+    all.extend(["--reference-spp", reference_spp, "--probe-samples", "256", "--samples", "4"]);
     all.extend(arguments);
     let ran = run(&all);
     assert_eq!(ran.code, Some(0), "{ran:?}");
@@ -68,12 +72,29 @@ fn fields_and_the_baseline_are_judged() {
     assert!(traced(1) > traced(0), "nine times the paths: {report}");
     what_was_written_is_what_was_measured(&report, Path::new(out));
 
-    // The reference is kept: the second run took no time for another.
+    // The reference is kept, and grows no further where that is enough.
     arguments.extend(["--baseline-frames", "0"]);
+    let film = |name: &str| {
+        let mut files = std::fs::read_dir(kept).expect("a folder").map(|e| e.expect("one").path());
+        let of = |path: &std::path::PathBuf| {
+            path.to_str().is_some_and(|path| path.ends_with(name) && path.contains("-72x48-"))
+        };
+        std::fs::read(files.find(of).expect("a film")).expect("bytes")
+    };
+    let before = film(".indirect.film");
     let again = bench(&arguments).json();
+    assert!(before == film(".indirect.film"));
     assert_eq!(again["reference"], report["reference"]);
     assert_eq!(again["fields"][1]["whole"], report["fields"][1]["whole"]);
     assert_eq!(again["baseline"], Value::Array(Vec::new()));
+
+    // Where it is not, it goes on.
+    let more = bench_with("256", &arguments).json();
+    assert!(before != film(".indirect.film"));
+    assert_eq!(more["reference"]["samples"], 256);
+    let noise = |report| number(report, "/reference/noise_psnr");
+    let gain = noise(&more) - noise(&report);
+    assert!((4.0..9.0).contains(&gain), "four times the samples are 6 dB, {gain}");
 }
 
 /// Every picture that quality.md shows is there, and as far from the reference as the table says.

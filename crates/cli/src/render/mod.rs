@@ -1,6 +1,5 @@
 //! `lumencast render`: a picture of a scene.
 
-mod partial;
 mod raster;
 mod reference;
 

@@ -1,9 +1,9 @@
 //! Pictures by path tracing every pixel.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use anyhow::{Context, Result};
 use glam::UVec2;
@@ -12,11 +12,9 @@ use lumencast_picture::{Picture, exposure};
 use lumencast_scene::{Scene, View};
 use serde_json::{Value, json};
 
-use super::{FilterArgument, PartsArgument, Render, partial};
-use crate::{fingerprint, interrupt, output};
+use super::{FilterArgument, PartsArgument, Render};
+use crate::{film_file, fingerprint, interrupt, output};
 
-/// The unfinished picture is kept at least so often.
-const KEEP_EVERY: Duration = Duration::from_secs(60);
 /// Samples a pixel unless told otherwise.
 const SAMPLES: u32 = 64;
 
@@ -24,7 +22,7 @@ impl Render {
     pub(super) fn trace_picture(&self, scene: &mut Scene, view: View) -> Result<()> {
         let settings = self.settings();
         let key = self.key(scene, view, settings);
-        let partial = partial::path_of(&self.output[0]);
+        let partial = unfinished(&self.output[0]);
         let mut film = self.begun(&partial, key);
         let before = film.samples();
         let spinner = output::spinner("Building".into());
@@ -37,7 +35,7 @@ impl Render {
             Some(rays) => rays,
             None => {
                 if film.samples() > before {
-                    partial::write(&partial, key, &film)?;
+                    film_file::write(&partial, key, &film)?;
                 }
                 match film.samples() {
                     0 => eprintln!("Stopped before the first samples were done."),
@@ -99,22 +97,11 @@ impl Render {
 
     /// The film to go on with.
     fn begun(&self, partial: &Path, key: u64) -> Film {
-        let kept =
-            (!self.restart).then(|| partial::read(partial, key, self.picture.size)).flatten();
-        match kept {
-            Some(film) => {
-                eprintln!("Going on from {} samples in {}.", film.samples(), partial.display());
-                film
-            }
-            None => {
-                if partial.exists() && !self.restart {
-                    eprintln!(
-                        "{} belongs to another picture or is damaged: beginning anew.",
-                        partial.display()
-                    );
-                }
-                Film::new(self.picture.size, self.reference_samples())
-            }
+        let (size, samples) = (self.picture.size, self.reference_samples());
+        if self.restart {
+            Film::new(size, samples)
+        } else {
+            film_file::begun(partial, key, size, samples)
         }
     }
 
@@ -148,8 +135,8 @@ impl Render {
                     return Ok(None);
                 }
             }
-            if kept.elapsed() > KEEP_EVERY && film.samples() < self.reference_samples() {
-                partial::write(partial, key, film)?;
+            if kept.elapsed() > film_file::KEEP_EVERY && film.samples() < self.reference_samples() {
+                film_file::write(partial, key, film)?;
                 kept = Instant::now();
             }
         }
@@ -202,6 +189,13 @@ impl Render {
             "noise_psnr": noise.map(|n| n.psnr),
         })
     }
+}
+
+/// Where the picture of a file is kept until it is finished.
+fn unfinished(output: &Path) -> PathBuf {
+    let mut name = output.as_os_str().to_owned();
+    name.push(".part");
+    name.into()
 }
 
 /// A finished picture, and what it took.

@@ -88,7 +88,8 @@ pub(crate) struct BenchQuality {
     offset: OffsetPolicy,
     #[command(flatten)]
     fit: FitArguments,
-    /// Keeps the references in this folder, and takes them from there the next time.
+    /// Keeps the references in this folder, also while they grow, and goes on from there the next time:
+    /// with more samples where more are asked for.
     #[arg(long, value_name = "FOLDER")]
     keep: Option<PathBuf>,
     /// Writes quality.md into this folder: the tables, with pictures, FLIP's differences from the

@@ -1,17 +1,15 @@
 //! The reference: traced or kept, and judging by it.
 
-use std::fs;
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 use glam::UVec2;
 use lumencast_gather::reference::{Film, Parts, PictureSettings, Renderer};
 use lumencast_picture::{Comparison, Loaded, PIXELS_PER_DEGREE, Picture, compare};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::{BenchQuality, Subject, sum};
-use crate::{fingerprint, output};
+use crate::{film_file, fingerprint, output};
 
 /// The two parts of a path-traced picture.
 pub(super) struct Reference {
@@ -20,13 +18,12 @@ pub(super) struct Reference {
     pub(super) told: Told,
 }
 
-/// What is kept of a reference beside its pictures.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+/// What is told of a reference beside its pictures.
+#[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct Told {
     pub(super) samples: u32,
     /// Of both parts together; nothing where it has no noise.
     pub(super) noise_psnr: Option<f64>,
-    pub(super) seconds: f64,
 }
 
 /// What pictures of one size are judged by.
@@ -53,41 +50,76 @@ impl Judge {
 }
 
 impl BenchQuality {
-    /// The reference of a size: from the folder where it is kept, or else traced. Its noise is told
-    /// at the exposure given, or else its own.
+    /// The reference of a size, traced, or gone on with where it is kept. Its noise is told at the
+    /// exposure given, or else its own.
     pub(super) fn reference(
         &self,
         subject: &Subject<'_>,
         size: UVec2,
         exposure: Option<f32>,
     ) -> Result<Reference> {
-        let name = self.reference_name(subject, size);
-        let known = self.keep.as_ref().map(|folder| folder.join(name));
-        if let Some(base) = &known
-            && let Some(kept) = kept(base)?
-        {
-            return Ok(kept);
-        }
-        let start = Instant::now();
-        let direct = self.trace(subject, size, Parts::Direct, "Tracing direct light")?;
-        let indirect = self.trace(subject, size, Parts::Indirect, "Tracing indirect light")?;
+        let films = [
+            self.trace(subject, size, Parts::Direct, "direct")?,
+            self.trace(subject, size, Parts::Indirect, "indirect")?,
+        ];
+        let [direct, indirect] = &films;
         let picture = |film: &Film| Picture::new(size.x, size.y, film.picture());
-        let (direct_picture, indirect_picture) = (picture(&direct)?, picture(&indirect)?);
-        let own = || lumencast_picture::exposure(&sum(&direct_picture, &indirect_picture));
+        let pictures = (picture(direct)?, picture(indirect)?);
+        let own = || lumencast_picture::exposure(&sum(&pictures.0, &pictures.1));
         let told = Told {
-            samples: self.reference_spp,
-            noise_psnr: noise_psnr(&direct, &indirect, exposure.unwrap_or_else(own)),
-            seconds: start.elapsed().as_secs_f64(),
+            samples: direct.samples().min(indirect.samples()),
+            noise_psnr: noise_psnr(direct, indirect, exposure.unwrap_or_else(own)),
         };
-        let reference = Reference { direct: direct_picture, indirect: indirect_picture, told };
-        if let Some(base) = &known {
-            reference.keep(base)?;
-        }
-        Ok(reference)
+        Ok(Reference { direct: pictures.0, indirect: pictures.1, told })
     }
 
-    /// Of all that the reference depends on.
-    fn reference_name(&self, subject: &Subject<'_>, size: UVec2) -> String {
+    /// One part of it, which is also the name of its file.
+    fn trace(
+        &self,
+        subject: &Subject<'_>,
+        size: UVec2,
+        parts: Parts,
+        name: &'static str,
+    ) -> Result<Film> {
+        let key = self.key(subject);
+        let scene = subject.scene.name();
+        let file = format!("{scene}-{}x{}-{key:016x}.{name}.film", size.x, size.y);
+        let path = self.keep.as_ref().map(|folder| folder.join(file));
+        let mut film = match &path {
+            Some(path) => film_file::begun(path, key, size, self.reference_spp),
+            None => Film::new(size, self.reference_spp),
+        };
+        if film.samples() >= self.reference_spp {
+            return Ok(film);
+        }
+
+        let bounces = if parts == Parts::Direct { 1 } else { self.picture.bounces };
+        let settings =
+            PictureSettings { size, bounces, parts, clamp: self.clamp, ..self.picture.settings() };
+        let renderer = Renderer::new(&subject.snapshot, subject.view, settings)
+            .context("cannot start the threads that trace")?;
+        let bar = output::bar(self.reference_spp.into(), format!("Tracing {name} light"));
+        bar.set_position(film.samples().into());
+        bar.reset_eta();
+        let mut written = Instant::now();
+        while film.samples() < self.reference_spp {
+            // Never told to stop.
+            renderer.pass(&mut film, self.reference_spp, &|_| true);
+            bar.set_position(film.samples().into());
+            let done = film.samples() >= self.reference_spp;
+            if let Some(path) = &path
+                && (done || written.elapsed() > film_file::KEEP_EVERY)
+            {
+                film_file::write(path, key, &film)?;
+                written = Instant::now();
+            }
+        }
+        bar.finish_and_clear();
+        Ok(film)
+    }
+
+    /// All that a sample of the reference depends on, but the size.
+    fn key(&self, subject: &Subject<'_>) -> u64 {
         let (p, scene) = (&self.picture, subject.scene);
         let said = format!(
             "{:?} {:?} {} {} {:?} {}",
@@ -98,62 +130,8 @@ impl BenchQuality {
             scene.environment(),
             self.clamp
         );
-        let hash = fingerprint::of(scene, said);
-        format!("{}-{}x{}-{}spp-{hash:016x}", scene.name(), size.x, size.y, self.reference_spp)
+        fingerprint::of(scene, said)
     }
-
-    fn trace(
-        &self,
-        subject: &Subject<'_>,
-        size: UVec2,
-        parts: Parts,
-        label: &'static str,
-    ) -> Result<Film> {
-        let bounces = if parts == Parts::Direct { 1 } else { self.picture.bounces };
-        let settings =
-            PictureSettings { size, bounces, parts, clamp: self.clamp, ..self.picture.settings() };
-        let renderer = Renderer::new(&subject.snapshot, subject.view, settings)
-            .context("cannot start the threads that trace")?;
-        let mut film = Film::new(size, self.reference_spp);
-        let bar = output::bar(self.reference_spp.into(), label);
-        while film.samples() < self.reference_spp {
-            // Never told to stop.
-            renderer.pass(&mut film, self.reference_spp, &|_| true);
-            bar.set_position(film.samples().into());
-        }
-        bar.finish_and_clear();
-        Ok(film)
-    }
-}
-
-impl Reference {
-    fn keep(&self, base: &Path) -> Result<()> {
-        self.direct.write_exr(beside(base, "direct.exr"))?;
-        self.indirect.write_exr(beside(base, "indirect.exr"))?;
-        let path = beside(base, "json");
-        fs::write(&path, serde_json::to_string(&self.told)?)
-            .with_context(|| format!("cannot write {}", path.display()))
-    }
-}
-
-fn kept(base: &Path) -> Result<Option<Reference>> {
-    let path = beside(base, "json");
-    if !path.is_file() {
-        return Ok(None);
-    }
-    let text =
-        fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let told = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
-    let read = |part: &str| Loaded::read(beside(base, part)).map(|l| l.stored().clone());
-    Ok(Some(Reference { direct: read("direct.exr")?, indirect: read("indirect.exr")?, told }))
-}
-
-/// A file of a reference.
-fn beside(base: &Path, extension: &str) -> PathBuf {
-    let mut name = base.as_os_str().to_owned();
-    name.push(".");
-    name.push(extension);
-    name.into()
 }
 
 /// Noise of two films' sum, each with its own.

@@ -163,10 +163,8 @@ impl Report {
             self.scene, self.bounces, self.adapter
         );
         let (samples, noise) = (reference.samples, decibels(reference.noise_psnr));
-        let seconds = reference.seconds;
         // Writing to a string does not fail.
-        let _ =
-            writeln!(text, "reference: {samples} samples a pixel, {seconds:.0} s, noise {noise}  ");
+        let _ = writeln!(text, "reference: {samples} samples a pixel, noise {noise}  ");
         let (psnr, flip) = (direct.psnr, direct.flip);
         let _ = writeln!(text, "direct light alone: {psnr:.2} dB, FLIP {flip:.4}\n");
         text

@@ -1,4 +1,4 @@
-//! A picture that is not finished, kept beside it.
+//! What a picture has gathered so far, kept in a file to go on from.
 //!
 //! One line that names the format, then little-endian numbers: a key of all that the picture depends
 //! on (u64), width and height, samples planned and samples of both halves (u32), the sums of both (f32), a
@@ -6,7 +6,8 @@
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::time::Duration;
 
 use anyhow::{Context, Result};
 use glam::{UVec2, Vec3};
@@ -14,15 +15,11 @@ use lumencast_gather::reference::Film;
 
 const MAGIC: &[u8] = b"lumencast picture 2\n";
 
-/// Where the unfinished picture of a file is kept.
-pub(super) fn path_of(output: &Path) -> PathBuf {
-    let mut name = output.as_os_str().to_owned();
-    name.push(".part");
-    name.into()
-}
+/// A film that grows is written at least so often.
+pub(crate) const KEEP_EVERY: Duration = Duration::from_secs(60);
 
 /// Writes a film; a crash leaves either the old file or the new one.
-pub(super) fn write(path: &Path, key: u64, film: &Film) -> Result<()> {
+pub(crate) fn write(path: &Path, key: u64, film: &Film) -> Result<()> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend(key.to_le_bytes());
     let [a, b] = film.parts();
@@ -33,14 +30,35 @@ pub(super) fn write(path: &Path, key: u64, film: &Film) -> Result<()> {
         sum.to_array().iter().for_each(|v| bytes.extend(v.to_le_bytes()));
     }
     bytes.extend(hash(&bytes).to_le_bytes());
-    let temporary = path.with_extension("part.tmp");
+    let mut temporary = path.as_os_str().to_owned();
+    temporary.push(".tmp");
     fs::write(&temporary, bytes)
         .and_then(|()| fs::rename(&temporary, path))
-        .with_context(|| format!("cannot keep the unfinished picture in {}", path.display()))
+        .with_context(|| format!("cannot keep the picture so far in {}", path.display()))
+}
+
+/// The film to go on with: that of a file, or else one of so many `planned` samples. Says which where
+/// there is a file.
+pub(crate) fn begun(path: &Path, key: u64, size: UVec2, planned: u32) -> Film {
+    match read(path, key, size) {
+        Some(film) => {
+            eprintln!("Going on from {} samples in {}.", film.samples(), path.display());
+            film
+        }
+        None => {
+            if path.exists() {
+                eprintln!(
+                    "{} belongs to another picture or is damaged: beginning anew.",
+                    path.display()
+                );
+            }
+            Film::new(size, planned)
+        }
+    }
 }
 
 /// The film kept in a file, if there is one, it is whole, and its key is this.
-pub(super) fn read(path: &Path, key: u64, size: UVec2) -> Option<Film> {
+fn read(path: &Path, key: u64, size: UVec2) -> Option<Film> {
     let bytes = fs::read(path).ok()?;
     let (content, end) = bytes.split_last_chunk::<8>()?;
     let rest = content.strip_prefix(MAGIC)?;
