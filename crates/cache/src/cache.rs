@@ -5,7 +5,7 @@ use std::ops::Deref;
 
 use glam::Vec3;
 use lumencast_codec::{Catalog, ClientEdit, Epoch, Field, LightFile, ProbeHeader, StateFrame};
-use lumencast_light::{LightField, OffsetPolicy, ProbeVolume, VolumeId};
+use lumencast_light::{LightField, ProbeVolume};
 use lumencast_scene::Edit;
 
 use crate::CacheError;
@@ -66,7 +66,7 @@ pub struct Light<'a> {
 impl Light<'_> {
     /// Irradiance on a surface at a world position, lux.
     pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Vec3 {
-        self.field.irradiance(position, normal, OffsetPolicy::default())
+        self.field.irradiance(position, normal)
     }
 }
 
@@ -317,10 +317,10 @@ impl Cache {
 
 /// A field's volume with the light that was known there before.
 fn lit_by(light: &LightField, field: &Field) -> ProbeVolume {
-    let mut volume = ProbeVolume::dark(VolumeId(field.id), field.grid, field.order);
+    let mut volume = field.dark();
     for probe in 0..volume.grid.probe_count() {
         let position = volume.grid.position(volume.grid.cell(probe));
-        if let Some(before) = light.sample(position, Vec3::ZERO, OffsetPolicy::None) {
+        if let Some(before) = light.sample(position, Vec3::ZERO) {
             let n = field.order.coefficients();
             volume.probe_mut(probe).copy_from_slice(&before.coefficients[..n]);
         }

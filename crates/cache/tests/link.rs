@@ -49,6 +49,7 @@ impl Server {
             order: Order::L1,
             usage: Use::All,
             grid,
+            offset: lumencast_light::Offset::default(),
             cells_min: IVec3::ZERO,
             regions: encoder.regions().collect(),
             layers: 3,

@@ -10,7 +10,7 @@ use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::Gather;
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, MaterialModel, Options};
-use lumencast_light::{Grid, OffsetPolicy, Order};
+use lumencast_light::{Grid, Offset, Order};
 use lumencast_scene::{Edit, Scene, Script, VolumeSpec};
 use lumencast_server::{FitOptions, GatherOptions, SampleRange, TickOptions};
 use lumencast_shade::Occlusion;
@@ -86,19 +86,13 @@ pub(crate) struct GatherArguments {
     #[arg(long, value_enum, default_value_t = Materials::Full)]
     pub(crate) materials: Materials,
     #[command(flatten)]
-    pub(crate) fit: FitArguments,
+    pub(crate) reading: ReadingArguments,
 }
 
 impl GatherArguments {
-    /// For clients that read volumes at `offset`; fitted to `points` a probe unless told otherwise.
-    pub(crate) fn options(
-        &self,
-        blend: BlendSettings,
-        points: u32,
-        offset: OffsetPolicy,
-    ) -> GatherOptions {
-        let fit = self.fit.options(points, offset);
-        GatherOptions { bounces: self.bounces, clamp: self.clamp, blend, fit }
+    pub(crate) fn options(&self, blend: BlendSettings, reading: Reading) -> GatherOptions {
+        let Reading { fit, offset } = reading;
+        GatherOptions { bounces: self.bounces, clamp: self.clamp, blend, fit, offset }
     }
 
     pub(crate) fn gatherer(&self) -> Result<Box<dyn Gather>> {
@@ -114,30 +108,62 @@ pub(crate) fn source(options: &GatherOptions) -> String {
     format!("cpu path tracing{fitted}")
 }
 
-/// Points a probe unless told otherwise: of a server, and of light that is computed once.
-const SERVED_POINTS: u32 = 0;
-pub(crate) const BAKED_POINTS: u32 = 256;
+/// Points a probe of light that is computed once, unless told otherwise.
+const POINTS: u32 = 256;
+/// Where fitted light is read unless told otherwise. Farther off, points on both sides of an edge read
+/// the same place; at the surface itself, both sides of a wall do (`docs/results.md`).
+const NEAR: Offset = Offset::Cells(0.125);
 
-/// Whether probes are fitted to surfaces.
+/// Where on surfaces light is read, and whether it is fitted to be read there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reading {
+    pub(crate) fit: Option<FitOptions>,
+    pub(crate) offset: Offset,
+}
+
+/// How surfaces read light.
 #[derive(Debug, Args)]
-pub(crate) struct FitArguments {
+pub(crate) struct ReadingArguments {
     /// Fits probes to the surfaces about them, so that light leaks through no walls: so many points of
     /// surfaces a probe, 0 to leave probes with what arrives at them. Takes as many samples again.
     /// Unless given, 256 where light is computed once, and none where it is live.
     #[arg(long, value_name = "POINTS", value_parser = clap::value_parser!(u32).range(0..=4096))]
     fit: Option<u32>,
+    /// Where in front of a surface light is read: none, half-cell, N-cells or metres. Unless given,
+    /// where the light says; light that is computed says half a cell, which is three.js's rule, but
+    /// 0.125 cells where it is fitted and drawn at once.
+    #[arg(long, value_name = "none|half-cell|N-cells|METRES", value_parser = parse_offset)]
+    pub(crate) offset: Option<Offset>,
 }
 
-impl FitArguments {
-    /// For clients that read volumes at `offset`.
-    pub(crate) fn options(&self, points: u32, offset: OffsetPolicy) -> Option<FitOptions> {
-        let points = self.fit.unwrap_or(points);
-        (points > 0).then_some(FitOptions { points, offset })
+impl ReadingArguments {
+    /// For pages, live.
+    pub(crate) fn served(&self) -> Reading {
+        Reading { fit: self.fit(0), offset: self.offset.unwrap_or_default() }
+    }
+
+    /// For whoever has the file.
+    pub(crate) fn baked(&self) -> Reading {
+        Reading { fit: self.fit(POINTS), offset: self.offset.unwrap_or_default() }
+    }
+
+    /// For our own renderer.
+    pub(crate) fn drawn(&self) -> Reading {
+        let fit = self.fit(POINTS);
+        let usual = if fit.is_some() { NEAR } else { Offset::default() };
+        Reading { fit, offset: self.offset.unwrap_or(usual) }
     }
 
     /// What is compared with what: light as it is gathered, and fitted where that is asked for.
-    pub(crate) fn compared(&self, offset: OffsetPolicy) -> Vec<Option<FitOptions>> {
-        [None].into_iter().chain(self.options(BAKED_POINTS, offset).map(Some)).collect()
+    pub(crate) fn compared(&self) -> Vec<Reading> {
+        let gathered = Reading { fit: None, offset: self.offset.unwrap_or_default() };
+        let fitted = Some(self.drawn()).filter(|reading| reading.fit.is_some());
+        [gathered].into_iter().chain(fitted).collect()
+    }
+
+    fn fit(&self, usual: u32) -> Option<FitOptions> {
+        let points = self.fit.unwrap_or(usual);
+        (points > 0).then_some(FitOptions { points })
     }
 }
 
@@ -173,11 +199,10 @@ impl TickArguments {
         scene: &Scene,
         volumes: &SceneArguments,
         gather: &GatherArguments,
-        offset: OffsetPolicy,
     ) -> Result<TickOptions> {
         let blend = BlendSettings { ratio: self.ratio, significance: self.significance };
         let feedback = if self.feedback { ", feedback" } else { "" };
-        let gather = gather.options(blend, SERVED_POINTS, offset);
+        let gather = gather.options(blend, gather.reading.served());
         Ok(TickOptions {
             period: 1.0 / self.rate,
             samples: self.samples,
@@ -315,15 +340,17 @@ where
 }
 
 /// How far in front of a surface a field is read.
-pub(crate) fn parse_offset(text: &str) -> Result<OffsetPolicy, String> {
-    match text {
-        "none" => Ok(OffsetPolicy::None),
-        "half-cell" => Ok(OffsetPolicy::HalfCell),
-        metres => match metres.parse::<f32>() {
-            Ok(metres) if metres.is_finite() => Ok(OffsetPolicy::Metres(metres)),
-            _ => Err("none, half-cell, or a number of metres".into()),
+fn parse_offset(text: &str) -> Result<Offset, String> {
+    let number = |text: &str| text.parse().ok().filter(|number: &f32| number.is_finite());
+    let offset = match text {
+        "none" => Some(Offset::NONE),
+        "half-cell" => Some(Offset::HALF_CELL),
+        _ => match text.strip_suffix("-cells") {
+            Some(cells) => number(cells).map(Offset::Cells),
+            None => number(text).map(Offset::Metres),
         },
-    }
+    };
+    offset.ok_or_else(|| "none, half-cell, cells as in 0.2-cells, or a number of metres".into())
 }
 
 /// How far ambient occlusion reaches, metres; 0 for none.
@@ -411,8 +438,11 @@ mod tests {
 
     #[test]
     fn offsets() {
-        assert_eq!(parse_offset("none"), Ok(OffsetPolicy::None));
-        assert_eq!(parse_offset("0.25"), Ok(OffsetPolicy::Metres(0.25)));
-        assert!(parse_offset("inf").is_err() && parse_offset("half").is_err());
+        assert_eq!(parse_offset("none"), Ok(Offset::NONE));
+        assert_eq!(parse_offset("half-cell"), parse_offset("0.5-cells"));
+        assert_eq!(parse_offset("0.25"), Ok(Offset::Metres(0.25)));
+        for wrong in ["inf", "half", "-cells", "nan-cells", "0.5-metres"] {
+            assert!(parse_offset(wrong).is_err(), "{wrong}");
+        }
     }
 }

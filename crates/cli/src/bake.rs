@@ -6,10 +6,9 @@ use anyhow::{Context, Result};
 use clap::Args;
 use lumencast_codec::{Epoch, LightFile, SceneInfo, UpdateInfo};
 use lumencast_gather::blend::BlendSettings;
-use lumencast_light::OffsetPolicy;
 use serde_json::json;
 
-use crate::arguments::{BAKED_POINTS, GatherArguments, SceneArguments, parse_offset, source};
+use crate::arguments::{GatherArguments, SceneArguments, source};
 use crate::output;
 
 /// Computes a scene's light until it has converged and writes it to a file.
@@ -32,9 +31,6 @@ pub(crate) struct Bake {
     /// Samples a probe: four times as many halve the noise.
     #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     samples: u32,
-    /// Where in front of a surface clients will read the field: none, half-cell or metres.
-    #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
-    offset: OffsetPolicy,
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
@@ -47,7 +43,7 @@ impl Bake {
         let volumes = self.scene.volumes(&scene)?;
         let snapshot = scene.snapshot();
         let mut gatherer = self.gather.gatherer()?;
-        let options = self.gather.options(BlendSettings::default(), BAKED_POINTS, self.offset);
+        let options = self.gather.options(BlendSettings::default(), self.gather.reading.baked());
         let bar = output::bar(1000, "Baking");
         let light = lumencast_server::bake(
             &snapshot,

@@ -9,8 +9,9 @@ use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::ProbeVolume;
 use lumencast_scene::{Scene, Snapshot, VolumeSpec};
-use lumencast_server::{FitOptions, GatherOptions};
+use lumencast_server::GatherOptions;
 
+use crate::arguments::Reading;
 use crate::{output, remote};
 
 /// Whether it is the address of a server's scene.
@@ -46,8 +47,7 @@ pub(crate) struct Computed {
     pub(crate) bounces: u32,
     /// Upper limit of one path vertex's contribution, cd/m².
     pub(crate) clamp: f32,
-    /// Whether probes are fitted to surfaces.
-    pub(crate) fit: Option<FitOptions>,
+    pub(crate) reading: Reading,
     pub(crate) tracing: Options,
 }
 
@@ -64,7 +64,8 @@ impl Computed {
             bounces: self.bounces,
             clamp: self.clamp,
             blend: BlendSettings::default(),
-            fit: self.fit,
+            fit: self.reading.fit,
+            offset: self.reading.offset,
         };
         let bar = output::share_bar("Computing the light field");
         let progress =

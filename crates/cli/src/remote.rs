@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use lumencast_codec::{Catalog, Field, ProbeDecoder, Region, RegionLight, StateFrame, limits};
-use lumencast_light::{ProbeVolume, VolumeId};
+use lumencast_light::ProbeVolume;
 use lumencast_transport::{Client, ConnectOptions, ReadOptions};
 
 /// How long a server may take to show its light.
@@ -53,7 +53,7 @@ async fn read(client: &Client) -> Result<Seen> {
 
     let mut volumes: BTreeMap<u32, ProbeVolume> = BTreeMap::new();
     for field in &catalog.fields {
-        let volume = ProbeVolume::dark(VolumeId(field.id), field.grid, field.order);
+        let volume = field.dark();
         let volume = volumes.entry(field.id).or_insert(volume);
         for &region in &field.regions {
             let (light, size) = region_light(client, field, region).await?;

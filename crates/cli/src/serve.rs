@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use lumencast_light::OffsetPolicy;
 use lumencast_server::{Server, ServerConfig};
 use lumencast_transport::{Access, Key, Tls};
 use serde_json::json;
@@ -76,8 +75,7 @@ impl Serve {
         let network = self.network()?;
         let spinner = output::spinner(format!("Loading {}", self.scene.source.scene));
         let scene = self.scene.source.open()?;
-        let options =
-            self.tick.options(&scene, &self.scene, &self.gather, OffsetPolicy::default())?;
+        let options = self.tick.options(&scene, &self.scene, &self.gather)?;
         let mut config = ServerConfig::new(network);
         config.tick = options;
         config.page = self.page.clone();

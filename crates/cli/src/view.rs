@@ -19,7 +19,7 @@ use tokio::task::JoinHandle;
 
 use crate::arguments::{
     Exposure, GatherArguments, SceneArguments, TickArguments, occlusion, parse_occlusion,
-    parse_offset, parse_positive,
+    parse_positive,
 };
 use crate::camera::{self, CameraArgument, parse_size};
 use crate::light_source::{self, is_address};
@@ -65,9 +65,6 @@ pub(crate) struct View {
     /// Tone map: gamma, srgb, reinhard, filmic or neutral.
     #[arg(long, value_name = "NAME", default_value_t = ToneMap::Neutral)]
     tone_map: ToneMap,
-    /// Where in front of a surface light is read: none, half-cell or metres.
-    #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
-    offset: lumencast_light::OffsetPolicy,
     /// Takes ringing out of light by a Hann window that ends at this band. None unless given.
     #[arg(long, value_name = "BAND", value_parser = parse_positive)]
     window: Option<f32>,
@@ -132,7 +129,7 @@ impl View {
         };
         let controls = Controls {
             settings,
-            offset: self.offset,
+            offset: self.gather.reading.offset,
             window: self.window,
             tone_map: self.tone_map,
             exposure: lumencast_window::Exposure::new(self.exposure.0),
@@ -176,7 +173,7 @@ impl View {
         let replica = scene.pristine(0.0);
         let loopback = std::net::SocketAddr::from(([127, 0, 0, 1], 0));
         let mut config = ServerConfig::new(lumencast_transport::ServerConfig::new(loopback));
-        config.tick = self.tick.options(&scene, &self.scene, &self.gather, self.offset)?;
+        config.tick = self.tick.options(&scene, &self.scene, &self.gather)?;
         let gatherer = self.gather.gatherer()?;
         let (address, running) = runtime.block_on(async {
             let server = Server::bind(scene, gatherer, config).await?;

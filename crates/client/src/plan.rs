@@ -77,6 +77,7 @@ mod tests {
             order: Order::L1,
             usage: Use::All,
             grid,
+            offset: lumencast_light::Offset::default(),
             cells_min: glam::IVec3::ZERO,
             regions: ProbeEncoder::new(resolution, Order::L1).regions().collect(),
             layers: 3,

@@ -5,7 +5,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use glam::{IVec3, Quat};
-use lumencast_light::{Grid, Order};
+use lumencast_light::{Grid, Offset, Order, ProbeVolume, VolumeId};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -81,6 +81,10 @@ pub struct Field {
     pub usage: Use,
     /// Where the probes are.
     pub grid: Grid,
+    /// Where in front of a surface the light is meant to be read: less than half a cell for light that
+    /// was fitted to be read there.
+    #[serde(default, skip_serializing_if = "is_usual")]
+    pub offset: Offset,
     /// Absolute integer coordinates of the grid's first cell; 0 unless the volume scrolls.
     #[serde(default)]
     pub cells_min: IVec3,
@@ -100,6 +104,10 @@ pub struct Field {
     /// [`Catalog::epoch_of`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub epoch: Option<Epoch>,
+}
+
+fn is_usual(offset: &Offset) -> bool {
+    *offset == Offset::default()
 }
 
 /// Which instances a field is for.
@@ -200,6 +208,11 @@ impl Catalog {
 }
 
 impl Field {
+    /// A volume of its shape without light.
+    pub fn dark(&self) -> ProbeVolume {
+        ProbeVolume::dark(VolumeId(self.id), self.grid, self.order).read_at(self.offset)
+    }
+
     /// The region of a number.
     pub fn region(&self, id: u32) -> Option<Region> {
         self.regions.iter().copied().find(|region| region.id == id)
@@ -232,6 +245,10 @@ impl Field {
         }
         if rotation != Quat::IDENTITY {
             self.grid.rotation = rotation.normalize();
+        }
+        let (Offset::Cells(offset) | Offset::Metres(offset)) = self.offset;
+        if !offset.is_finite() {
+            return Err(DecodeError::Malformed("offset"));
         }
         if !(1..=3).contains(&self.layers) {
             return Err(DecodeError::Malformed("layers"));
@@ -307,6 +324,7 @@ mod tests {
                 order: Order::L2,
                 usage: Use::All,
                 grid,
+                offset: Offset::Cells(0.125),
                 cells_min: IVec3::ZERO,
                 regions: crate::regions(grid.resolution),
                 layers: 3,
@@ -332,33 +350,38 @@ mod tests {
     }
 
     #[test]
-    fn scale_source_and_epoch_may_be_absent() {
+    fn offset_scale_source_and_epoch_may_be_absent() {
         let mut value: Value = serde_json::from_slice(&catalog().encode()).unwrap();
         let field = value["fields"][0].as_object_mut().unwrap();
+        assert_eq!(field.remove("offset"), Some(json!({ "cells": 0.125 })));
         assert_eq!(field.remove("scale_log2"), Some(json!(16)));
         assert_eq!(field.remove("source"), Some(json!("cpu path tracing")));
         assert_eq!(field.remove("epoch"), Some(json!("0000000000000005")));
         let old = Catalog::decode(value.to_string().as_bytes()).unwrap();
         let field = &old.fields[0];
         assert_eq!((field.source.as_str(), old.epoch_of(field)), ("", old.epoch));
-        assert_eq!(field.scale_log2, None);
+        assert_eq!((field.scale_log2, field.offset), (None, Offset::HALF_CELL));
         let written: Value = serde_json::from_slice(&old.encode()).unwrap();
         assert_eq!(written, value, "and are then not written");
         let new = catalog();
         assert_eq!(new.epoch_of(&new.fields[0]), Epoch(5));
-        assert!(field.has_shape_of(&new.fields[0]));
+        let moved = Field { offset: Offset::HALF_CELL, ..new.fields[0].clone() };
+        assert!(field.has_shape_of(&moved) && !field.has_shape_of(&new.fields[0]));
         assert!(!field.has_shape_of(&Field { layers: 2, ..new.fields[0].clone() }));
     }
 
     #[test]
     fn contradictions_and_excesses_are_refused() {
-        let cases: [(&str, Value, &str); 22] = [
+        let cases: [(&str, Value, &str); 25] = [
             ("/lumencast", json!(2), "version"),
             ("/lumencast", json!("1"), "malformed"),
             ("/epoch", json!(null), "json"),
             ("/epoch", json!("12"), "json"),
             ("/tick_seconds", json!(0), "malformed"),
             ("/fields/0/order", json!(5), "json"),
+            ("/fields/0/offset", json!(0.5), "json"),
+            ("/fields/0/offset", json!({ "feet": 0.5 }), "json"),
+            ("/fields/0/offset", json!({ "metres": 1e39 }), "malformed"),
             ("/fields/0/layers", json!(4), "malformed"),
             ("/fields/0/scale_log2", json!(128), "json"),
             ("/fields/0/scale_log2", json!(0.5), "json"),

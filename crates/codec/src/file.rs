@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use lumencast_light::{ProbeVolume, VolumeId};
+use lumencast_light::ProbeVolume;
 
 use crate::bytes::{Reader, put_varint};
 use crate::{
@@ -53,6 +53,7 @@ impl LightFile {
                 order: volume.order,
                 usage: Use::All,
                 grid: volume.grid,
+                offset: volume.offset,
                 cells_min: glam::IVec3::ZERO,
                 regions: encoder.regions().collect(),
                 layers: 3,
@@ -129,9 +130,7 @@ impl LightFile {
             let Some(field) = self.catalog.field(frame.field) else { continue };
             let Some(region) = field.region(frame.region) else { continue };
             let light = ProbeDecoder::new(region.size, field.order).decode(&frame.bytes)?;
-            let volume = volumes
-                .entry(field.id)
-                .or_insert_with(|| ProbeVolume::dark(VolumeId(field.id), field.grid, field.order));
+            let volume = volumes.entry(field.id).or_insert_with(|| field.dark());
             let n = field.order.coefficients();
             for (probe, values) in
                 region.probes(field.grid.resolution).zip(light.coefficients.chunks(n))
@@ -161,7 +160,7 @@ fn number(reader: &mut Reader<'_>) -> Result<u32, DecodeError> {
 mod tests {
     use super::*;
     use glam::{Quat, UVec3, Vec3};
-    use lumencast_light::{Grid, Order};
+    use lumencast_light::{Grid, Offset, Order, VolumeId};
 
     fn file() -> (Vec<ProbeVolume>, LightFile) {
         let volumes: Vec<ProbeVolume> = [(7, UVec3::new(12, 2, 3)), (2, UVec3::ONE)]
@@ -174,6 +173,7 @@ mod tests {
                     resolution,
                 };
                 let mut volume = ProbeVolume::dark(VolumeId(id), grid, Order::L2);
+                volume.offset = Offset::Cells(0.125 * id as f32);
                 for (i, c) in volume.coefficients.iter_mut().enumerate() {
                     *c = Vec3::new(1.0, 2.0, 3.0) / (1 + i % 9) as f32;
                 }
@@ -195,8 +195,8 @@ mod tests {
         assert_eq!(decoded.len(), 2);
         for (volume, decoded) in volumes.iter().zip(&decoded) {
             assert_eq!(
-                (volume.id, volume.order, volume.grid.resolution),
-                (decoded.id, decoded.order, decoded.grid.resolution)
+                (volume.id, volume.order, volume.grid.resolution, volume.offset),
+                (decoded.id, decoded.order, decoded.grid.resolution, decoded.offset)
             );
             let worst = volume
                 .coefficients

@@ -6,7 +6,7 @@ use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::fit::{FitSettings, Surroundings};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Place, Receiver, Sums};
-use lumencast_light::{Grid, OffsetPolicy, Order, ProbeVolume, VolumeId};
+use lumencast_light::{Grid, Offset, Order, ProbeVolume, VolumeId};
 use lumencast_scene::{Environment, Light, LightKind, Material, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -95,7 +95,7 @@ fn wall(scene: &Arc<Snapshot>, volume: &ProbeVolume, normal: Vec3) -> [f32; 2] {
     let lit = gather(Job::new(scene.clone(), (0..100).map(receiver).collect::<Vec<_>>()));
     let (mut squares, mut sum) = (0.0, 0.0);
     for (i, sums) in (0..100).zip(&lit) {
-        let read = volume.sample(at(i), normal, OffsetPolicy::HalfCell).irradiance(normal).y;
+        let read = volume.sample(at(i), normal).irradiance(normal).y;
         squares += (read - irradiance(sums).y).powi(2) / 100.0;
         sum += irradiance(sums).y / 100.0;
     }
@@ -133,11 +133,7 @@ fn higher_bands_stay() {
         let mut volume = ProbeVolume::dark(VolumeId(0), low.grid, order);
         let irradiance = |point: usize| {
             let at = around.points()[point]?;
-            Some(
-                fitted_low
-                    .sample(at.position, at.normal, OffsetPolicy::HalfCell)
-                    .irradiance(at.normal),
-            )
+            Some(fitted_low.sample(at.position, at.normal).irradiance(at.normal))
         };
         around.fit(&mut volume, &gathered, irradiance, &FitSettings::default());
         let scale = mean(low.grid, &fitted_low);
@@ -158,11 +154,15 @@ fn mean(grid: Grid, volume: &ProbeVolume) -> f32 {
 fn it_is_fitted_for_where_clients_read() {
     let scene = rooms();
     let (gathered, around) = look(&scene, grid_of_rooms(), 3);
-    let elsewhere = FitSettings { offset: OffsetPolicy::None, ..FitSettings::default() };
-    let [right, wrong] = [FitSettings::default(), elsewhere]
-        .map(|settings| fitted(&scene, &gathered, &around, 3, &settings))
-        .map(|volume| wall(&scene, &volume, Vec3::NEG_X)[0]);
-    assert!(wrong > 2.0 * right, "{wrong} {right}");
+    let here = gathered.offset;
+    for [own, other] in [[here, Offset::NONE], [Offset::NONE, here]] {
+        let gathered = gathered.clone().read_at(own);
+        let volume = fitted(&scene, &gathered, &around, 3, &FitSettings::default());
+        assert_eq!(volume.offset, own);
+        let right = wall(&scene, &volume, Vec3::NEG_X)[0];
+        let wrong = wall(&scene, &volume.read_at(other), Vec3::NEG_X)[0];
+        assert!(wrong > 2.0 * right, "{wrong} {right}");
+    }
 }
 
 /// In light that is the same everywhere there is nothing to mend: every probe keeps its own.

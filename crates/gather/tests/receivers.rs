@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Place, Receiver, Sums};
-use lumencast_light::{Grid, LightField, OffsetPolicy, Order, ProbeVolume, VolumeId};
+use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
 use lumencast_scene::{Environment, Light, LightKind, Material, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -196,7 +196,7 @@ fn bounces_add_up_from_job_to_job() {
             let job = Job { bounces: 0, seed, ..Job::new(stage.snapshot(), probes.clone()) };
             field(size, &gather(Job { previous: Some(before), ..job }))
         });
-        let found = light.sample(BLACK, BLACK, OffsetPolicy::None).unwrap().coefficients[0].x;
+        let found = light.sample(BLACK, BLACK).unwrap().coefficients[0].x;
         check(found, C0 * first / (1.0 - albedo), C0 * first * (1.0 + albedo), 5e-3);
     }
 }

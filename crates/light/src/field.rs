@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::sh::{Sh, convolve};
 use crate::zh::Bands;
-use crate::{OffsetPolicy, Order, ProbeVolume};
+use crate::{Offset, Order, ProbeVolume};
 
 /// The light of a scene: volumes, the finer ones laid over the coarser.
 ///
@@ -14,7 +14,7 @@ use crate::{OffsetPolicy, Order, ProbeVolume};
 ///
 /// ```
 /// use glam::{Quat, UVec3, Vec3};
-/// use lumencast_light::{Grid, LightField, OffsetPolicy, Order, ProbeVolume, VolumeId};
+/// use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
 ///
 /// let grid = Grid {
 ///     center: Vec3::ZERO,
@@ -27,7 +27,7 @@ use crate::{OffsetPolicy, Order, ProbeVolume};
 ///     volume.probe_mut(probe)[0] = Vec3::splat(3.544_908); // radiance 1 from everywhere
 /// }
 /// let light = LightField::new(vec![volume]);
-/// let irradiance = light.irradiance(Vec3::ZERO, Vec3::Y, OffsetPolicy::HalfCell);
+/// let irradiance = light.irradiance(Vec3::ZERO, Vec3::Y);
 /// assert!((irradiance.x - std::f32::consts::PI).abs() < 1e-3);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -63,9 +63,16 @@ impl LightField {
         self
     }
 
+    /// The same light, all volumes of which are to be read at another offset than their own.
+    #[must_use]
+    pub fn read_at(mut self, offset: Offset) -> Self {
+        self.volumes.iter_mut().for_each(|volume| volume.offset = offset);
+        self
+    }
+
     /// Light at a world position on a surface with a world `normal` (zero in free space); `None`
     /// when there is no volume.
-    pub fn sample(&self, position: Vec3, normal: Vec3, offset: OffsetPolicy) -> Option<Sh> {
+    pub fn sample(&self, position: Vec3, normal: Vec3) -> Option<Sh> {
         if self.volumes.is_empty() {
             return None;
         }
@@ -73,7 +80,7 @@ impl LightField {
         let mut light = Sh::dark(Order::L1);
         let mut add = |volume: &ProbeVolume, weight: f32| {
             if weight > 0.0 {
-                light.add_scaled(&volume.sample(position, normal, offset), weight);
+                light.add_scaled(&volume.sample(position, normal), weight);
             }
         };
         let mut left = 1.0;
@@ -102,8 +109,8 @@ impl LightField {
     }
 
     /// Irradiance on a surface, lux; black when there is no volume.
-    pub fn irradiance(&self, position: Vec3, normal: Vec3, offset: OffsetPolicy) -> Vec3 {
-        self.sample(position, normal, offset).map_or(Vec3::ZERO, |light| light.irradiance(normal))
+    pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Vec3 {
+        self.sample(position, normal).map_or(Vec3::ZERO, |light| light.irradiance(normal))
     }
 }
 
@@ -136,7 +143,7 @@ mod tests {
     }
 
     fn read_at(field: &LightField, position: Vec3) -> f32 {
-        field.sample(position, Vec3::ZERO, OffsetPolicy::None).unwrap().coefficients[0].x
+        field.sample(position, Vec3::ZERO).unwrap().coefficients[0].x
     }
 
     #[test]
@@ -196,6 +203,6 @@ mod tests {
         assert_eq!(read(&field, -12.5), 1.0);
         assert_eq!(read(&field, -3.0), 1.0);
         assert_eq!(read(&field, 3.0), 2.0);
-        assert_eq!(LightField::default().sample(Vec3::ZERO, Vec3::Y, OffsetPolicy::None), None);
+        assert_eq!(LightField::default().sample(Vec3::ZERO, Vec3::Y), None);
     }
 }

@@ -16,7 +16,7 @@ pub mod zh;
 
 pub use atlas::{Atlas, atlas_size, texels};
 pub use field::LightField;
-pub use sample::{Corners, OffsetPolicy};
+pub use sample::{Corners, Offset};
 pub use scale::ScaleRule;
 pub use sh::{Order, Sh};
 pub use volume::{Grid, ProbeVolume, VolumeId};

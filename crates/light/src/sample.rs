@@ -2,32 +2,40 @@
 
 use glam::{UVec3, Vec3};
 
+use serde::{Deserialize, Serialize};
+
 use crate::{Grid, ProbeVolume, sh::Sh};
 
 /// How far along its normal a surface's point is moved before light is read, so that probes behind
-/// the surface count less.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum OffsetPolicy {
-    /// Not at all.
-    None,
-    /// By half the distance between probes, along each of the box's axes: three.js's rule.
-    #[default]
-    HalfCell,
-    /// By metres.
+/// the surface count less. In JSON `{"cells": 0.5}` or `{"metres": 0.1}`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Offset {
+    /// Parts of the distance between probes, along each of the box's axes.
+    Cells(f32),
+    /// Metres.
     Metres(f32),
 }
 
-impl OffsetPolicy {
-    /// `position` in cells, moved along `normal` (both of the world).
-    fn cell_from_world(self, grid: &Grid, position: Vec3, normal: Vec3) -> Vec3 {
-        let normal = normal.normalize_or_zero();
+impl Offset {
+    /// Not at all.
+    pub const NONE: Self = Self::Cells(0.0);
+    /// Half a cell: three.js's rule.
+    pub const HALF_CELL: Self = Self::Cells(0.5);
+
+    /// Along each of the box's axes, in cells, for a normal along that axis.
+    #[must_use]
+    pub fn in_cells(self, grid: &Grid) -> Vec3 {
         match self {
-            Self::None => grid.cell_from_world(position),
-            Self::HalfCell => {
-                grid.cell_from_world(position) + 0.5 * (grid.rotation.inverse() * normal)
-            }
-            Self::Metres(metres) => grid.cell_from_world(position + metres * normal),
+            Self::Cells(cells) => Vec3::splat(cells),
+            Self::Metres(metres) => metres / grid.spacing(),
         }
+    }
+}
+
+impl Default for Offset {
+    fn default() -> Self {
+        Self::HALF_CELL
     }
 }
 
@@ -80,12 +88,14 @@ pub struct Corners {
     pub inside: bool,
 }
 
-impl Grid {
+impl ProbeVolume {
     /// Where light is read for a point of a surface with a world `normal` (zero in free space).
     /// Points that are not finite read the first probe.
-    pub fn corners(&self, position: Vec3, normal: Vec3, offset: OffsetPolicy) -> Corners {
-        let cell = offset.cell_from_world(self, position, normal);
-        let last = (self.resolution - 1).as_vec3();
+    pub fn corners(&self, position: Vec3, normal: Vec3) -> Corners {
+        let grid = &self.grid;
+        let out = grid.rotation.inverse() * normal.normalize_or_zero();
+        let cell = grid.cell_from_world(position) + self.offset.in_cells(grid) * out;
+        let last = (grid.resolution - 1).as_vec3();
         let clamped = if cell.is_finite() { cell.clamp(Vec3::ZERO, last) } else { Vec3::ZERO };
         let low = clamped.floor();
         let t = clamped - low;
@@ -95,19 +105,17 @@ impl Grid {
         let share = |corner, axis: usize| if far(corner, axis) { t[axis] } else { 1.0 - t[axis] };
         Corners {
             probes: std::array::from_fn(|c| {
-                self.index(UVec3::new(pick(c, 0), pick(c, 1), pick(c, 2)))
+                grid.index(UVec3::new(pick(c, 0), pick(c, 1), pick(c, 2)))
             }),
             shares: std::array::from_fn(|c| share(c, 0) * share(c, 1) * share(c, 2)),
             inside: cell.cmpge(Vec3::splat(-0.5)).all() && cell.cmple(last + 0.5).all(),
         }
     }
-}
 
-impl ProbeVolume {
     /// Light at a world position on a surface with a world `normal` (zero in free space), read as
-    /// [`Grid::corners`] says.
-    pub fn sample(&self, position: Vec3, normal: Vec3, offset: OffsetPolicy) -> Sh {
-        let Corners { probes, shares, .. } = self.grid.corners(position, normal, offset);
+    /// [`Self::corners`] says.
+    pub fn sample(&self, position: Vec3, normal: Vec3) -> Sh {
+        let Corners { probes, shares, .. } = self.corners(position, normal);
         let mut light = Sh::dark(self.order);
         for (probe, share) in probes.into_iter().zip(shares).filter(|(_, share)| *share > 0.0) {
             for (sum, c) in light.coefficients.iter_mut().zip(self.probe(probe)) {
@@ -149,11 +157,11 @@ mod tests {
             let volume = affine(rotation);
             for i in 0..volume.grid.probe_count() {
                 let position = volume.grid.position(volume.grid.cell(i));
-                let sampled = volume.sample(position, Vec3::ZERO, OffsetPolicy::None);
+                let sampled = volume.sample(position, Vec3::ZERO);
                 assert!((sampled.coefficients[0] - volume.probe(i)[0]).length() < 1e-4);
             }
             let between = volume.grid.center + rotation * Vec3::new(0.7, -0.3, 1.1);
-            let sampled = volume.sample(between, Vec3::ZERO, OffsetPolicy::None);
+            let sampled = volume.sample(between, Vec3::ZERO);
             assert!((sampled.coefficients[0] - value(between)).length() < 1e-4);
         }
     }
@@ -163,9 +171,9 @@ mod tests {
         let volume = affine(Quat::IDENTITY);
         let last = volume.grid.resolution - 1;
         let far = volume.grid.position(last) + Vec3::splat(100.0);
-        let sampled = volume.sample(far, Vec3::ZERO, OffsetPolicy::None);
+        let sampled = volume.sample(far, Vec3::ZERO);
         assert_eq!(sampled.coefficients[0], volume.probe(volume.grid.index(last))[0]);
-        let nowhere = volume.sample(Vec3::NAN, Vec3::ZERO, OffsetPolicy::None);
+        let nowhere = volume.sample(Vec3::NAN, Vec3::ZERO);
         assert_eq!(nowhere.coefficients[0], volume.probe(0)[0]);
     }
 
@@ -176,14 +184,12 @@ mod tests {
             let spacing = volume.grid.spacing();
             let position = volume.grid.center;
             let normal = rotation * Vec3::new(0.6, 0.8, 0.0);
-            let read = |offset| volume.sample(position, normal, offset).coefficients[0];
+            let read =
+                |offset| volume.clone().read_at(offset).sample(position, normal).coefficients[0];
             let half = position + rotation * (0.5 * spacing * Vec3::new(0.6, 0.8, 0.0));
-            assert!((read(OffsetPolicy::HalfCell) - value(half)).length() < 1e-4);
-            assert!(
-                (read(OffsetPolicy::Metres(0.25)) - value(position + 0.25 * normal)).length()
-                    < 1e-4
-            );
-            assert!((read(OffsetPolicy::None) - value(position)).length() < 1e-4);
+            assert!((read(Offset::HALF_CELL) - value(half)).length() < 1e-4);
+            assert!((read(Offset::Metres(0.25)) - value(position + 0.25 * normal)).length() < 1e-4);
+            assert!((read(Offset::NONE) - value(position)).length() < 1e-4);
         }
     }
 
@@ -198,10 +204,7 @@ mod tests {
         let mut volume = ProbeVolume::dark(VolumeId(0), grid, Order::L1);
         volume.probe_mut(0)[0] = Vec3::ONE;
         for position in [Vec3::ZERO, Vec3::splat(7.0), Vec3::splat(-0.2)] {
-            assert_eq!(
-                volume.sample(position, Vec3::Y, OffsetPolicy::HalfCell).coefficients[0],
-                Vec3::ONE
-            );
+            assert_eq!(volume.sample(position, Vec3::Y).coefficients[0], Vec3::ONE);
         }
         assert_eq!(grid.weight(Vec3::ZERO), 1.0);
         assert_eq!(grid.weight(Vec3::X * 0.25), 0.5);

@@ -3,7 +3,7 @@
 use glam::{Quat, UVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::Order;
+use crate::{Offset, Order};
 
 /// Number of a volume within a scene.
 #[derive(
@@ -66,16 +66,24 @@ pub struct ProbeVolume {
     pub grid: Grid,
     /// Order of the expansion.
     pub order: Order,
+    /// Where in front of a surface its light is meant to be read.
+    pub offset: Offset,
     /// Coefficients of arriving radiance (r, g, b), cd/m²: `order.coefficients()` a probe, probe by
     /// probe in index order.
     pub coefficients: Vec<Vec3>,
 }
 
 impl ProbeVolume {
-    /// A volume without light.
+    /// A volume without light, read half a cell in front of surfaces.
     pub fn dark(id: VolumeId, grid: Grid, order: Order) -> Self {
         let coefficients = vec![Vec3::ZERO; grid.probe_count() * order.coefficients()];
-        Self { id, grid, order, coefficients }
+        Self { id, grid, order, offset: Offset::default(), coefficients }
+    }
+
+    /// The same light, to be read elsewhere.
+    #[must_use]
+    pub fn read_at(self, offset: Offset) -> Self {
+        Self { offset, ..self }
     }
 
     /// The coefficients of one probe.

@@ -100,7 +100,7 @@ fn cells(resolution: UVec3) -> u64 {
 mod tests {
     use super::*;
     use glam::Quat;
-    use lumencast_light::{LightField, OffsetPolicy, ProbeVolume, VolumeId};
+    use lumencast_light::{LightField, ProbeVolume, VolumeId};
 
     #[test]
     fn volumes_around_bounds_have_near_cubic_cells_within_the_budget() {
@@ -193,7 +193,7 @@ mod tests {
         let cell = whole.grid.spacing().z;
         let read = |light: &LightField, z: f32| {
             let position = whole.grid.center + rotation * Vec3::new(0.3, 0.2, z);
-            light.sample(position, Vec3::ZERO, OffsetPolicy::None).expect("light").values()[0].x
+            light.sample(position, Vec3::ZERO).expect("light").values()[0].x
         };
         // In hundredths of a cell, from the first probe to the last.
         let values: Vec<(f32, f32)> = (50..=6950)

@@ -33,7 +33,7 @@ pub fn bake(
     mut progress: impl FnMut(f32),
 ) -> Result<Vec<ProbeVolume>, ServerError> {
     let mean = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
-    let mut fields = Field::all(volumes, mean, options.fit)?;
+    let mut fields = Field::all(volumes, &GatherOptions { blend: mean, ..options })?;
     look(&mut fields, gatherer, scene);
     let passes = samples.div_ceil(SAMPLES_A_PASS).max(1);
     for pass in 0..passes {

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use glam::{IVec3, Vec3};
 use lumencast_codec::{self as codec, EncodedRegion, ProbeEncoder, UpdateInfo, limits};
-use lumencast_gather::blend::{BlendSettings, History};
+use lumencast_gather::blend::History;
 use lumencast_gather::{Gathered, Job, Receiver};
 use lumencast_light::{LightField, ProbeVolume, VolumeId};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
 use crate::surfaces::Surfaces;
-use crate::tick::{FitOptions, GatherOptions};
+use crate::tick::GatherOptions;
 use crate::walls::Buried;
 
 /// A volume with all that turns sums into frames.
@@ -37,20 +37,16 @@ impl Field {
     /// each piece. Volumes are checked before memory is taken for any.
     pub(crate) fn all(
         volumes: &[VolumeSpec],
-        blend: BlendSettings,
-        fit: Option<FitOptions>,
+        options: &GatherOptions,
     ) -> Result<Vec<Self>, ServerError> {
-        let new = |(id, spec)| Self::new(VolumeId(id), spec, blend, fit);
+        let new = |(id, spec)| Self::new(VolumeId(id), spec, options);
         Ok((0..).zip(pieces(volumes)?).map(new).collect())
     }
 
-    fn new(
-        id: VolumeId,
-        VolumeSpec { grid, order }: VolumeSpec,
-        blend: BlendSettings,
-        fit: Option<FitOptions>,
-    ) -> Self {
-        let dark = ProbeVolume::dark(id, grid, order);
+    fn new(id: VolumeId, spec: VolumeSpec, options: &GatherOptions) -> Self {
+        let VolumeSpec { grid, order } = spec;
+        let GatherOptions { blend, fit, offset, .. } = *options;
+        let dark = ProbeVolume::dark(id, grid, order).read_at(offset);
         Self {
             arriving: dark.clone(),
             volume: dark,
@@ -82,6 +78,7 @@ impl Field {
             order: self.volume.order,
             usage: codec::Use::All,
             grid: self.volume.grid,
+            offset: self.volume.offset,
             cells_min: IVec3::ZERO,
             regions: self.encoder.regions().collect(),
             layers: 3,

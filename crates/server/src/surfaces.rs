@@ -25,7 +25,8 @@ const SAMPLES_A_TURN: u32 = 4;
 
 /// Points of surfaces, with what is known of the light there.
 pub(crate) struct Surfaces {
-    options: FitOptions,
+    /// A probe.
+    points: u32,
     around: Surroundings,
     /// Where the points were when their histories began.
     began: Vec<Option<SurfacePoint>>,
@@ -43,7 +44,7 @@ impl Surfaces {
         let each = (options.points as usize).min(MOST_POINTS / probes.max(1)).max(1);
         let points = probes * each;
         Self {
-            options: FitOptions { points: each as u32, ..options },
+            points: each as u32,
             around: Surroundings::default(),
             began: vec![None; points],
             history: History::new(blend, points, 1),
@@ -55,7 +56,7 @@ impl Surfaces {
 
     /// What to ask for to find the surfaces of a scene; `None` while it is the one that was seen.
     pub(crate) fn look(&self, scene: &Arc<Snapshot>, probes: &[glam::Vec3]) -> Option<Job> {
-        let probe = |position: &glam::Vec3| Receiver::probe(*position, self.options.points);
+        let probe = |position: &glam::Vec3| Receiver::probe(*position, self.points);
         (self.seen != Some(scene.version)).then(|| Job {
             bounces: 0,
             surfaces: true,
@@ -85,7 +86,7 @@ impl Surfaces {
 
     /// Where to gather next, `samples` a probe in all: at all points, or at those whose turn it is.
     pub(crate) fn receivers(&mut self, samples: u32) -> Vec<Receiver> {
-        let points = self.options.points;
+        let points = self.points;
         let turns = (SAMPLES_A_TURN * points).div_ceil(samples.max(1)).max(1);
         let each = (samples * turns).div_ceil(points);
         let turn = self.turn % turns as usize;
@@ -114,8 +115,7 @@ impl Surfaces {
         gathered: &ProbeVolume,
         (rounds, steps): (u32, u32),
     ) {
-        let offset = self.options.offset;
-        let settings = FitSettings { offset, rounds, steps, ..FitSettings::default() };
+        let settings = FitSettings { rounds, steps, ..FitSettings::default() };
         let irradiance = |point| {
             let known = self.history.effective_samples(point) > 0.0;
             known.then(|| self.history.coefficients(point)[0])

@@ -10,7 +10,7 @@ use lumencast_codec::{
 };
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::{Gather, Gathered};
-use lumencast_light::{LightField, OffsetPolicy, ProbeVolume};
+use lumencast_light::{LightField, Offset, ProbeVolume};
 use lumencast_scene::{Edit, Environment, InstanceSource, Scene, Script, Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
@@ -67,11 +67,19 @@ pub struct GatherOptions {
     /// Whether, and how, probes are fitted to the surfaces about them; otherwise they hold the light
     /// that arrives at them.
     pub fit: Option<FitOptions>,
+    /// Where in front of surfaces clients are to read the light. Fitted light is right there alone.
+    pub offset: Offset,
 }
 
 impl Default for GatherOptions {
     fn default() -> Self {
-        Self { bounces: 3, clamp: f32::INFINITY, blend: BlendSettings::default(), fit: None }
+        Self {
+            bounces: 3,
+            clamp: f32::INFINITY,
+            blend: BlendSettings::default(),
+            fit: None,
+            offset: Offset::default(),
+        }
     }
 }
 
@@ -82,8 +90,6 @@ pub struct FitOptions {
     /// has so many probes that there would be more than a million points. Gathering at them takes as
     /// many samples as gathering at the probes, in all.
     pub points: u32,
-    /// Where clients read the volumes.
-    pub offset: OffsetPolicy,
 }
 
 /// Rounds and steps of a tick's fit, which goes on from the last one's.
@@ -141,7 +147,7 @@ impl Tick {
         }
         let volumes =
             if options.volumes.is_empty() { scene.volumes() } else { options.volumes.clone() };
-        let fields = Field::all(&volumes, options.gather.blend, options.gather.fit)?;
+        let fields = Field::all(&volumes, &options.gather)?;
         let told_scales = fields.iter().map(Field::scale_log2).collect();
         let budget = Budget::new(options.period, options.samples);
         let last = Report::default();

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use glam::{UVec3, Vec3};
 use lumencast_codec::{EncodedRegion, Epoch};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::{OffsetPolicy, ProbeVolume};
+use lumencast_light::ProbeVolume;
 use lumencast_scene::{Edit, LightSpec, NodeId, Scene, Transform, VolumeSpec};
 use lumencast_server::{
     FitOptions, GatherOptions, Mail, Outlet, Received, SampleRange, Tick, TickOptions, bake,
 };
 
-const FIT: FitOptions = FitOptions { points: 16, offset: OffsetPolicy::HalfCell };
+const FIT: FitOptions = FitOptions { points: 16 };
 
 /// Nobody listens.
 struct Nowhere;
@@ -64,9 +64,7 @@ fn difference(a: &ProbeVolume, b: &ProbeVolume) -> f32 {
         for i in 0..100_u8 {
             let at = |k: u8| f32::from(k) * 0.2 - 0.9;
             let at = (middle - middle.y * Vec3::Y * normal.y) + at(i % 10) * u + at(i / 10) * v;
-            let read = |light: &ProbeVolume| {
-                light.sample(at, normal, OffsetPolicy::HalfCell).irradiance(normal).y
-            };
+            let read = |light: &ProbeVolume| light.sample(at, normal).irradiance(normal).y;
             squares += (read(a) - read(b)).powi(2);
             sum += read(b);
         }

@@ -5,9 +5,7 @@
 //! probes, so that filtering never reaches a neighbour.
 
 use glam::{Affine3A, Mat3, UVec3};
-use lumencast_light::{
-    Atlas, LightField, OffsetPolicy, ProbeVolume, ScaleRule, atlas_size, texels,
-};
+use lumencast_light::{Atlas, LightField, ProbeVolume, ScaleRule, atlas_size, texels};
 use lumencast_shaders::layout;
 
 use crate::ShadeError;
@@ -51,17 +49,12 @@ impl GpuField {
             ..Default::default()
         });
         let atlas = texture(gpu, UVec3::ONE);
-        let group = group(gpu, &layout, &sampler, &atlas, &[], OffsetPolicy::None);
+        let group = group(gpu, &layout, &sampler, &atlas, &[]);
         Self { layout, sampler, group, sizes: vec![], origins: vec![], atlas, scales: vec![] }
     }
 
     /// Takes in other light. Where the volumes are as large as before, the texture stays.
-    pub(crate) fn update(
-        &mut self,
-        gpu: &Gpu,
-        light: &LightField,
-        offset: OffsetPolicy,
-    ) -> Result<(), ShadeError> {
+    pub(crate) fn update(&mut self, gpu: &Gpu, light: &LightField) -> Result<(), ShadeError> {
         let volumes = light.volumes();
         let sizes: Vec<UVec3> =
             volumes.iter().map(|v| atlas_size(v.grid.resolution, v.order)).collect();
@@ -79,7 +72,7 @@ impl GpuField {
             write(gpu, &self.atlas, origin, &packed);
             placed.push(of_volume(volume, origin, packed.scale_log2));
         }
-        self.group = group(gpu, &self.layout, &self.sampler, &self.atlas, &placed, offset);
+        self.group = group(gpu, &self.layout, &self.sampler, &self.atlas, &placed);
         Ok(())
     }
 }
@@ -115,7 +108,9 @@ fn of_volume(volume: &ProbeVolume, origin: UVec3, scale_log2: i8) -> layout::Vol
         resolution,
         texels: texels(volume.order) as u32,
         origin: origin.as_vec3(),
-        _pad: 0.0,
+        _pad0: 0.0,
+        offset: volume.offset.in_cells(grid),
+        _pad1: 0.0,
     }
 }
 
@@ -156,15 +151,8 @@ fn group(
     sampler: &wgpu::Sampler,
     atlas: &wgpu::Texture,
     volumes: &[layout::Volume],
-    offset: OffsetPolicy,
 ) -> wgpu::BindGroup {
-    let (offset_policy, offset_metres) = match offset {
-        OffsetPolicy::None => (0, 0.0),
-        OffsetPolicy::HalfCell => (1, 0.0),
-        OffsetPolicy::Metres(metres) => (2, metres),
-    };
-    let field =
-        layout::Field { count: volumes.len() as u32, offset_policy, offset_metres, _pad: 0 };
+    let field = layout::Field { count: volumes.len() as u32 };
     let uniform = gpu.buffer("field", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&field), 0);
     let least = size_of::<layout::Volume>() as u64;
     let storage = wgpu::BufferUsages::STORAGE;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
-use lumencast_light::{LightField, OffsetPolicy};
+use lumencast_light::LightField;
 use lumencast_scene::{Snapshot, View};
 use lumencast_shaders::layout;
 
@@ -29,7 +29,7 @@ const GOLDEN: f32 = 0.618_034;
 /// Draws pictures of a scene under the light of a field.
 ///
 /// ```no_run
-/// use lumencast_light::{LightField, OffsetPolicy};
+/// use lumencast_light::LightField;
 /// use lumencast_scene::Scene;
 /// use lumencast_shade::{Gpu, Renderer, Settings};
 ///
@@ -37,7 +37,7 @@ const GOLDEN: f32 = 0.618_034;
 /// let settings = Settings::default();
 /// let mut renderer = Renderer::new(Gpu::new()?, &settings);
 /// renderer.set_scene(&scene.snapshot());
-/// renderer.set_light(&LightField::default(), OffsetPolicy::HalfCell)?;
+/// renderer.set_light(&LightField::default())?;
 /// let view = scene.cameras()[0].view();
 /// let pictures = renderer.pictures(&[view], &settings)?;
 /// assert_eq!(pictures[0].len(), 1280 * 720);
@@ -152,16 +152,12 @@ impl Renderer {
         self.wanted = Some(snapshot.clone());
     }
 
-    /// Takes indirect light from this field from now on, read so far in front of surfaces.
+    /// Takes indirect light from this field from now on, read where its volumes say.
     ///
     /// # Errors
     /// Where it does not fit the device's textures.
-    pub fn set_light(
-        &mut self,
-        light: &LightField,
-        offset: OffsetPolicy,
-    ) -> Result<(), ShadeError> {
-        self.field.update(&self.gpu, light, offset)
+    pub fn set_light(&mut self, light: &LightField) -> Result<(), ShadeError> {
+        self.field.update(&self.gpu, light)
     }
 
     /// One picture a view, all under the same light: radiance (cd/m²), row by row from the top left.

@@ -102,14 +102,11 @@ pub struct ShadowView {
     pub _pad2: f32,
 }
 
-/// How many volumes there are, and where they are read. Group 2, binding 0.
+/// How many volumes there are. Group 2, binding 0.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Field {
     pub count: u32,
-    pub offset_policy: u32,
-    pub offset_metres: f32,
-    pub _pad: u32,
 }
 
 /// A probe volume in the atlas. Group 2, binding 1.
@@ -122,7 +119,9 @@ pub struct Volume {
     pub resolution: Vec3,
     pub texels: u32,
     pub origin: Vec3,
-    pub _pad: f32,
+    pub _pad0: f32,
+    pub offset: Vec3,
+    pub _pad1: f32,
 }
 
 /// How a texture is looked up.

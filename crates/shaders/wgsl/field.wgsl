@@ -12,15 +12,14 @@ struct Volume {
     texels: u32,
     // Texel of the atlas where the volume begins.
     origin: vec3f,
-    _pad: f32,
+    _pad0: f32,
+    // How far along a normal light is read, in cells along each of the box's axes.
+    offset: vec3f,
+    _pad1: f32,
 }
 
 struct Field {
     count: u32,
-    // 0: none, 1: half a cell, 2: metres.
-    offset_policy: u32,
-    offset_metres: f32,
-    _pad: u32,
 }
 
 @group(2) @binding(0) var<uniform> field: Field;
@@ -62,12 +61,8 @@ fn volume_distance(v: Volume, position: vec3f) -> f32 {
 
 // Where the texture is read for a surface: in cells, clamped to the outermost probes.
 fn sampled_cell(v: Volume, position: vec3f, normal: vec3f) -> vec3f {
-    var cell = cell_of(v, position);
-    if field.offset_policy == 1u {
-        cell += 0.5 * transform_vector(v.cell_from_world, normal) * v.spacing;
-    } else if field.offset_policy == 2u {
-        cell += field.offset_metres * transform_vector(v.cell_from_world, normal);
-    }
+    let out = transform_vector(v.cell_from_world, normal) * v.spacing;
+    let cell = cell_of(v, position) + v.offset * out;
     return clamp(cell, vec3f(0.0), v.resolution - 1.0);
 }
 

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use egui::{ComboBox, Grid, Label, RichText, Slider, Ui};
-use lumencast_light::OffsetPolicy;
+use lumencast_light::Offset;
 use lumencast_picture::ToneMap;
 use lumencast_shade::{Lighting, Occlusion, Settings, Shading, Transparency};
 
@@ -15,8 +15,8 @@ use crate::exposure::Exposure;
 pub struct Controls {
     /// How pictures are drawn; size and pre-exposure are the window's business.
     pub settings: Settings,
-    /// Where in front of surfaces light is read.
-    pub offset: OffsetPolicy,
+    /// Where in front of surfaces light is read, where that is elsewhere than the light says.
+    pub offset: Option<Offset>,
     /// Band at which a Hann window against ringing ends, where there is one.
     pub window: Option<f32>,
     /// From linear light to the display.
@@ -150,11 +150,19 @@ fn drawing(ui: &mut Ui, controls: &mut Controls) {
     ui.add(Slider::new(&mut shadows.filter_samples, 1..=64).text("PCF samples"));
     ui.add(Slider::new(&mut shadows.search_samples, 0..=64).text("PCSS samples"));
     occlusion(ui, &mut settings.occlusion);
-    let offsets = [OffsetPolicy::HalfCell, OffsetPolicy::None, OffsetPolicy::Metres(0.1)];
+    let offsets = [
+        None,
+        Some(Offset::NONE),
+        Some(Offset::Cells(0.125)),
+        Some(Offset::HALF_CELL),
+        Some(Offset::Metres(0.1)),
+    ];
     choice(ui, "Light is read", &mut controls.offset, &offsets, |offset| match offset {
-        OffsetPolicy::None => "at the surface".into(),
-        OffsetPolicy::HalfCell => "half a cell off it".into(),
-        OffsetPolicy::Metres(metres) => format!("{metres} m off it"),
+        None => "where it says".into(),
+        Some(Offset::NONE) => "at the surface".into(),
+        Some(Offset::HALF_CELL) => "half a cell off it".into(),
+        Some(Offset::Cells(cells)) => format!("{cells} cells off it"),
+        Some(Offset::Metres(metres)) => format!("{metres} m off it"),
     });
     let windows = [None, Some(5.0), Some(4.0), Some(3.0)];
     choice(ui, "Window of harmonics", &mut controls.window, &windows, |window| match window {

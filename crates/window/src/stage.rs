@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use egui::{Color32, Panel, PlatformOutput, RawInput, Rect, Sense, Ui};
 use egui_wgpu::ScreenDescriptor;
 use glam::UVec2;
-use lumencast_light::{OffsetPolicy, zh};
+use lumencast_light::{Offset, zh};
 use lumencast_picture::Picture;
 use lumencast_scene::{Aabb, View};
 use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Screen, Settings, Show, wgpu};
@@ -32,7 +32,7 @@ pub struct Stage {
     context: egui::Context,
     device: Device,
     /// How the light that the device has is read.
-    lit: Option<(OffsetPolicy, Option<f32>)>,
+    lit: Option<(Option<Offset>, Option<f32>)>,
     frames: Frames,
     drawn: Drawn,
     time: Option<PassTimes>,
@@ -238,18 +238,25 @@ impl Stage {
         let show = Show { exposure: settings.pre_exposure, tone_map: self.controls.tone_map };
         let Device { renderer, screen, .. } = &mut self.device;
         renderer.set_scene(&self.world.snapshot());
-        let (offset, window) = (self.controls.offset, self.controls.window);
+        let wanted = (self.controls.offset, self.controls.window);
         let mut taken = Ok(());
-        self.world.light(self.lit != Some((offset, window)), &mut |light| {
-            taken = match window {
-                Some(width) => {
-                    renderer.set_light(&light.clone().convolved(&zh::hann(width)), offset)
+        self.world.light(self.lit != Some(wanted), &mut |light| {
+            taken = match wanted {
+                (None, None) => renderer.set_light(light),
+                (offset, window) => {
+                    let mut light = light.clone();
+                    if let Some(offset) = offset {
+                        light = light.read_at(offset);
+                    }
+                    if let Some(band) = window {
+                        light = light.convolved(&zh::hann(band));
+                    }
+                    renderer.set_light(&light)
                 }
-                None => renderer.set_light(light, offset),
             };
         });
         taken?;
-        self.lit = Some((offset, window));
+        self.lit = Some(wanted);
         self.drawn = renderer.show(&self.camera.view(), &settings, screen, show, onto)?;
         // Those who draw the panel do not expect a device that is gone.
         renderer.gpu().health()?;

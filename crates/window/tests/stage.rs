@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, pos2, vec2};
 use glam::{UVec2, Vec3};
-use lumencast_light::{LightField, OffsetPolicy};
+use lumencast_light::LightField;
 use lumencast_picture::{Loaded, ToneMap};
 use lumencast_scene::Scene;
 use lumencast_shade::{Gpu, Lighting, Settings, wgpu};
@@ -43,7 +43,7 @@ impl Test {
         std::fs::create_dir_all(&folder).unwrap();
         let controls = Controls {
             settings: Settings { samples: 1, ..Settings::default() },
-            offset: OffsetPolicy::HalfCell,
+            offset: None,
             window: None,
             tone_map: ToneMap::Srgb,
             exposure: Exposure::new(None),

@@ -17,6 +17,7 @@ export {
   epochOf,
   type Field,
   type Grid,
+  type Offset,
   parseCatalog,
   type Region,
   valuesPerProbe,

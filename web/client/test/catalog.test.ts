@@ -30,6 +30,13 @@ describe('a catalog', () => {
     expect(epochOf(read, read.fields[0])).toBe(fieldEpoch);
   });
 
+  it('tells where in front of surfaces a field is read: half a cell unless it says so', () => {
+    expect(parseCatalog(catalog()).fields[0].offset).toEqual({ cells: 0.5 });
+    for (const offset of [{ cells: 0.125 }, { metres: 0.1 }]) {
+      expect(parseCatalog(catalog((_, f) => (f.offset = offset))).fields[0].offset).toEqual(offset);
+    }
+  });
+
   it('tells a field’s scale where there is light', () => {
     expect('scale' in parseCatalog(catalog()).fields[0]).toBe(false);
     expect(parseCatalog(catalog((_, f) => (f.scale_log2 = -9))).fields[0].scale).toBe(2 ** -9);
@@ -43,6 +50,7 @@ describe('a catalog', () => {
     expect(same((_, f) => (f.epoch = '00000000000000ab'))).toBe(false);
     expect(same((_, f) => (f.source = 'another'))).toBe(false);
     expect(same((_, f) => (f.layers = 2))).toBe(false);
+    expect(same((_, f) => (f.offset = { cells: 0 }))).toBe(false);
     expect(same((_, f) => (f.grid.size = [4, 2, 3]))).toBe(false);
     expect(same((c) => (c.fields = []))).toBe(false);
   });
@@ -61,6 +69,8 @@ describe('a catalog', () => {
     ['a field twice', 'malformed', (c, f) => c.fields.push(f)],
     ['order 5', 'malformed', (_, f) => (f.order = 5)],
     ['an unknown use', 'malformed', (_, f) => (f.use = 'some')],
+    ['an offset without a unit', 'malformed', (_, f) => (f.offset = 0.5)],
+    ['an offset in feet', 'malformed', (_, f) => (f.offset = { feet: 1 })],
     ['no layers', 'malformed', (_, f) => (f.layers = 0)],
     ['a scale of 2^128', 'malformed', (_, f) => (f.scale_log2 = 128)],
     ['half a power as scale', 'malformed', (_, f) => (f.scale_log2 = 0.5)],

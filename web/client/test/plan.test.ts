@@ -14,6 +14,7 @@ function field(regions: Region[], resolution: Vec3, rotation: Vec4 = [0, 0, 0, 1
     order: 2,
     use: 'all',
     grid: { center: [10, 0, 0], rotation, size: [8, 4, 4], resolution },
+    offset: { cells: 0.5 },
     cellsMin: [0, 0, 0],
     regions,
     layers: 3,

@@ -62,6 +62,12 @@ function forAllInstances(fields: readonly Field[], warnings: string[]): readonly
 
 function gridOf(field: Field, maxCells: Vec3, warnings: string[]): GridPlan {
   const { center, size, resolution, rotation } = field.grid;
+  if (!('cells' in field.offset && field.offset.cells === 0.5)) {
+    const off = 'cells' in field.offset ? `${field.offset.cells} cells` : `${field.offset.metres} m`;
+    warnings.push(
+      `volume ${field.id} is meant to be read ${off} off surfaces: three.js reads it half a cell off`,
+    );
+  }
   const turned = Math.hypot(rotation[0], rotation[1], rotation[2]) > 1e-4;
   if (!turned && resolution.every((n, axis) => n <= maxCells[axis])) {
     return { center, size, resolution, fields: [field], exact: true };

@@ -56,6 +56,7 @@ const field: Field = {
   order: 2,
   use: 'all',
   grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: [1, 1, 1], resolution: [1, 1, 1] },
+  offset: { cells: 0.5 },
   cellsMin: [0, 0, 0],
   regions: [],
   layers: 3,

@@ -15,6 +15,7 @@ function field(id: number, grid: Partial<Field['grid']>, rest: Partial<Field> = 
     order: 2,
     use: 'all',
     grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: [4, 4, 4], resolution: [4, 4, 4], ...grid },
+    offset: { cells: 0.5 },
     cellsMin: [0, 0, 0],
     regions: [],
     layers: 3,
@@ -43,6 +44,13 @@ describe('planVolumes', () => {
     const { grids, warnings } = planVolumes([field(0, { resolution: [10, 6, 7], size: [8, 6, 4] })], WIDE);
     expect(warnings).toEqual([]);
     expect(grids).toMatchObject([{ exact: true, resolution: [10, 6, 7], size: [8, 6, 4] }]);
+  });
+
+  it('says where light is meant to be read elsewhere than three.js does', () => {
+    const { grids, warnings } = planVolumes([field(0, {}, { offset: { cells: 0.125 } })], WIDE);
+    expect(warnings).toEqual([expect.stringContaining('0.125 cells off surfaces')]);
+    expect(grids).toMatchObject([{ exact: true }]);
+    expect(planVolumes([field(0, {}, { offset: { metres: 1 } })], WIDE).warnings).toHaveLength(1);
   });
 
   it('gives the finer of two overlapping volumes the higher priority', () => {

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use clap::Args;
 use lumencast_codec::{EncodedRegion, Epoch, ProbeHeader};
-use lumencast_light::OffsetPolicy;
 use lumencast_server::{Mail, Outlet, Report, Stage, Tick};
 use serde_json::{Value, json};
 
@@ -45,8 +44,7 @@ const RAW_BYTES: [(&str, u64); 2] = [("paper", 56), ("implementation", 72)];
 impl BenchTick {
     pub(crate) fn run(self) -> Result<()> {
         let scene = self.scene.source.open()?;
-        let options =
-            self.tick.options(&scene, &self.scene, &self.gather, OffsetPolicy::default())?;
+        let options = self.tick.options(&scene, &self.scene, &self.gather)?;
         let period = options.period;
         let mut tick = Tick::new(scene, self.gather.gatherer()?, options, Epoch(0))?;
         let ticks = SETTLING + (self.seconds * self.tick.rate).ceil().clamp(1.0, 1e7) as usize;

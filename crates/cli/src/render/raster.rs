@@ -5,16 +5,14 @@ use std::time::Instant;
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use glam::{Affine3A, UVec2, Vec3};
-use lumencast_light::{LightField, OffsetPolicy, ProbeVolume, zh};
+use lumencast_light::{LightField, ProbeVolume, zh};
 use lumencast_picture::{Picture, exposure};
 use lumencast_scene::{Scene, View};
 use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadows, Transparency};
 use serde_json::json;
 
 use super::{Lighting, PartsArgument, Render};
-use crate::arguments::{
-    BAKED_POINTS, FitArguments, occlusion, parse_occlusion, parse_offset, parse_positive,
-};
+use crate::arguments::{ReadingArguments, occlusion, parse_occlusion, parse_positive};
 use crate::light_source::{self, Computed};
 use crate::output;
 
@@ -37,11 +35,8 @@ pub(crate) struct RasterArguments {
     #[arg(long, value_name = "N", default_value_t = 2048,
           value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     probe_samples: u32,
-    /// Where in front of a surface the field is read: none, half-cell or metres.
-    #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
-    offset: OffsetPolicy,
     #[command(flatten)]
-    fit: FitArguments,
+    reading: ReadingArguments,
     /// Takes ringing out of the field by a Hann window that ends at this band; 3 leaves order 2 a
     /// quarter of its band 2. None unless given.
     #[arg(long, value_name = "BAND", value_parser = parse_positive)]
@@ -105,11 +100,14 @@ impl Render {
         if settings.lighting.indirect {
             let volumes = self.volumes(scene)?;
             probes = volumes.iter().map(|volume| volume.grid.probe_count()).sum();
-            let light = match self.raster.window {
-                Some(width) => LightField::new(volumes).convolved(&zh::hann(width)),
-                None => LightField::new(volumes),
-            };
-            renderer.set_light(&light, self.raster.offset)?;
+            let mut light = LightField::new(volumes);
+            if let Some(width) = self.raster.window {
+                light = light.convolved(&zh::hann(width));
+            }
+            if let Some(offset) = self.raster.reading.offset {
+                light = light.read_at(offset);
+            }
+            renderer.set_light(&light)?;
         }
         let grid = self.raster.views.unwrap_or(UVec2::ONE);
         let views = views(&view, grid, self.raster.view_spacing);
@@ -168,7 +166,7 @@ impl Render {
             samples: self.raster.probe_samples,
             bounces: self.picture.bounces.saturating_sub(1),
             clamp: self.clamp,
-            fit: self.raster.fit.options(BAKED_POINTS, self.raster.offset),
+            reading: self.raster.reading.drawn(),
             tracing: self.picture.tracing(),
         };
         computed.volumes(&scene.snapshot(), &specs)

@@ -9,7 +9,7 @@
 //! Σₚ wₚ |Eₚ − Rₚ c|² + Σⱼ sⱼ/4π Σₖ A²ₖ |cⱼₖ − gⱼₖ|²
 //!
 //! - Eₚ is the irradiance at point p of a surface, and Rₚ reads it from the volume just as a client
-//!   does: trilinear, off the surface by the client's [`OffsetPolicy`], convolved by the cosine. The
+//!   does: trilinear, off the surface by the volume's [offset](lumencast_light::Offset), convolved by the cosine. The
 //!   two sides of a wall are read from other places and in other directions, so that even a wall
 //!   within a cell keeps them apart.
 //! - Points are those that are [seen](Surroundings) from the probes themselves, so that a surface
@@ -30,7 +30,7 @@
 mod solve;
 
 use glam::Vec3;
-use lumencast_light::{OffsetPolicy, ProbeVolume, sh};
+use lumencast_light::{ProbeVolume, sh};
 
 use crate::sampling::luminance;
 use crate::{Place, Receiver, Sums, SurfacePoint};
@@ -49,8 +49,6 @@ const SLOPE: f32 = 2.0 * (1.0 - 1.0 / 2.2);
 /// How probes are fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitSettings {
-    /// Where clients read the volume.
-    pub offset: OffsetPolicy,
     /// s of a probe that is not inside of anything: as many points of surfaces its own light is
     /// worth.
     pub stiffness: f32,
@@ -62,7 +60,7 @@ pub struct FitSettings {
 
 impl Default for FitSettings {
     fn default() -> Self {
-        Self { offset: OffsetPolicy::default(), stiffness: 1.0, rounds: 4, steps: 64 }
+        Self { stiffness: 1.0, rounds: 4, steps: 64 }
     }
 }
 
@@ -145,7 +143,7 @@ impl Surroundings {
             }
         }
         let row = |(at, irradiance): (SurfacePoint, Vec3)| {
-            let corners = volume.grid.corners(at.position, at.normal, settings.offset);
+            let corners = volume.corners(at.position, at.normal);
             corners.inside.then(|| Row {
                 probes: corners.probes.map(|probe| probe as u32),
                 shares: corners.shares,

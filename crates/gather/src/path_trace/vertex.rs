@@ -1,7 +1,7 @@
 //! What happens at the vertices of paths: emission, light reached for, scattering.
 
 use glam::{Mat3, Vec3};
-use lumencast_light::{LightField, OffsetPolicy};
+use lumencast_light::LightField;
 
 use super::integrator::{Connection, Part, Path, Paths, Segment};
 use crate::accel::{Hit, Ray};
@@ -233,7 +233,7 @@ impl Vertex<'_> {
         let direction = next.ray.direction;
         let normal = self.frame.z_axis;
         let side = normal * 1.0f32.copysign(normal.dot(direction));
-        let arriving = field.sample(self.point.position, side, OffsetPolicy::HalfCell);
+        let arriving = field.sample(self.point.position, side);
         arriving.map_or(Vec3::ZERO, |light| weight * light.radiance(direction))
     }
 

@@ -2,7 +2,7 @@
 
 use crate::common::{SIZE, drawn, renderer};
 use glam::{Quat, UVec2, UVec3, Vec3};
-use lumencast_light::{Grid, LightField, OffsetPolicy, Order, ProbeVolume, VolumeId};
+use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
 use lumencast_scene::{Environment, Light, LightKind, Scene, View};
 use lumencast_shade::{Gpu, Lighting, Renderer, Settings, ShadeError, Transparency};
 use lumencast_testkit::scenes::{Stage, lambert};
@@ -79,9 +79,9 @@ fn a_field_too_large_for_the_adapter_is_refused() {
     };
     let light = LightField::new(vec![ProbeVolume::dark(VolumeId(0), grid, Order::L4)]);
     let mut renderer = renderer(&lit_by([]), &settings());
-    let error = renderer.set_light(&light, OffsetPolicy::None).unwrap_err();
+    let error = renderer.set_light(&light).unwrap_err();
     assert!(error.to_string().contains("fewer or coarser"), "{error}");
-    renderer.set_light(&LightField::default(), OffsetPolicy::None).unwrap();
+    renderer.set_light(&LightField::default()).unwrap();
 }
 
 #[test]
@@ -133,7 +133,7 @@ fn parts_add_up() {
     (0..8).for_each(|probe| volume.probe_mut(probe)[0] = Vec3::new(1.0, 2.0, 3.0));
     let view = scene.cameras()[0].view();
     let mut renderer = renderer(&scene.snapshot(), &settings());
-    renderer.set_light(&LightField::new(vec![volume]), OffsetPolicy::HalfCell).unwrap();
+    renderer.set_light(&LightField::new(vec![volume])).unwrap();
     let mut of = |lighting| {
         renderer.pictures(&[view], &Settings { lighting, ..settings() }).unwrap().remove(0)
     };

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::common::renderer;
 use glam::{Quat, UVec2, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::{Grid, LightField, OffsetPolicy, Order, ProbeVolume, VolumeId};
+use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
 use lumencast_picture::{Loaded, PIXELS_PER_DEGREE, Pair, Picture, ToneMap, flip};
 use lumencast_scene::{Environment, Light, LightKind, Material, Scene, Snapshot, View, VolumeSpec};
 use lumencast_server::{GatherOptions, bake};
@@ -38,7 +38,7 @@ impl Drawn {
     fn picture(&self, settings: &Settings) -> Picture {
         let settings = Settings { pre_exposure: self.exposure, ..*settings };
         let mut renderer = renderer(&self.scene, &settings);
-        renderer.set_light(&self.light, OffsetPolicy::HalfCell).unwrap();
+        renderer.set_light(&self.light).unwrap();
         let pixels = renderer.pictures(&[self.view], &settings).unwrap().remove(0);
         // As a file has them: eight bits.
         let code = |linear: Vec3| {

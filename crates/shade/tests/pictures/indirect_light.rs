@@ -6,9 +6,7 @@ use std::sync::Arc;
 
 use crate::common::{SIZE, drawn, renderer};
 use glam::{Affine2, DVec3, Quat, UVec2, UVec3, Vec2, Vec3};
-use lumencast_light::{
-    Grid, LightField, OffsetPolicy, Order, ProbeVolume, Sh, VolumeId, sh::basis,
-};
+use lumencast_light::{Grid, LightField, Offset, Order, ProbeVolume, Sh, VolumeId, sh::basis};
 use lumencast_scene::{
     Filter, Image, Light, LightKind, Material, Snapshot, TextureRef, View, Wrap,
 };
@@ -50,13 +48,13 @@ fn volume(id: u32, center: Vec3, turn: f32, cells: UVec3, order: Order) -> Probe
 
 /// What every pixel of the floor should show, read from the field on the processor; the largest
 /// difference from what the adapter draws, relative to the largest light.
-fn worst(drawn_light: &LightField, light: &LightField, offset: OffsetPolicy) -> f32 {
+fn worst(drawn_light: &LightField, light: &LightField) -> f32 {
     let albedo = Vec3::new(0.9, 0.6, 0.3);
     let scene = floor(lambert(albedo, Vec3::ZERO));
     let view = View::look_at(Vec3::new(1.0, 2.5, 3.0), Vec3::ZERO, 0.9).unwrap();
     let settings = Settings { pre_exposure: 1e-3, ..settings() };
     let mut renderer = renderer(&scene, &settings);
-    renderer.set_light(drawn_light, offset).unwrap();
+    renderer.set_light(drawn_light).unwrap();
     let picture = renderer.pictures(&[view], &settings).unwrap().remove(0);
 
     let (mut worst, mut largest) = (0.0f32, 0.0f32);
@@ -68,7 +66,7 @@ fn worst(drawn_light: &LightField, light: &LightField, offset: OffsetPolicy) -> 
         if direction.y >= 0.0 || point.abs().max_element() > 2.95 {
             continue;
         }
-        let irradiance = light.irradiance(point, Vec3::Y, offset).max(Vec3::ZERO);
+        let irradiance = light.irradiance(point, Vec3::Y).max(Vec3::ZERO);
         let expected = albedo / std::f32::consts::PI * irradiance;
         largest = largest.max(expected.max_element());
         worst = worst.max((*pixel - expected).abs().max_element());
@@ -83,10 +81,13 @@ fn read_as_on_the_processor() {
     for order in ORDERS {
         let light =
             LightField::new(vec![volume(0, Vec3::Y * 0.5, 0.4, UVec3::new(5, 3, 4), order)]);
-        for offset in [OffsetPolicy::None, OffsetPolicy::HalfCell, OffsetPolicy::Metres(0.3)] {
-            let worst = worst(&light, &light, offset);
+        for offset in [Offset::NONE, Offset::HALF_CELL, Offset::Metres(0.3)] {
+            let light = light.clone().read_at(offset);
+            let worst = worst(&light, &light);
             assert!(worst < 5e-3, "{order:?} {offset:?}: {worst}");
         }
+        let elsewhere = light.clone().read_at(Offset::Metres(0.4));
+        assert!(worst(&elsewhere, &light) > 0.01, "{order:?}: another offset is noticed");
     }
 }
 
@@ -97,15 +98,14 @@ fn volumes_of_many_kinds_meet() {
         volume(1, Vec3::new(1.5, 0.2, 0.5), 0.7, UVec3::new(8, 4, 7), Order::L3),
         volume(2, Vec3::new(-2.0, 0.4, -1.0), -0.3, UVec3::new(9, 3, 9), Order::L2),
     ]);
-    let offset = OffsetPolicy::HalfCell;
-    let all = worst(&light, &light, offset);
+    let all = worst(&light, &light);
     assert!(all < 5e-3, "{all}");
     // What was read is really that of these volumes.
     let fewer = LightField::new(light.volumes()[..2].to_vec());
-    assert!(worst(&fewer, &light, offset) > 0.05, "a volume that is missing is noticed");
+    assert!(worst(&fewer, &light) > 0.05, "a volume that is missing is noticed");
     let mut other = light.clone();
     other.volumes_mut()[1].coefficients.iter_mut().for_each(|c| *c *= 1.1);
-    assert!(worst(&other, &light, offset) > 0.01, "a tenth more light is noticed");
+    assert!(worst(&other, &light) > 0.01, "a tenth more light is noticed");
 }
 
 /// A field of one probe, which is the same everywhere.
@@ -173,7 +173,7 @@ fn errors_of_metal(order: Order, angle: f32, roughness: &[f32]) -> Vec<f32> {
     let error = |&roughness: &f32| {
         let scene = floor(Material { metallic: 1.0, roughness, ..Material::default() });
         let mut renderer = renderer(&scene, &settings());
-        renderer.set_light(&light, OffsetPolicy::None).unwrap();
+        renderer.set_light(&light).unwrap();
         let picture = renderer.pictures(&[view], &settings()).unwrap().remove(0);
         let middle = picture[(SIZE.y / 2 * SIZE.x + SIZE.x / 2) as usize].x;
         let expected = reflected_by_metal(&sh, roughness.into(), toward_eye.as_dvec3()) as f32;
@@ -216,7 +216,7 @@ fn furnace() {
     ] {
         let scene = floor(material);
         let mut renderer = renderer(&scene, &settings());
-        renderer.set_light(&light, OffsetPolicy::None).unwrap();
+        renderer.set_light(&light).unwrap();
         let picture = renderer.pictures(&[view], &settings()).unwrap().remove(0);
         let middle = picture[(SIZE.y / 2 * SIZE.x + SIZE.x / 2) as usize].x;
         assert!((least..1.003).contains(&middle), "{name}: {middle}");
@@ -245,7 +245,7 @@ fn occlusion_takes_from_indirect_light_alone() {
     let light = uniform(&sh);
     let view = View::look_at(Vec3::new(1.0, 2.5, 3.0), Vec3::ZERO, 0.9).unwrap();
     let mut renderer = renderer(&floor(Material::default()), &settings());
-    renderer.set_light(&light, OffsetPolicy::None).unwrap();
+    renderer.set_light(&light).unwrap();
     let mut drawn = |material: &Material, settings: &Settings| {
         let mut stage = Stage::default();
         let material = stage.material(material.clone());
@@ -320,7 +320,7 @@ fn no_light() {
     let mut sh = Sh::dark(Order::L2);
     sh.coefficients[0] = Vec3::splat(-3.0);
     let mut renderer = renderer(&scene, &settings());
-    renderer.set_light(&uniform(&sh), OffsetPolicy::None).unwrap();
+    renderer.set_light(&uniform(&sh)).unwrap();
     let picture = renderer.pictures(&[view], &settings()).unwrap().remove(0);
     assert!(picture.iter().all(|p| *p == Vec3::ZERO));
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::common::renderer;
 use glam::{Quat, UVec2, UVec3, Vec3};
-use lumencast_light::{Grid, LightField, OffsetPolicy, Order, ProbeVolume, VolumeId};
+use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
 use lumencast_scene::{
     AlphaMode, Light, LightKind, Material, MaterialId, Projection, Snapshot, View,
 };
@@ -45,7 +45,7 @@ fn uniform() -> LightField {
 
 fn lit(scene: &Arc<Snapshot>, settings: &Settings) -> Renderer {
     let mut renderer = renderer(scene, settings);
-    renderer.set_light(&uniform(), OffsetPolicy::None).unwrap();
+    renderer.set_light(&uniform()).unwrap();
     renderer
 }
 

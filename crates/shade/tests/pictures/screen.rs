@@ -2,7 +2,7 @@
 
 use crate::common::{SIZE, renderer};
 use glam::{UVec2, Vec3};
-use lumencast_light::{LightField, OffsetPolicy};
+use lumencast_light::LightField;
 use lumencast_picture::{Picture, ToneMap, luminance};
 use lumencast_scene::{Environment, Scene, View};
 use lumencast_shade::{Gpu, Measured, Renderer, Screen, Settings, ShadeError, Show, wgpu};
@@ -99,7 +99,7 @@ fn codes_and_exposure_are_the_processors() {
     let view = scene.views()[0].view;
     let settings = Settings { size: SIZE, samples: 1, ..Settings::default() };
     let mut renderer = renderer(&scene.snapshot(), &settings);
-    renderer.set_light(&LightField::default(), OffsetPolicy::HalfCell).unwrap();
+    renderer.set_light(&LightField::default()).unwrap();
     let picture = renderer.pictures(&[view], &settings).unwrap().remove(0);
     let picture = Picture::new(SIZE.x, SIZE.y, picture).unwrap();
     let best = suited(&picture);

@@ -69,9 +69,10 @@ export class FieldCache {
 
   /** Whether another field's light could take this one's place. */
   sameShape(field: Field): boolean {
-    const shape = ({ order, grid, cellsMin, regions, use }: Field) => ({
+    const shape = ({ order, grid, offset, cellsMin, regions, use }: Field) => ({
       order,
       grid,
+      offset,
       cellsMin,
       regions,
       use,

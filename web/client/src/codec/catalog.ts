@@ -31,6 +31,12 @@ export interface Field {
   /** Which instances the field is for. */
   readonly use: 'static' | 'moving' | 'all';
   readonly grid: Grid;
+  /**
+   * How far along its normal a point of a surface is moved before light is read there, in cells along
+   * each of the box's axes or in metres. Half a cell is three.js's rule; light that was fitted to be read
+   * elsewhere is wrong there.
+   */
+  readonly offset: Offset;
   /** Absolute integer coordinates of the grid's first cell; 0 unless the volume scrolls. */
   readonly cellsMin: Vec3;
   readonly regions: readonly Region[];
@@ -46,6 +52,9 @@ export interface Field {
   /** The run of the server that computes it, where that is not the catalog's; see {@link epochOf}. */
   readonly epoch?: string;
 }
+
+/** Where in front of a surface light is read. */
+export type Offset = { readonly cells: number } | { readonly metres: number };
 
 /** An oriented box divided into cells. */
 export interface Grid {
@@ -135,6 +144,7 @@ function parseField(json: Json): Field {
     order: whole(json.order, 'order', 4, 1),
     use,
     grid,
+    offset: json.offset === undefined ? { cells: 0.5 } : parseOffset(object(json.offset, 'offset')),
     cellsMin: json.cells_min === undefined ? [0, 0, 0] : vec3(json.cells_min, 'cells_min', anyWhole),
     regions: parseRegions(json.regions, grid.resolution),
     layers: whole(json.layers, 'layers', LIMITS.layers, 1),
@@ -142,6 +152,12 @@ function parseField(json: Json): Field {
     ...(json.source === undefined ? {} : { source: parseSource(json.source) }),
     ...(json.epoch === undefined ? {} : { epoch: parseEpoch(json.epoch) }),
   };
+}
+
+function parseOffset(json: Json): Offset {
+  return json.cells === undefined
+    ? { metres: number(json.metres, 'offset.metres') }
+    : { cells: number(json.cells, 'offset.cells') };
 }
 
 function parseEpoch(json: unknown): string {

@@ -34,6 +34,7 @@ export function catalogOf(counts: Vec3, tickSeconds = TICK): Catalog {
       size: resolution,
       resolution,
     },
+    offset: { cells: 0.5 },
     cellsMin: [0, 0, 0],
     regions,
     layers: 3,

@@ -131,6 +131,7 @@ export function volumeLight(
     order,
     use: 'all',
     grid: { center, rotation: [0, 0, 0, 1], size, resolution },
+    offset: { cells: 0.5 },
     cellsMin: [0, 0, 0],
     regions: [],
     layers: 1,

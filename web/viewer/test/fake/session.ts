@@ -45,6 +45,7 @@ export class FakeSession implements Session {
       order: 2,
       use: 'all',
       grid: { center, size, rotation, resolution: RESOLUTION },
+      offset: { cells: 0.5 },
       cellsMin: [0, 0, 0],
       regions: [{ id: 0, min: [0, 0, 0], size: RESOLUTION }],
       layers: 3,

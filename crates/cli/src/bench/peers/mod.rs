@@ -14,14 +14,13 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::Vec3;
 use lumencast_gather::path_trace::{MaterialModel, Options};
-use lumencast_light::{LightField, OffsetPolicy};
+use lumencast_light::LightField;
 use lumencast_picture::{Picture, ToneMap};
 use lumencast_scene::{Environment, Material, Scene, Snapshot, View, VolumeSpec};
-use lumencast_server::FitOptions;
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading};
 
 use super::{cells, draw};
-use crate::arguments::{FitArguments, VolumeArgument, parse_offset};
+use crate::arguments::{Reading, ReadingArguments, VolumeArgument};
 use crate::light_source::Computed;
 use crate::{camera, output};
 use judge::Judge;
@@ -59,11 +58,8 @@ pub(crate) struct BenchPeers {
     /// A grid in place of the published one. May be given several times.
     #[arg(long = "volume", value_name = "NXxNYxNZ[@X,Y,Z:SX,SY,SZ]")]
     volumes: Vec<VolumeArgument>,
-    /// Where in front of a surface the field is read: none, half-cell or metres.
-    #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
-    offset: OffsetPolicy,
     #[command(flatten)]
-    fit: FitArguments,
+    reading: ReadingArguments,
     /// Samples a probe.
     #[arg(long, value_name = "N", default_value_t = PROBE_SAMPLES,
           value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
@@ -135,22 +131,22 @@ impl BenchPeers {
 
         let published = [VolumeArgument { resolution: subject.cells, place: None }];
         let grids = if self.volumes.is_empty() { &published[..] } else { &self.volumes };
-        let fits = self.fit.compared(self.offset);
+        let readings = self.reading.compared();
         let mut fields = Vec::new();
         for grid in grids {
             let grid = grid.in_scene(&scene).context("--volume")?;
-            for fit in &fits {
-                let light = self.light(&snapshot, grid, *fit)?;
-                renderer.set_light(&light, self.offset)?;
+            for reading in &readings {
+                let light = self.light(&snapshot, grid, *reading)?;
+                renderer.set_light(&light)?;
                 let picture = draw(renderer, view, settings, Lighting::FIELD)?;
-                let how = if fit.is_some() { "fitted" } else { "gathered" };
+                let how = if reading.fit.is_some() { "fitted" } else { "gathered" };
                 let name = format!("{}-{how}", cells(&grid));
                 self.write(subject, &name, &picture)?;
                 self.write(subject, &format!("{name}-difference"), &judge.difference(&picture))?;
                 fields.push(Field {
                     grid: cells(&grid),
                     order: grid.order,
-                    fit: fit.map(|fit| fit.points),
+                    fit: reading.fit.map(|fit| fit.points),
                     psnr: judge.psnr(&picture)?,
                     faults: faults(subject, &judge, &picture),
                 });
@@ -168,11 +164,11 @@ impl BenchPeers {
         &self,
         snapshot: &Arc<Snapshot>,
         grid: VolumeSpec,
-        fit: Option<FitOptions>,
+        reading: Reading,
     ) -> Result<LightField> {
         let tracing = Options { materials: MaterialModel::Lambert, threads: None };
         let (samples, bounces) = (self.probe_samples, self.bounces);
-        let computed = Computed { samples, bounces, clamp: f32::INFINITY, fit, tracing };
+        let computed = Computed { samples, bounces, clamp: f32::INFINITY, reading, tracing };
         Ok(LightField::new(computed.volumes(snapshot, &[grid])?))
     }
 

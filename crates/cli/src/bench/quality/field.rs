@@ -3,14 +3,14 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use lumencast_light::{LightField, OffsetPolicy};
+use lumencast_light::LightField;
 use lumencast_scene::{View, VolumeSpec};
-use lumencast_server::FitOptions;
 use lumencast_shade::{Lighting, Renderer, Settings};
 
 use super::reference::Judge;
 use super::report::{Errors, Row};
 use super::{BenchQuality, Subject, sum};
+use crate::arguments::Reading;
 use crate::bench::{cells, draw};
 use crate::light_source::Computed;
 
@@ -32,12 +32,12 @@ impl BenchQuality {
         subject: &Subject<'_>,
         spec: VolumeSpec,
         bounces: u32,
-        fit: Option<FitOptions>,
+        reading: Reading,
     ) -> Result<Field> {
         let (samples, clamp) = (self.probe_samples, self.clamp);
-        let how = if fit.is_some() { ", fitted" } else { "" };
+        let how = if reading.fit.is_some() { ", fitted" } else { "" };
         let tracing = self.picture.tracing();
-        let computed = Computed { samples, bounces, clamp, fit, tracing };
+        let computed = Computed { samples, bounces, clamp, reading, tracing };
         let start = Instant::now();
         let light = LightField::new(computed.volumes(&subject.snapshot, &[spec])?);
         let seconds = start.elapsed().as_secs_f64();
@@ -55,7 +55,6 @@ pub(super) struct Canvas<'a> {
     pub(super) renderer: &'a mut Renderer,
     pub(super) view: View,
     pub(super) settings: Settings,
-    pub(super) offset: OffsetPolicy,
 }
 
 impl Canvas<'_> {
@@ -68,7 +67,7 @@ impl Canvas<'_> {
     /// Of a picture under a field. What only a first picture takes, its indirect part alone has taken
     /// before the whole one is timed.
     pub(super) fn row(&mut self, field: &Field, judge: &Judge) -> Result<Row> {
-        self.renderer.set_light(&field.light, self.offset)?;
+        self.renderer.set_light(&field.light)?;
         let indirect = draw(self.renderer, self.view, &self.settings, Lighting::INDIRECT)?;
         let start = Instant::now();
         let whole = draw(self.renderer, self.view, &self.settings, Lighting::FIELD)?;

@@ -14,12 +14,12 @@ use std::sync::Arc;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::UVec2;
-use lumencast_light::{OffsetPolicy, Order};
+use lumencast_light::Order;
 use lumencast_picture::Picture;
 use lumencast_scene::{Scene, Snapshot, View, VolumeSpec};
 use lumencast_shade::{Gpu, Renderer, Settings, Shading, Shadows};
 
-use crate::arguments::{FitArguments, SceneArguments, parse_offset, parse_positive};
+use crate::arguments::{ReadingArguments, SceneArguments, parse_positive};
 use crate::camera::{self, PictureArguments};
 use crate::output;
 use field::{Canvas, Field};
@@ -83,11 +83,8 @@ pub(crate) struct BenchQuality {
     #[arg(long, value_name = "PIXELS,…", value_delimiter = ',',
           value_parser = clap::value_parser!(u32).range(1..=16_384))]
     resolutions: Vec<u32>,
-    /// Where in front of a surface the field is read: none, half-cell or metres.
-    #[arg(long, value_name = "none|half-cell|METRES", default_value = "half-cell", value_parser = parse_offset)]
-    offset: OffsetPolicy,
     #[command(flatten)]
-    fit: FitArguments,
+    reading: ReadingArguments,
     /// Keeps the references in this folder, also while they grow, and goes on from there the next time:
     /// with more samples where more are asked for.
     #[arg(long, value_name = "FOLDER")]
@@ -156,15 +153,20 @@ impl BenchQuality {
     fn fields(&self, subject: &Subject<'_>, grids: &[VolumeSpec]) -> Result<Vec<Field>> {
         let mut fields = Vec::new();
         let below = self.picture.bounces.saturating_sub(1);
-        let fits = self.fit.compared(self.offset);
+        let readings = self.reading.compared();
         for (number, grid) in grids.iter().enumerate() {
             let each =
-                |order: &Order| fits.iter().map(|fit| (*order, below, *fit)).collect::<Vec<_>>();
+                |&order: &Order| readings.iter().map(move |reading| (order, below, *reading));
             let as_in_the_paper =
-                (number == 0).then_some((self.orders[0], self.picture.bounces, None));
+                (number == 0).then_some((self.orders[0], self.picture.bounces, readings[0]));
             let rows = self.orders.iter().flat_map(each).chain(as_in_the_paper);
-            for (order, bounces, fit) in rows {
-                fields.push(self.field(subject, VolumeSpec { order, ..*grid }, bounces, fit)?);
+            for (order, bounces, reading) in rows {
+                fields.push(self.field(
+                    subject,
+                    VolumeSpec { order, ..*grid },
+                    bounces,
+                    reading,
+                )?);
             }
         }
         Ok(fields)
@@ -179,7 +181,7 @@ impl BenchQuality {
         let size = self.picture.size;
         let judge = Judge::new(self.reference(subject, size, None)?, None);
         let settings = self.settings(size, Shading::Samples, &judge);
-        let mut canvas = Canvas { renderer, view: subject.view, settings, offset: self.offset };
+        let mut canvas = Canvas { renderer, view: subject.view, settings };
         let direct = canvas.direct(&judge)?;
         let fields = fields.iter().map(|field| canvas.row(field, &judge)).collect::<Result<_>>()?;
         Ok(Table {
@@ -206,7 +208,7 @@ impl BenchQuality {
         let exposure = Some(exposure);
         let judge = Judge::new(self.reference(subject, size, exposure)?, exposure);
         let settings = self.settings(size, Shading::Pixels, &judge);
-        let mut canvas = Canvas { renderer, view: subject.view, settings, offset: self.offset };
+        let mut canvas = Canvas { renderer, view: subject.view, settings };
         Ok(AtResolution {
             side,
             field: canvas.row(field, &judge)?,
