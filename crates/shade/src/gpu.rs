@@ -6,6 +6,7 @@ use glam::UVec2;
 
 use crate::ShadeError;
 use crate::bindings::entry;
+use crate::timing;
 
 /// What colours are drawn in before they are shown: linear, pre-exposed.
 pub(crate) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -19,6 +20,8 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     info: wgpu::AdapterInfo,
+    /// For the timestamps of a frame's passes, if it has a clock.
+    pub(crate) clock: Option<wgpu::QuerySet>,
     /// Sample counts that pictures can be multisampled with.
     sample_counts: Vec<u32>,
     /// What went wrong since it was last asked for.
@@ -107,7 +110,8 @@ impl Gpu {
                 keep(format!("device lost: {message}"), &of_loss);
             }
         });
-        Ok(Self { adapter, device, queue, info, sample_counts, fault })
+        let clock = timing::clock(&device);
+        Ok(Self { adapter, device, queue, info, clock, sample_counts, fault })
     }
 
     /// For those who draw more onto what is shown.

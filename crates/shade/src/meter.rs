@@ -6,6 +6,7 @@ use lumencast_shaders::meter;
 use crate::bindings;
 use crate::gpu::Gpu;
 use crate::readback::Readback;
+use crate::timing::{Commands, Stage};
 
 /// Bytes of a histogram.
 const SIZE: u64 = (BINS * size_of::<u32>()) as u64;
@@ -33,7 +34,7 @@ impl Meter {
     pub(crate) fn measure(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands,
         picture: &wgpu::TextureView,
     ) -> wgpu::Buffer {
         let size = picture.texture().size();
@@ -48,17 +49,18 @@ impl Meter {
                 wgpu::BindGroupEntry { binding: 1, resource: self.histogram.as_entire_binding() },
             ],
         });
-        encoder.clear_buffer(&self.histogram, 0, None);
+        commands.encoder.clear_buffer(&self.histogram, 0, None);
+        let (encoder, timestamp_writes) = commands.compute_pass(Stage::Screen);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("meter"),
-            timestamp_writes: None,
+            timestamp_writes,
         });
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(size.width.div_ceil(SQUARE), size.height.div_ceil(SQUARE), 1);
         drop(pass);
         let read = Readback::buffer(gpu, "histogram", SIZE);
-        encoder.copy_buffer_to_buffer(&self.histogram, 0, &read, 0, SIZE);
+        commands.encoder.copy_buffer_to_buffer(&self.histogram, 0, &read, 0, SIZE);
         read
     }
 }

@@ -12,6 +12,7 @@ use lumencast_shaders::{layout, occlusion};
 use crate::bindings::{PICTURE, UNIFORM, entry, texture};
 use crate::gpu::{DEPTH, Gpu};
 use crate::settings::Occlusion;
+use crate::timing::{Commands, Stage};
 
 /// The visible share of a half space.
 const VISIBILITY: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
@@ -104,15 +105,14 @@ impl Occluder {
     /// Draws visibility, once depth is drawn; `bind` binds group 0.
     pub(crate) fn draw(
         &self,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands,
         groups: &Groups,
         bind: impl Fn(&mut wgpu::RenderPass<'_>),
-        timestamps: Option<wgpu::RenderPassTimestampWrites<'_>>,
     ) {
         let Some(pipelines) = &self.pipelines else { return };
-        for (pipeline, group, onto, timestamps) in [
-            (&pipelines.find, &groups.find, &self.textures.rough, None),
-            (&pipelines.blur, &groups.blur, &self.textures.smooth, timestamps),
+        for (pipeline, group, onto) in [
+            (&pipelines.find, &groups.find, &self.textures.rough),
+            (&pipelines.blur, &groups.blur, &self.textures.smooth),
         ] {
             let color = wgpu::RenderPassColorAttachment {
                 view: onto,
@@ -123,10 +123,11 @@ impl Occluder {
                     store: wgpu::StoreOp::Store,
                 },
             };
+            let (encoder, timestamp_writes) = commands.pass(Stage::Occlusion);
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("occlusion"),
                 color_attachments: &[Some(color)],
-                timestamp_writes: timestamps,
+                timestamp_writes,
                 ..Default::default()
             });
             pass.set_pipeline(pipeline);

@@ -1,5 +1,6 @@
 //! The renderer: scene and light in, pictures out.
 
+use std::mem;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
@@ -20,7 +21,7 @@ use crate::screen::{Screen, Show};
 use crate::settings::{Lighting, Materials, Settings, Transparency};
 use crate::shadows::ShadowPlan;
 use crate::target::{Target, depth_attachment};
-use crate::timing::{PassTimes, Spans, Timing};
+use crate::timing::{Commands, PassTimes, Stage};
 
 /// How far patterns turn from one frame of a picture to the next: the golden section fills the circle
 /// evenly for any number.
@@ -99,26 +100,12 @@ struct FrameSettings<'a> {
 struct Passes {
     group: wgpu::BindGroup,
     stride: u32,
-    timing: Option<Timing>,
 }
 
 impl Passes {
     /// Binds what pass `number` looks from.
     fn bind(&self, pass: &mut wgpu::RenderPass<'_>, number: u32) {
         pass.set_bind_group(0, &self.group, &[number * self.stride]);
-    }
-
-    fn timestamps(&self, number: u32) -> Option<wgpu::RenderPassTimestampWrites<'_>> {
-        self.timing.as_ref().map(|timing| timing.of_pass(number))
-    }
-
-    /// Of the first and the last pass of the occlusion of picture `number`.
-    fn occlusion_timestamps(
-        &self,
-        number: u32,
-    ) -> [Option<wgpu::RenderPassTimestampWrites<'_>>; 2] {
-        let Some(timing) = &self.timing else { return [None, None] };
-        timing.of_occlusion(number).map(Some)
     }
 }
 
@@ -185,7 +172,8 @@ impl Renderer {
         self.gpu.check_size(settings.size)?;
         let samples = self.gpu.samples_at_once(settings.samples.max(1));
         let frames = settings.samples.max(1).div_ceil(samples);
-        self.prepare(settings, samples);
+        let mut commands = Commands::new(&self.gpu);
+        self.prepare(settings, samples, &mut commands);
         let pixels = settings.size.as_usizevec2().element_product();
         let mut pictures = vec![vec![Vec3::ZERO; pixels]; views.len()];
         let weight = 1.0 / (settings.pre_exposure * frames as f32);
@@ -199,18 +187,17 @@ impl Renderer {
             // Samples of a pixel are spread over strata along both axes; frames move them within.
             let moved = jitter(number, frames) / samples as f32;
             let cameras: Vec<Camera> = views.iter().map(|view| camera(view, moved)).collect();
-            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
             let mut copies = Vec::with_capacity(views.len());
             let frame = FrameSettings { snapshot: &snapshot, plan: &plan, settings, number };
-            let timing = self.frame(&mut encoder, frame, &cameras, |gpu, encoder, target| {
-                copies.push(target.copy(gpu, encoder));
+            self.frame(&mut commands, frame, &cameras, |gpu, commands, target| {
+                copies.push(target.copy(gpu, &mut commands.encoder));
             });
-            self.gpu.queue.submit([encoder.finish()]);
+            let timed = mem::replace(&mut commands, Commands::new(&self.gpu)).submit(&self.gpu);
             for (picture, copy) in pictures.iter_mut().zip(copies) {
                 copy.add_to(&self.gpu, picture, weight)?;
             }
-            if let Some(timing) = timing {
-                *drawn.time.get_or_insert_default() += timing.submitted().wait(&self.gpu)?;
+            if let Some(timed) = timed {
+                *drawn.time.get_or_insert_default() += timed.wait(&self.gpu)?;
             }
         }
         drawn.of_plan(&plan);
@@ -234,24 +221,24 @@ impl Renderer {
         self.gpu.check_size(settings.size)?;
         self.gpu.check("showing a picture")?;
         let samples = self.gpu.samples_at_once(settings.samples.max(1));
-        self.prepare(settings, samples);
+        let mut commands = Commands::new(&self.gpu);
+        self.prepare(settings, samples, &mut commands);
         let mut drawn = Drawn { frames: 1, samples, ..Drawn::default() };
         let Some(snapshot) = self.snapshot() else { return Ok(drawn) };
         let cameras = [Camera::new(view, settings.size, Vec2::ZERO)];
         let plan = self.shadow_plan(&snapshot, &cameras, settings);
         drawn.of_plan(&plan);
 
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let frame = FrameSettings { snapshot: &snapshot, plan: &plan, settings, number: 0 };
         let mut histogram = None;
-        let timing = self.frame(&mut encoder, frame, &cameras, |gpu, encoder, target| {
+        self.frame(&mut commands, frame, &cameras, |gpu, commands, target| {
             let picture = target.picture();
-            screen.draw(gpu, encoder, picture, settings.pre_exposure, show, onto);
-            histogram = screen.measure(gpu, encoder, picture);
+            screen.draw(gpu, commands, picture, settings.pre_exposure, show, onto);
+            histogram = screen.measure(gpu, commands, picture);
         });
-        self.gpu.queue.submit([encoder.finish()]);
+        let timed = commands.submit(&self.gpu);
         if let Some(histogram) = histogram {
-            screen.submitted(timing.map(Timing::submitted), histogram, settings.pre_exposure);
+            screen.submitted(timed, histogram, settings.pre_exposure);
         }
         Ok(drawn)
     }
@@ -260,8 +247,8 @@ impl Renderer {
         self.shown.as_ref().map(|(snapshot, _)| snapshot.clone())
     }
 
-    /// Makes ready what the settings ask for.
-    fn prepare(&mut self, settings: &Settings, samples: u32) {
+    /// Makes ready what the settings ask for; `commands` bring the scene to its moment.
+    fn prepare(&mut self, settings: &Settings, samples: u32, commands: &mut Commands) {
         let variant = Variant {
             samples,
             // A pixel of one sample is shaded once either way.
@@ -283,7 +270,8 @@ impl Renderer {
             Arc::ptr_eq(shown, wanted) && *model == settings.materials
         };
         if !self.shown.as_ref().is_some_and(is_shown) {
-            self.scene.update(&self.gpu, &self.layouts.material, wanted, settings.materials);
+            let layout = &self.layouts.material;
+            self.scene.update(&self.gpu, commands, layout, wanted, settings.materials);
             self.shown = Some((wanted.clone(), settings.materials));
             self.drawn = None;
         }
@@ -293,11 +281,11 @@ impl Renderer {
     /// `taken` is called after each camera's commands, before the next one's overwrite the picture.
     fn frame(
         &mut self,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands,
         FrameSettings { snapshot, plan, settings, number }: FrameSettings<'_>,
         cameras: &[Camera],
-        mut taken: impl FnMut(&Gpu, &mut wgpu::CommandEncoder, &Target),
-    ) -> Option<Timing> {
+        mut taken: impl FnMut(&Gpu, &mut Commands, &Target),
+    ) {
         let redraws = self.drawn.as_ref() != Some(plan);
 
         let mut visible = Vec::new();
@@ -319,35 +307,26 @@ impl Renderer {
             .collect();
         let occlusion = settings.drawn_occlusion();
         let occlusion = occlusion.and_then(|settings| self.occluder.groups(&self.gpu, settings));
-        let spans = Spans {
-            shadow_maps: shadows.len() as u32,
-            pictures: cameras.len() as u32,
-            occlusions: if occlusion.is_some() { cameras.len() as u32 } else { 0 },
-        };
-        let passes = self.passes(&views, spans, &visible);
+        let passes = self.passes(&views, &visible);
 
         if redraws {
             let layers = self.lights.shadow_maps(&self.gpu, plan);
             for ((layer, calls), pass) in layers.iter().zip(&shadow_calls).zip(0..) {
-                self.draw_shadow_map(encoder, &passes, pass, layer, calls);
+                self.draw_shadow_map(commands, &passes, pass, layer, calls);
             }
             self.drawn = Some(plan.clone());
         }
         let frame = frame_layout(settings, self.pipelines.as_ref(), number);
         let light = self.lights.group(&self.gpu, snapshot, plan, frame, &self.occluder);
-        for (calls, pass) in camera_calls.iter().zip(spans.shadow_maps..) {
+        for (calls, pass) in camera_calls.iter().zip(shadows.len() as u32..) {
             if let Some(groups) = &occlusion {
-                self.draw_occlusion(encoder, &passes, pass, calls, groups);
+                self.draw_occlusion(commands, &passes, pass, calls, groups);
             }
-            self.draw_picture(encoder, &passes, pass, calls, &light, settings.lighting);
+            self.draw_picture(commands, &passes, pass, calls, &light, settings.lighting);
             if let Some(target) = &self.target {
-                taken(&self.gpu, encoder, target);
+                taken(&self.gpu, commands, target);
             }
         }
-        if let Some(timing) = &passes.timing {
-            timing.resolve(encoder);
-        }
-        passes.timing
     }
 
     fn shadow_plan(
@@ -392,8 +371,7 @@ impl Renderer {
     }
 
     /// What passes with these views have in common; `visible`: the instances that they draw.
-    fn passes(&self, views: &[layout::View], spans: Spans, visible: &[u32]) -> Passes {
-        let timing = Timing::new(&self.gpu, spans);
+    fn passes(&self, views: &[layout::View], visible: &[u32]) -> Passes {
         let alignment = self.gpu.device.limits().min_uniform_buffer_offset_alignment;
         let size = size_of::<layout::View>();
         let stride = (size as u32).next_multiple_of(alignment);
@@ -420,21 +398,22 @@ impl Renderer {
                 entry(2, visible.as_entire_binding()),
             ],
         });
-        Passes { group, stride, timing }
+        Passes { group, stride }
     }
 
     fn draw_shadow_map(
         &self,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands,
         passes: &Passes,
         number: u32,
         layer: &wgpu::TextureView,
         calls: &[Call],
     ) {
+        let (encoder, timestamp_writes) = commands.pass(Stage::Shadows);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("shadow map"),
             depth_stencil_attachment: Some(depth_attachment(layer, wgpu::StoreOp::Store)),
-            timestamp_writes: passes.timestamps(number),
+            timestamp_writes,
             ..Default::default()
         });
         self.draw_depth(&mut pass, passes, number, calls);
@@ -444,26 +423,26 @@ impl Renderer {
     /// part in it: half of one hides half of what lies behind it, which no single depth tells.
     fn draw_occlusion(
         &self,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands,
         passes: &Passes,
         number: u32,
         calls: &[Call],
         groups: &Groups,
     ) {
-        let [first, last] = passes.occlusion_timestamps(number);
+        let (encoder, timestamp_writes) = commands.pass(Stage::Occlusion);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("depth of pixels"),
             depth_stencil_attachment: Some(depth_attachment(
                 self.occluder.depth(),
                 wgpu::StoreOp::Store,
             )),
-            timestamp_writes: first,
+            timestamp_writes,
             ..Default::default()
         });
         let solid = |call: &&Call| self.scene.draw(call).0.surface != Surface::Blended;
         self.draw_depth(&mut pass, passes, number, calls.iter().filter(solid));
         drop(pass);
-        self.occluder.draw(encoder, groups, |pass| passes.bind(pass, number), last);
+        self.occluder.draw(commands, groups, |pass| passes.bind(pass, number));
     }
 
     fn draw_depth<'a>(
@@ -490,7 +469,7 @@ impl Renderer {
 
     fn draw_picture(
         &self,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands,
         passes: &Passes,
         number: u32,
         calls: &[Call],
@@ -498,7 +477,7 @@ impl Renderer {
         lighting: Lighting,
     ) {
         let (Some(target), Some(pipelines)) = (&self.target, &self.pipelines) else { return };
-        let mut pass = target.pass(encoder, passes.timestamps(number));
+        let mut pass = target.pass(commands);
         passes.bind(&mut pass, number);
         pass.set_bind_group(1, light, &[]);
         // What is mixed with the background comes after it.

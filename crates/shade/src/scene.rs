@@ -15,6 +15,7 @@ use crate::gpu::Gpu;
 use crate::materials::{GpuMaterial, Surface};
 use crate::settings::Materials;
 use crate::textures::Textures;
+use crate::timing::{Commands, Stage};
 
 /// A primitive with all instances that it is drawn for.
 #[derive(Debug)]
@@ -75,6 +76,7 @@ impl GpuScene {
     pub(crate) fn update(
         &mut self,
         gpu: &Gpu,
+        commands: &mut Commands,
         material_layout: &wgpu::BindGroupLayout,
         snapshot: &Snapshot,
         model: Materials,
@@ -82,7 +84,7 @@ impl GpuScene {
         self.update_materials(gpu, material_layout, &snapshot.materials, model);
         let placed: Vec<layout::Instance> = snapshot.instances.iter().map(placed).collect();
         self.instances = instance_buffer(gpu, &placed);
-        self.deform(gpu, snapshot);
+        self.deform(gpu, commands, snapshot);
         self.draws.clear();
         let mut rigid: HashMap<(usize, usize), usize> = HashMap::new();
         for (instance, number) in snapshot.instances.iter().zip(0..) {
@@ -125,15 +127,15 @@ impl GpuScene {
     }
 
     /// Brings the vertices of deforming instances to this moment.
-    fn deform(&mut self, gpu: &Gpu, snapshot: &Snapshot) {
+    fn deform(&mut self, gpu: &Gpu, commands: &mut Commands, snapshot: &Snapshot) {
         let mut before = std::mem::take(&mut self.deformed);
         if snapshot.instances.iter().all(|instance| instance.deformation.is_none()) {
             return;
         }
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let (encoder, timestamp_writes) = commands.compute_pass(Stage::Deformation);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("deform"),
-            timestamp_writes: None,
+            timestamp_writes,
         });
         for instance in &snapshot.instances {
             let Some(deformation) = &instance.deformation else { continue };
@@ -144,8 +146,6 @@ impl GpuScene {
             };
             self.deformed.insert(instance.node, deformed);
         }
-        drop(pass);
-        gpu.queue.submit([encoder.finish()]);
     }
 
     /// Deforms the primitives of an instance, in the buffers that it had before where they fit.

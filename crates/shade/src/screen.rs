@@ -11,7 +11,7 @@ use lumencast_shaders::screen;
 use crate::gpu::Gpu;
 use crate::meter::{Meter, exposure};
 use crate::readback::Readback;
-use crate::timing::{PassTimes, Timed};
+use crate::timing::{Commands, PassTimes, Stage, Timed};
 use crate::{ShadeError, bindings};
 
 /// Frames that may be under way; more are not measured.
@@ -102,7 +102,7 @@ impl Screen {
     pub(crate) fn draw(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands,
         picture: &wgpu::TextureView,
         pre_exposure: f32,
         show: Show,
@@ -136,9 +136,11 @@ impl Screen {
                 store: wgpu::StoreOp::Store,
             },
         };
+        let (encoder, timestamp_writes) = commands.pass(Stage::Screen);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("screen"),
             color_attachments: &[Some(color)],
+            timestamp_writes,
             ..Default::default()
         });
         pass.set_pipeline(&self.pipeline);
@@ -150,11 +152,11 @@ impl Screen {
     pub(crate) fn measure(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands,
         picture: &wgpu::TextureView,
     ) -> Option<wgpu::Buffer> {
         let is_free = self.under_way.len() < UNDER_WAY;
-        is_free.then(|| self.meter.measure(gpu, encoder, picture))
+        is_free.then(|| self.meter.measure(gpu, commands, picture))
     }
 
     /// Waits for a frame that has been submitted.

@@ -6,6 +6,7 @@ use half::f16;
 use crate::ShadeError;
 use crate::gpu::{COLOR, DEPTH, Gpu};
 use crate::readback::Readback;
+use crate::timing::{Commands, Stage};
 
 /// Rows that are copied to a buffer begin at multiples of so many bytes.
 const ROW_ALIGNMENT: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
@@ -58,11 +59,8 @@ impl Target {
     }
 
     /// A pass that draws a picture from nothing.
-    pub(crate) fn pass<'a>(
-        &self,
-        encoder: &'a mut wgpu::CommandEncoder,
-        timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
-    ) -> wgpu::RenderPass<'a> {
+    pub(crate) fn pass<'a>(&self, commands: &'a mut Commands) -> wgpu::RenderPass<'a> {
+        let (encoder, timestamp_writes) = commands.pass(Stage::Picture);
         let color = wgpu::RenderPassColorAttachment {
             view: &self.drawn,
             depth_slice: None,

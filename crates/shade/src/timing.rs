@@ -1,108 +1,140 @@
-//! How long passes take on the device, where the adapter tells.
-
-use std::ops::Add as _;
+//! The commands of a frame, and how long their passes take on the device, where the adapter tells.
 
 use crate::ShadeError;
 use crate::gpu::Gpu;
 use crate::readback::Readback;
 
-/// Seconds on the device, by pass.
+/// Seconds on the device, by what passes are for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PassTimes {
+    /// Skins and morph targets, once a moment of the scene.
+    pub deformation: f64,
     /// Shadow maps: drawn once for all views, and kept while neither scene nor cascades change.
     pub shadows: f64,
     /// Ambient occlusion, with the depth that it is of, of all views.
     pub occlusion: f64,
     /// Surfaces and what lies behind them, of all views.
     pub pictures: f64,
+    /// Showing a picture on a screen, and measuring it.
+    pub screen: f64,
+}
+
+impl PassTimes {
+    fn of(&mut self, stage: Stage) -> &mut f64 {
+        match stage {
+            Stage::Deformation => &mut self.deformation,
+            Stage::Shadows => &mut self.shadows,
+            Stage::Occlusion => &mut self.occlusion,
+            Stage::Picture => &mut self.pictures,
+            Stage::Screen => &mut self.screen,
+        }
+    }
 }
 
 impl std::ops::AddAssign for PassTimes {
     fn add_assign(&mut self, other: Self) {
+        self.deformation += other.deformation;
         self.shadows += other.shadows;
         self.occlusion += other.occlusion;
         self.pictures += other.pictures;
+        self.screen += other.screen;
     }
 }
 
-/// The most spans of a frame that are timed.
-const MOST: u32 = 2048;
+/// What a pass is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stage {
+    Deformation,
+    Shadows,
+    Occlusion,
+    Picture,
+    Screen,
+}
+
+/// The most passes of a frame that are timed: a query set holds no more pairs.
+const MOST: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
 /// Of a timestamp.
-const TICK: u64 = 8;
+const TICK: usize = size_of::<u64>();
 const DURING: &str = "reading timestamps";
 
-/// The spans of a frame that are timed, in this order.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Spans {
-    pub(crate) shadow_maps: u32,
-    pub(crate) pictures: u32,
-    /// As many as there are pictures, or none. Each is of several passes.
-    pub(crate) occlusions: u32,
-}
-
-/// Two timestamps for each span of a frame.
-#[derive(Debug)]
-pub(crate) struct Timing {
-    queries: wgpu::QuerySet,
-    count: u32,
-    spans: Spans,
-    resolved: wgpu::Buffer,
-    read: wgpu::Buffer,
-}
-
-impl Timing {
-    /// Nothing where the adapter has no clock.
-    pub(crate) fn new(gpu: &Gpu, spans: Spans) -> Option<Self> {
-        let all = spans.shadow_maps + spans.pictures + spans.occlusions;
-        let count = 2 * Some(all).filter(|all| (1..=MOST).contains(all))?;
-        if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
-            return None;
-        }
-        let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+/// Two timestamps for each pass of a frame; nothing where the adapter has no clock.
+pub(crate) fn clock(device: &wgpu::Device) -> Option<wgpu::QuerySet> {
+    let has_clock = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+    has_clock.then(|| {
+        device.create_query_set(&wgpu::QuerySetDescriptor {
             label: Some("passes"),
             ty: wgpu::QueryType::Timestamp,
-            count,
+            count: 2 * MOST as u32,
+        })
+    })
+}
+
+/// Commands that are submitted together, whose passes are timed.
+#[derive(Debug)]
+pub(crate) struct Commands {
+    pub(crate) encoder: wgpu::CommandEncoder,
+    clock: Option<wgpu::QuerySet>,
+    /// Of the passes so far.
+    stages: Vec<Stage>,
+}
+
+impl Commands {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        let encoder = gpu.device.create_command_encoder(&Default::default());
+        Self { encoder, clock: gpu.clock.clone(), stages: Vec::new() }
+    }
+
+    /// For a pass that is to be encoded: what it is encoded with, and what it has to write.
+    pub(crate) fn pass(
+        &mut self,
+        stage: Stage,
+    ) -> (&mut wgpu::CommandEncoder, Option<wgpu::RenderPassTimestampWrites<'_>>) {
+        let [begin, end] = self.stamps(stage);
+        let timestamps = self.clock.as_ref().map(|query_set| wgpu::RenderPassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: begin,
+            end_of_pass_write_index: end,
         });
-        let size = TICK * u64::from(count);
-        let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
-        let resolved = gpu.buffer("timestamps", usage, &[], size);
-        let read = Readback::buffer(gpu, "timestamps", size);
-        Some(Self { queries, count, spans, resolved, read })
+        (&mut self.encoder, timestamps.filter(|_| begin.is_some()))
     }
 
-    /// What the pass of a shadow map or a picture has to write, which is a span by itself.
-    pub(crate) fn of_pass(&self, number: u32) -> wgpu::RenderPassTimestampWrites<'_> {
-        self.writes(Some(2 * number), Some(2 * number + 1))
+    /// The same of a compute pass.
+    pub(crate) fn compute_pass(
+        &mut self,
+        stage: Stage,
+    ) -> (&mut wgpu::CommandEncoder, Option<wgpu::ComputePassTimestampWrites<'_>>) {
+        let [begin, end] = self.stamps(stage);
+        let timestamps = self.clock.as_ref().map(|query_set| wgpu::ComputePassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: begin,
+            end_of_pass_write_index: end,
+        });
+        (&mut self.encoder, timestamps.filter(|_| begin.is_some()))
     }
 
-    /// What the first and the last pass of the occlusion of a picture have to write, whose own pass
-    /// has this number.
-    pub(crate) fn of_occlusion(&self, number: u32) -> [wgpu::RenderPassTimestampWrites<'_>; 2] {
-        let first = 2 * (number + self.spans.pictures);
-        [self.writes(Some(first), None), self.writes(None, Some(first + 1))]
+    /// Both timestamps of the next pass; none where there are too many passes.
+    fn stamps(&mut self, stage: Stage) -> [Option<u32>; 2] {
+        let first = 2 * self.stages.len() as u32;
+        let is_room = self.stages.len() < MOST;
+        self.stages.push(stage);
+        [first, first + 1].map(|stamp| is_room.then_some(stamp))
     }
 
-    fn writes(
-        &self,
-        beginning_of_pass_write_index: Option<u32>,
-        end_of_pass_write_index: Option<u32>,
-    ) -> wgpu::RenderPassTimestampWrites<'_> {
-        wgpu::RenderPassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index,
-            end_of_pass_write_index,
-        }
-    }
-
-    /// Copies the timestamps to where they can be read.
-    pub(crate) fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.resolve_query_set(&self.queries, 0..self.count, &self.resolved, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.read, 0, self.read.size());
-    }
-
-    /// Asks for the timestamps of a frame that was submitted.
-    pub(crate) fn submitted(self) -> Timed {
-        Timed { read: Readback::begin(self.read), spans: self.spans }
+    /// Submits the commands, and asks for what they will have taken.
+    pub(crate) fn submit(self, gpu: &Gpu) -> Option<Timed> {
+        let Self { mut encoder, clock, stages } = self;
+        let clock = clock.filter(|_| (1..=MOST).contains(&stages.len()));
+        let read = clock.map(|clock| {
+            let size = (2 * TICK * stages.len()) as u64;
+            let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
+            let resolved = gpu.buffer("timestamps", usage, &[], size);
+            let read = Readback::buffer(gpu, "timestamps", size);
+            encoder.resolve_query_set(&clock, 0..2 * stages.len() as u32, &resolved, 0);
+            encoder.copy_buffer_to_buffer(&resolved, 0, &read, 0, size);
+            read
+        });
+        gpu.queue.submit([encoder.finish()]);
+        read.map(|read| Timed { read: Readback::begin(read), stages })
     }
 }
 
@@ -110,7 +142,7 @@ impl Timing {
 #[derive(Debug)]
 pub(crate) struct Timed {
     read: Readback,
-    spans: Spans,
+    stages: Vec<Stage>,
 }
 
 impl Timed {
@@ -126,15 +158,14 @@ impl Timed {
 
     fn times(&self, gpu: &Gpu, bytes: &[u8]) -> PassTimes {
         let period = 1e-9 * f64::from(gpu.queue.get_timestamp_period());
-        let ticks: Vec<u64> = bytes
-            .chunks_exact(TICK as usize)
-            .map(|tick| u64::from_le_bytes(tick.try_into().unwrap_or_default()))
-            .collect();
-        // Clocks may jump: no pass takes less than nothing.
-        let seconds = |pair: &[u64]| period * pair[1].saturating_sub(pair[0]) as f64;
-        let (shadows, views) = ticks.split_at(2 * self.spans.shadow_maps as usize);
-        let (pictures, occlusions) = views.split_at(2 * self.spans.pictures as usize);
-        let sum = |ticks: &[u64]| ticks.chunks_exact(2).map(seconds).fold(0.0, f64::add);
-        PassTimes { shadows: sum(shadows), occlusion: sum(occlusions), pictures: sum(pictures) }
+        let (ticks, _) = bytes.as_chunks::<TICK>();
+        let (pairs, _) = ticks.as_chunks::<2>();
+        let mut times = PassTimes::default();
+        for (stage, pair) in self.stages.iter().zip(pairs) {
+            let [begin, end] = pair.map(u64::from_le_bytes);
+            // Clocks may jump: no pass takes less than nothing.
+            *times.of(*stage) += period * end.saturating_sub(begin) as f64;
+        }
+        times
     }
 }

@@ -199,11 +199,15 @@ impl Stage {
             frame.push(("longest", longest));
         }
         if let Some(time) = self.time {
+            if time.deformation > 0.0 {
+                frame.push(("skins, morphs", milliseconds(time.deformation)));
+            }
             frame.push(("shadow maps", milliseconds(time.shadows)));
             if self.controls.settings.occlusion.is_some() {
                 frame.push(("occlusion", milliseconds(time.occlusion)));
             }
             frame.push(("picture", milliseconds(time.pictures)));
+            frame.push(("screen", milliseconds(time.screen)));
         }
         frame.push(("size", format!("{} × {}", size.x, size.y)));
         frame.push(("samples", self.drawn.samples.to_string()));

@@ -203,6 +203,7 @@ impl Render {
                 "probes": probes,
                 "seconds": seconds,
                 "device_seconds": drawn.time.map(|time| json!({
+                    "deformation": time.deformation,
                     "shadows": time.shadows,
                     "occlusion": time.occlusion,
                     "pictures": time.pictures,
@@ -222,8 +223,11 @@ impl Render {
             drawn.shadow_maps, drawn.shadow_resolution
         );
         match drawn.time {
-            Some(PassTimes { shadows, occlusion, pictures }) => println!(
-                "{adapter}: {:.1} ms shadow maps, {:.1} ms occlusion, {:.1} ms pictures",
+            // Nothing is shown on a screen.
+            Some(PassTimes { deformation, shadows, occlusion, pictures, screen: _ }) => println!(
+                "{adapter}: {:.1} ms skins and morph targets, {:.1} ms shadow maps, \
+                 {:.1} ms occlusion, {:.1} ms pictures",
+                1e3 * deformation,
                 1e3 * shadows,
                 1e3 * occlusion,
                 1e3 * pictures

@@ -1,12 +1,18 @@
-//! Pictures shown on the device: the same codes as the processor's tone maps give, and measured.
+//! Pictures shown on the device: the same codes as the processor's tone maps give, measured and timed.
+
+use std::sync::Arc;
 
 use crate::common::{SIZE, renderer};
 use glam::{UVec2, Vec3};
 use lumencast_light::LightField;
 use lumencast_picture::{Picture, ToneMap, luminance};
-use lumencast_scene::{Environment, Scene, View};
-use lumencast_shade::{Gpu, Measured, Renderer, Screen, Settings, ShadeError, Show, wgpu};
-use lumencast_testkit::scenes::Stage;
+use lumencast_scene::{
+    Deformation, Environment, Light, LightKind, MorphTarget, Scene, Snapshot, View,
+};
+use lumencast_shade::{
+    Gpu, Measured, Occlusion, Renderer, Screen, Settings, ShadeError, Show, wgpu,
+};
+use lumencast_testkit::scenes::{Stage, lambert};
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
@@ -122,6 +128,45 @@ fn codes_and_exposure_are_the_processors() {
             let measured = measured.exposure.expect("there is light");
             assert!((measured / best).log2().abs() < 1.0 / 12.0, "{measured} for {best}");
         }
+    }
+}
+
+/// A ball of light over a floor that is being morphed, with occlusion: passes of every kind.
+fn morphing() -> Arc<Snapshot> {
+    let mut stage = Stage::default();
+    let white = stage.material(lambert(Vec3::ONE, Vec3::ZERO));
+    stage.quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0, white);
+    let kind = LightKind::Point { radius: 0.0 };
+    let light = Light { kind, color: Vec3::ONE, intensity: 30.0, range: None };
+    stage.light(light, Vec3::Y, Vec3::NEG_Y);
+    let mut snapshot = (*stage.snapshot()).clone();
+    let instance = &mut snapshot.instances[0];
+    let mut mesh = (*instance.mesh).clone();
+    for primitive in &mut mesh.primitives {
+        let positions = vec![Vec3::Y; primitive.vertices.positions.len()];
+        primitive.morph_targets = vec![MorphTarget { positions, ..MorphTarget::default() }];
+    }
+    instance.mesh = Arc::new(mesh);
+    let deformation = Deformation::new(instance.mesh.clone(), vec![0.1], None);
+    instance.deformation = Some(Arc::new(deformation));
+    Arc::new(snapshot)
+}
+
+#[test]
+fn every_pass_is_timed_that_is_drawn() {
+    let view = View::look_at(Vec3::new(0.0, 2.0, 2.0), Vec3::ZERO, 1.0).unwrap();
+    let settings =
+        Settings { size: SIZE, occlusion: Some(Occlusion::default()), ..Settings::default() };
+    let mut renderer = renderer(&morphing(), &settings);
+    let mut screen = Screen::new(renderer.gpu(), FORMAT);
+    let how = Show { exposure: 1.0, tone_map: ToneMap::Srgb };
+    let mut times = || show(&mut renderer, &mut screen, &view, &settings, how).1.time;
+    // An adapter without a clock tells nothing, ever.
+    let (Some(first), Some(second)) = (times(), times()) else { return };
+    assert!(first.deformation > 0.0 && first.shadows > 0.0, "{first:?}");
+    assert!((second.deformation, second.shadows) == (0.0, 0.0), "kept: {second:?}");
+    for time in [first, second] {
+        assert!(time.occlusion > 0.0 && time.pictures > 0.0 && time.screen > 0.0, "{time:?}");
     }
 }
 
