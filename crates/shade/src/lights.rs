@@ -20,7 +20,7 @@ const TABLE: usize = 32;
 #[derive(Debug)]
 pub(crate) struct GpuLights {
     pub(crate) layout: wgpu::BindGroupLayout,
-    comparison: wgpu::Sampler,
+    nearest: wgpu::Sampler,
     linear: wgpu::Sampler,
     table: wgpu::TextureView,
     picture: (Option<Arc<HdrImage>>, wgpu::TextureView),
@@ -32,7 +32,7 @@ fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let plane = wgpu::TextureViewDimension::D2;
     let exact = wgpu::TextureSampleType::Float { filterable: false };
     let depth = wgpu::TextureSampleType::Depth;
-    let comparison = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
+    let gathering = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering);
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("light"),
         entries: &[
@@ -42,7 +42,7 @@ fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
             entry(3, STORAGE),
             entry(4, STORAGE),
             entry(5, texture(depth, wgpu::TextureViewDimension::D2Array)),
-            entry(6, comparison),
+            entry(6, gathering),
             entry(7, texture(FILTERED, plane)),
             entry(8, SAMPLER),
             entry(9, texture(exact, plane)),
@@ -53,21 +53,18 @@ fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 
 impl GpuLights {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let sampler = |label, compare| {
+        let sampler = |label, filter| {
             gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some(label),
-                mag_filter: wgpu::FilterMode::Linear,
-                min_filter: wgpu::FilterMode::Linear,
-                compare,
+                mag_filter: filter,
+                min_filter: filter,
                 ..Default::default()
             })
         };
-        // Depth is reversed: lit is what is as near to the light as the map or nearer.
-        let comparison = sampler("shadows", Some(wgpu::CompareFunction::GreaterEqual));
         Self {
             layout: group_layout(&gpu.device),
-            comparison,
-            linear: sampler("table", None),
+            nearest: sampler("shadows", wgpu::FilterMode::Nearest),
+            linear: sampler("table", wgpu::FilterMode::Linear),
             table: table(gpu),
             picture: (None, picture(gpu, 1, 1, &[Vec3::ZERO])),
             maps: maps(gpu, 1, 1),
@@ -135,7 +132,7 @@ impl GpuLights {
                 entry(3, lights.as_entire_binding()),
                 entry(4, views.as_entire_binding()),
                 entry(5, texture(&maps)),
-                entry(6, sampler(&self.comparison)),
+                entry(6, sampler(&self.nearest)),
                 entry(7, texture(&self.table)),
                 entry(8, sampler(&self.linear)),
                 entry(9, texture(occlusion.visibility())),

@@ -70,7 +70,7 @@ const PART_INDIRECT: u32 = 4u;
 @group(1) @binding(3) var<storage, read> lights: array<Light>;
 @group(1) @binding(4) var<storage, read> shadow_views: array<ShadowView>;
 @group(1) @binding(5) var shadow_maps: texture_depth_2d_array;
-@group(1) @binding(6) var shadow_sampler: sampler_comparison;
+@group(1) @binding(6) var shadow_sampler: sampler;
 // By cosine and roughness: on its left half what F0 and F90 are multiplied by, and the lobe's mean
 // direction; on its right the lobe's bands.
 @group(1) @binding(7) var environment_brdf: texture_2d<f32>;
@@ -109,6 +109,9 @@ fn incident(light: Light, at: vec3f) -> Incident {
     let outside = max(distance, light.size);
     return Incident(direction, distance, light.intensity * (falloff / outside / outside));
 }
+
+// How far in front of a surface shadows are looked up, texels.
+const OFF: f32 = 0.25;
 
 const NO_VIEW: u32 = 0xffffffffu;
 
@@ -153,6 +156,72 @@ fn disc_point(i: u32, n: u32, turn: f32) -> vec2f {
     return radius * vec2f(cos(angle), sin(angle));
 }
 
+// What a surface's plane is in a map: depths there are affine in texture coordinates, in perspective
+// too.
+struct PlaneInMap {
+    // Texture coordinates and depth of its point.
+    at: vec3f,
+    // How depth grows along both texture coordinates.
+    gradient: vec2f,
+    // Texture coordinates of a metre along each of the plane's axes; in perspective only near the point.
+    axes: mat2x2f,
+}
+
+// Of a plane with axes u and v.
+fn plane_in_map(shadow: ShadowView, point: vec3f, u: vec3f, v: vec3f, texel: f32) -> PlaneInMap {
+    let at = in_map(shadow, point).xyz;
+    let dx = in_map(shadow, point + texel * u).xyz - at;
+    let dy = in_map(shadow, point + texel * v).xyz - at;
+    let area = dx.x * dy.y - dx.y * dy.x;
+    let gradient = vec2f(dx.z * dy.y - dy.z * dx.y, dy.z * dx.x - dx.z * dy.x);
+    let axes = mat2x2f(dx.xy / texel, dy.xy / texel);
+    return PlaneInMap(at, select(vec2f(0.0), gradient / area, area != 0.0), axes);
+}
+
+// Share of the four texels about a place that nothing lies before, each compared with the plane's own
+// depth at its middle: so a plane does not shadow itself, however low the light stands.
+fn filtered(plane: PlaneInMap, layer: u32, at: vec2f) -> f32 {
+    let size = vec2f(textureDimensions(shadow_maps));
+    let place = at * size - 0.5;
+    let low = floor(place);
+    let part = place - low;
+    // Where the four meet, so that it is clear which they are.
+    let corner = (low + 1.0) / size;
+    let step = plane.gradient / size;
+    let depth = plane.at.z + dot(plane.gradient, corner - plane.at.xy);
+    // At the lower left, the lower right, the upper right, the upper left.
+    let stored = textureGather(shadow_maps, shadow_sampler, corner, i32(layer));
+    let own = depth + 0.5 * vec4f(step.y - step.x, step.x + step.y, step.x - step.y, -step.x - step.y);
+    let lit = select(vec4f(0.0), vec4f(1.0), stored <= own);
+    let rows = mix(lit.wx, lit.zy, part.x);
+    return mix(rows.x, rows.y, part.y);
+}
+
+// Where a point of a surface's plane is looked up.
+struct ShadowSample {
+    // Counted from the light's first.
+    view: u32,
+    plane: PlaneInMap,
+    at: vec2f,
+}
+
+// Metres `o` along the plane's axes from where it is known in a view.
+fn sample_of(
+    light: Light, known: u32, plane: PlaneInMap, start: vec3f, u: vec3f, v: vec3f, o: vec2f, texel: f32,
+) -> ShadowSample {
+    if light.kind == 2u {
+        return ShadowSample(known, plane, plane.at.xy + plane.axes * o);
+    }
+    let point = start + o.x * u + o.y * v;
+    let view = shadow_view_of(light, point);
+    let map = shadow_views[light.first_shadow + view];
+    if view == known {
+        return ShadowSample(view, plane, in_map(map, point).xy);
+    }
+    let other = plane_in_map(map, point, u, v, texel);
+    return ShadowSample(view, other, other.at.xy);
+}
+
 // Share of a light that reaches a point of a surface with the given geometric normal, 0 to 1.
 //
 // Percentage-closer soft shadows (Fernando 2005): how far what casts the shadow is from the point
@@ -172,17 +241,21 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
     let facing = dot(normal, l);
     // What lies at the back of a surface is shadowed by it; coarse meshes are lit a little beyond.
     let cosine = max(facing, 0.05);
-    let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
     let texel = shadow.texel * select(distance, 1.0, parallel);
-    // A texel stands for a piece of the surface of its own size.
-    let start = position + normal * (texel * (0.5 + 1.5 * sine));
+    // Surfaces are not quite planes.
+    let start = position + normal * (texel * OFF);
     let x = tangent_of(l);
     let y = cross(l, x);
     // How much depth the plane gains along x and y.
     let slope = clamp(vec2f(dot(normal, x), dot(normal, y)) / cosine, vec2f(-8.0), vec2f(8.0));
+    // The plane's own axes.
+    let u = x - l * slope.x;
+    let v = y - l * slope.y;
+    let plane = plane_in_map(shadow, start, u, v, texel);
 
     var radius = frame.filter_radius * texel;
     if light.size > 0.0 && frame.search_samples > 0u {
+        let size = vec2f(textureDimensions(shadow_maps));
         let search = max(shadow.search, radius);
         var sum = 0.0;
         var found = 0.0;
@@ -190,22 +263,16 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
             // More of them near the middle, where they count whatever casts the shadow.
             let toward = disc_point(i, frame.search_samples, turn);
             let o = search * length(toward) * toward;
-            let point = start + o.x * x + o.y * y - l * dot(slope, o);
-            var own = index;
-            if !parallel {
-                own = shadow_view_of(light, point);
-            }
-            let map = shadow_views[light.first_shadow + own];
-            let at = in_map(map, point);
-            let size = vec2f(textureDimensions(shadow_maps));
-            let texel_at = clamp(vec2i(at.xy * size), vec2i(0), vec2i(size) - 1);
-            let depth = textureLoad(shadow_maps, texel_at, i32(light.first_shadow + own), 0);
+            let s = sample_of(light, index, plane, start, u, v, o, texel);
+            let texel_at = clamp(vec2i(s.at * size), vec2i(0), vec2i(size) - 1);
+            let depth = textureLoad(shadow_maps, texel_at, i32(light.first_shadow + s.view), 0);
+            let here = s.plane.at.z + dot(s.plane.gradient, (vec2f(texel_at) + 0.5) / size - s.plane.at.xy);
             // How far from the light what is there lies, as a share of this point's distance; in
             // parallel light, how many metres before the point.
-            let place = select(map.near / depth / at.w, (depth - at.z) * map.depth_range, parallel);
+            let place = select(here / depth, (depth - here) * shadow.depth_range, parallel);
             // Only what lies between the point and the light's disc casts a shadow here.
             let reach = light.size * select((1.0 - place) / max(place, 1e-3), place, parallel);
-            if depth > at.z && length(o) <= reach + texel {
+            if depth > here && length(o) <= reach + texel {
                 sum += place;
                 found += 1.0;
             }
@@ -221,13 +288,8 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
     var lit = 0.0;
     for (var i = 0u; i < frame.filter_samples; i++) {
         let o = radius * disc_point(i, frame.filter_samples, turn);
-        let point = start + o.x * x + o.y * y - l * dot(slope, o);
-        var own = index;
-        if !parallel {
-            own = shadow_view_of(light, point);
-        }
-        let at = in_map(shadow_views[light.first_shadow + own], point);
-        lit += textureSampleCompareLevel(shadow_maps, shadow_sampler, at.xy, i32(light.first_shadow + own), at.z);
+        let s = sample_of(light, index, plane, start, u, v, o, texel);
+        lit += filtered(s.plane, light.first_shadow + s.view, s.at);
     }
     return lit / f32(frame.filter_samples);
 }
