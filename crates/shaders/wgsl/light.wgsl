@@ -110,8 +110,8 @@ fn incident(light: Light, at: vec3f) -> Incident {
     return Incident(direction, distance, light.intensity * (falloff / outside / outside));
 }
 
-// How far in front of a surface shadows are looked up, texels.
-const OFF: f32 = 0.25;
+// How far in front of a surface that faces the light shadows are looked up, texels.
+const OFF: f32 = 0.125;
 
 const NO_VIEW: u32 = 0xffffffffu;
 
@@ -242,8 +242,8 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
     // What lies at the back of a surface is shadowed by it; coarse meshes are lit a little beyond.
     let cosine = max(facing, 0.05);
     let texel = shadow.texel * select(distance, 1.0, parallel);
-    // Surfaces are not quite planes.
-    let start = position + normal * (texel * OFF);
+    // Surfaces are not quite planes: within a texel they leave them, the more the lower the light stands.
+    let start = position + normal * (texel * OFF / cosine);
     let x = tangent_of(l);
     let y = cross(l, x);
     // How much depth the plane gains along x and y.
