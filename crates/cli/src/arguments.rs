@@ -91,8 +91,7 @@ pub(crate) struct GatherArguments {
 
 impl GatherArguments {
     pub(crate) fn options(&self, blend: BlendSettings, reading: Reading) -> GatherOptions {
-        let Reading { fit, offset } = reading;
-        GatherOptions { bounces: self.bounces, clamp: self.clamp, blend, fit, offset }
+        reading.gathered(self.bounces, self.clamp, blend)
     }
 
     pub(crate) fn gatherer(&self) -> Result<Box<dyn Gather>> {
@@ -119,6 +118,12 @@ const NEAR: Offset = Offset::Cells(0.125);
 pub(crate) struct Reading {
     pub(crate) fit: Option<FitOptions>,
     pub(crate) offset: Offset,
+}
+
+impl Reading {
+    pub(crate) fn gathered(self, bounces: u32, clamp: f32, blend: BlendSettings) -> GatherOptions {
+        GatherOptions { bounces, clamp, blend, fit: self.fit, offset: self.offset }
+    }
 }
 
 /// How surfaces read light.

@@ -9,7 +9,6 @@ use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::ProbeVolume;
 use lumencast_scene::{Scene, Snapshot, VolumeSpec};
-use lumencast_server::GatherOptions;
 
 use crate::arguments::Reading;
 use crate::{output, remote};
@@ -60,13 +59,7 @@ impl Computed {
     ) -> Result<Vec<ProbeVolume>> {
         let mut tracer =
             CpuPathTracer::new(self.tracing).context("cannot start the threads that trace")?;
-        let gather = GatherOptions {
-            bounces: self.bounces,
-            clamp: self.clamp,
-            blend: BlendSettings::default(),
-            fit: self.reading.fit,
-            offset: self.reading.offset,
-        };
+        let gather = self.reading.gathered(self.bounces, self.clamp, BlendSettings::default());
         let bar = output::share_bar("Computing the light field");
         let progress =
             |done: f32| bar.set_position((f64::from(done) * output::SHARE_BAR_LENGTH) as u64);

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::sh::{Sh, convolve};
-use crate::zh::Bands;
+use crate::zh::{self, Bands};
 use crate::{Offset, Order, ProbeVolume};
 
 /// The light of a scene: volumes, the finer ones laid over the coarser.
@@ -61,6 +61,14 @@ impl LightField {
             volume.coefficients.chunks_mut(probe).for_each(|probe| convolve(probe, bands));
         }
         self
+    }
+
+    /// The same light as someone wishes to see it: read at another offset than its volumes' own,
+    /// and through a Hann window of this width in bands, where given.
+    #[must_use]
+    pub fn seen(self, offset: Option<Offset>, window: Option<f32>) -> Self {
+        let light = offset.into_iter().fold(self, Self::read_at);
+        window.map(zh::hann).iter().fold(light, Self::convolved)
     }
 
     /// The same light, all volumes of which are to be read at another offset than their own.

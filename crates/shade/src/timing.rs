@@ -89,13 +89,13 @@ impl Commands {
         &mut self,
         stage: Stage,
     ) -> (&mut wgpu::CommandEncoder, Option<wgpu::RenderPassTimestampWrites<'_>>) {
-        let [begin, end] = self.stamps(stage);
-        let timestamps = self.clock.as_ref().map(|query_set| wgpu::RenderPassTimestampWrites {
+        let stamps = self.stamps(stage).zip(self.clock.as_ref());
+        let timestamps = stamps.map(|([begin, end], query_set)| wgpu::RenderPassTimestampWrites {
             query_set,
-            beginning_of_pass_write_index: begin,
-            end_of_pass_write_index: end,
+            beginning_of_pass_write_index: Some(begin),
+            end_of_pass_write_index: Some(end),
         });
-        (&mut self.encoder, timestamps.filter(|_| begin.is_some()))
+        (&mut self.encoder, timestamps)
     }
 
     /// The same of a compute pass.
@@ -103,21 +103,20 @@ impl Commands {
         &mut self,
         stage: Stage,
     ) -> (&mut wgpu::CommandEncoder, Option<wgpu::ComputePassTimestampWrites<'_>>) {
-        let [begin, end] = self.stamps(stage);
-        let timestamps = self.clock.as_ref().map(|query_set| wgpu::ComputePassTimestampWrites {
+        let stamps = self.stamps(stage).zip(self.clock.as_ref());
+        let timestamps = stamps.map(|([begin, end], query_set)| wgpu::ComputePassTimestampWrites {
             query_set,
-            beginning_of_pass_write_index: begin,
-            end_of_pass_write_index: end,
+            beginning_of_pass_write_index: Some(begin),
+            end_of_pass_write_index: Some(end),
         });
-        (&mut self.encoder, timestamps.filter(|_| begin.is_some()))
+        (&mut self.encoder, timestamps)
     }
 
     /// Both timestamps of the next pass; none where there are too many passes.
-    fn stamps(&mut self, stage: Stage) -> [Option<u32>; 2] {
-        let first = 2 * self.stages.len() as u32;
-        let is_room = self.stages.len() < MOST;
+    fn stamps(&mut self, stage: Stage) -> Option<[u32; 2]> {
+        let pass = self.stages.len();
         self.stages.push(stage);
-        [first, first + 1].map(|stamp| is_room.then_some(stamp))
+        (pass < MOST).then_some([2 * pass as u32, 2 * pass as u32 + 1])
     }
 
     /// Submits the commands, and asks for what they will have taken.

@@ -64,6 +64,23 @@ macro_rules! same {
     }};
 }
 
+fn volumes_agree(modules: &[Module]) {
+    same!(
+        modules,
+        Volume {
+            cell_from_world,
+            spacing,
+            scale,
+            resolution,
+            texels,
+            origin,
+            _pad0,
+            offset,
+            _pad1
+        }
+    );
+}
+
 #[test]
 fn layouts_agree() {
     let modules = [
@@ -126,20 +143,7 @@ fn layouts_agree() {
         }
     );
     same!(m, Field { count });
-    same!(
-        m,
-        Volume {
-            cell_from_world,
-            spacing,
-            scale,
-            resolution,
-            texels,
-            origin,
-            _pad0,
-            offset,
-            _pad1
-        }
-    );
+    volumes_agree(m);
     same!(m, Map { row0, row1 });
     same!(m, Deform { vertices, morphs, joints, flags });
     same!(m, Influence { weights, joints, _pad });
@@ -184,20 +188,7 @@ fn a_moved_member_is_noticed() {
     assert!(shader.contains(sound));
     let moved = shader.replace(sound, moved);
     let modules = [compiled("moved", &moved)];
-    same!(
-        &modules,
-        Volume {
-            cell_from_world,
-            spacing,
-            scale,
-            resolution,
-            texels,
-            origin,
-            _pad0,
-            offset,
-            _pad1
-        }
-    );
+    volumes_agree(&modules);
 }
 
 /// Numbers that shaders and Rust both name.

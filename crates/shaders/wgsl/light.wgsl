@@ -156,6 +156,15 @@ fn disc_point(i: u32, n: u32, turn: f32) -> vec2f {
     return radius * vec2f(cos(angle), sin(angle));
 }
 
+// A surface's plane: a point of it, and axes.
+struct SurfacePlane {
+    start: vec3f,
+    u: vec3f,
+    v: vec3f,
+    // How large a texel is there, metres.
+    texel: f32,
+}
+
 // What a surface's plane is in a map: depths there are affine in texture coordinates, in perspective
 // too.
 struct PlaneInMap {
@@ -167,11 +176,12 @@ struct PlaneInMap {
     axes: mat2x2f,
 }
 
-// Of a plane with axes u and v.
-fn plane_in_map(shadow: ShadowView, point: vec3f, u: vec3f, v: vec3f, texel: f32) -> PlaneInMap {
+// About a point of a surface.
+fn plane_in_map(shadow: ShadowView, point: vec3f, surface: SurfacePlane) -> PlaneInMap {
     let at = in_map(shadow, point).xyz;
-    let dx = in_map(shadow, point + texel * u).xyz - at;
-    let dy = in_map(shadow, point + texel * v).xyz - at;
+    let texel = surface.texel;
+    let dx = in_map(shadow, point + texel * surface.u).xyz - at;
+    let dy = in_map(shadow, point + texel * surface.v).xyz - at;
     let area = dx.x * dy.y - dx.y * dy.x;
     let gradient = vec2f(dx.z * dy.y - dy.z * dx.y, dy.z * dx.x - dx.z * dy.x);
     let axes = mat2x2f(dx.xy / texel, dy.xy / texel);
@@ -207,18 +217,18 @@ struct ShadowSample {
 
 // Metres `o` along the plane's axes from where it is known in a view.
 fn sample_of(
-    light: Light, known: u32, plane: PlaneInMap, start: vec3f, u: vec3f, v: vec3f, o: vec2f, texel: f32,
+    light: Light, known: u32, plane: PlaneInMap, surface: SurfacePlane, o: vec2f,
 ) -> ShadowSample {
     if light.kind == 2u {
         return ShadowSample(known, plane, plane.at.xy + plane.axes * o);
     }
-    let point = start + o.x * u + o.y * v;
+    let point = surface.start + o.x * surface.u + o.y * surface.v;
     let view = shadow_view_of(light, point);
     let map = shadow_views[light.first_shadow + view];
     if view == known {
         return ShadowSample(view, plane, in_map(map, point).xy);
     }
-    let other = plane_in_map(map, point, u, v, texel);
+    let other = plane_in_map(map, point, surface);
     return ShadowSample(view, other, other.at.xy);
 }
 
@@ -248,10 +258,8 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
     let y = cross(l, x);
     // How much depth the plane gains along x and y.
     let slope = clamp(vec2f(dot(normal, x), dot(normal, y)) / cosine, vec2f(-8.0), vec2f(8.0));
-    // The plane's own axes.
-    let u = x - l * slope.x;
-    let v = y - l * slope.y;
-    let plane = plane_in_map(shadow, start, u, v, texel);
+    let surface = SurfacePlane(start, x - l * slope.x, y - l * slope.y, texel);
+    let plane = plane_in_map(shadow, start, surface);
 
     var radius = frame.filter_radius * texel;
     if light.size > 0.0 && frame.search_samples > 0u {
@@ -263,7 +271,7 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
             // More of them near the middle, where they count whatever casts the shadow.
             let toward = disc_point(i, frame.search_samples, turn);
             let o = search * length(toward) * toward;
-            let s = sample_of(light, index, plane, start, u, v, o, texel);
+            let s = sample_of(light, index, plane, surface, o);
             let texel_at = clamp(vec2i(s.at * size), vec2i(0), vec2i(size) - 1);
             let depth = textureLoad(shadow_maps, texel_at, i32(light.first_shadow + s.view), 0);
             let here = s.plane.at.z + dot(s.plane.gradient, (vec2f(texel_at) + 0.5) / size - s.plane.at.xy);
@@ -288,7 +296,7 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
     var lit = 0.0;
     for (var i = 0u; i < frame.filter_samples; i++) {
         let o = radius * disc_point(i, frame.filter_samples, turn);
-        let s = sample_of(light, index, plane, start, u, v, o, texel);
+        let s = sample_of(light, index, plane, surface, o);
         lit += filtered(s.plane, light.first_shadow + s.view, s.at);
     }
     return lit / f32(frame.filter_samples);

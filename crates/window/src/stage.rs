@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use egui::{Color32, Panel, PlatformOutput, RawInput, Rect, Sense, Ui};
 use egui_wgpu::ScreenDescriptor;
 use glam::UVec2;
-use lumencast_light::{Offset, zh};
+use lumencast_light::Offset;
 use lumencast_picture::Picture;
 use lumencast_scene::{Aabb, View};
 use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Screen, Settings, Show, wgpu};
@@ -247,16 +247,7 @@ impl Stage {
         self.world.light(self.lit != Some(wanted), &mut |light| {
             taken = match wanted {
                 (None, None) => renderer.set_light(light),
-                (offset, window) => {
-                    let mut light = light.clone();
-                    if let Some(offset) = offset {
-                        light = light.read_at(offset);
-                    }
-                    if let Some(band) = window {
-                        light = light.convolved(&zh::hann(band));
-                    }
-                    renderer.set_light(&light)
-                }
+                (offset, window) => renderer.set_light(&light.clone().seen(offset, window)),
             };
         });
         taken?;

@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use glam::{Affine3A, UVec2, Vec3};
-use lumencast_light::{LightField, ProbeVolume, zh};
+use lumencast_light::{LightField, ProbeVolume};
 use lumencast_picture::{Picture, exposure};
 use lumencast_scene::{Scene, View};
 use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadows, Transparency};
@@ -100,14 +100,8 @@ impl Render {
         if settings.lighting.indirect {
             let volumes = self.volumes(scene)?;
             probes = volumes.iter().map(|volume| volume.grid.probe_count()).sum();
-            let mut light = LightField::new(volumes);
-            if let Some(width) = self.raster.window {
-                light = light.convolved(&zh::hann(width));
-            }
-            if let Some(offset) = self.raster.reading.offset {
-                light = light.read_at(offset);
-            }
-            renderer.set_light(&light)?;
+            let (offset, window) = (self.raster.reading.offset, self.raster.window);
+            renderer.set_light(&LightField::new(volumes).seen(offset, window))?;
         }
         let grid = self.raster.views.unwrap_or(UVec2::ONE);
         let views = views(&view, grid, self.raster.view_spacing);

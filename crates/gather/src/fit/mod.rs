@@ -9,9 +9,9 @@
 //! Σₚ wₚ |Eₚ − Rₚ c|² + Σⱼ sⱼ/4π Σₖ A²ₖ |cⱼₖ − gⱼₖ|²
 //!
 //! - Eₚ is the irradiance at point p of a surface, and Rₚ reads it from the volume just as a client
-//!   does: trilinear, off the surface by the volume's [offset](lumencast_light::Offset), convolved by the cosine. The
-//!   two sides of a wall are read from other places and in other directions, so that even a wall
-//!   within a cell keeps them apart.
+//!   does: trilinear, off the surface by the volume's [offset](lumencast_light::Offset), convolved by
+//!   the cosine. The two sides of a wall are read from other places and in other directions, so that
+//!   even a wall within a cell keeps them apart.
 //! - Points are those that are [seen](Surroundings) from the probes themselves, so that a surface
 //!   counts by how much of it is seen from around the volume, and the insides of walls not at all.
 //! - wₚ makes differences count as they are displayed: the square of the slope of the code v^(1/2.2)

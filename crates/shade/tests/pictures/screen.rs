@@ -131,7 +131,7 @@ fn codes_and_exposure_are_the_processors() {
     }
 }
 
-/// A ball of light over a floor that is being morphed, with occlusion: passes of every kind.
+/// A point light over a floor that is being morphed, with occlusion: passes of every kind.
 fn morphing() -> Arc<Snapshot> {
     let mut stage = Stage::default();
     let white = stage.material(lambert(Vec3::ONE, Vec3::ZERO));

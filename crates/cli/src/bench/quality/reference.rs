@@ -58,19 +58,17 @@ impl BenchQuality {
         size: UVec2,
         exposure: Option<f32>,
     ) -> Result<Reference> {
-        let films = [
-            self.trace(subject, size, Parts::Direct, "direct")?,
-            self.trace(subject, size, Parts::Indirect, "indirect")?,
-        ];
-        let [direct, indirect] = &films;
+        let key = self.key(subject);
+        let direct_film = self.trace(subject, size, key, Parts::Direct, "direct")?;
+        let indirect_film = self.trace(subject, size, key, Parts::Indirect, "indirect")?;
         let picture = |film: &Film| Picture::new(size.x, size.y, film.picture());
-        let pictures = (picture(direct)?, picture(indirect)?);
-        let own = || lumencast_picture::exposure(&sum(&pictures.0, &pictures.1));
+        let (direct, indirect) = (picture(&direct_film)?, picture(&indirect_film)?);
+        let own = || lumencast_picture::exposure(&sum(&direct, &indirect));
         let told = Told {
-            samples: direct.samples().min(indirect.samples()),
-            noise_psnr: noise_psnr(direct, indirect, exposure.unwrap_or_else(own)),
+            samples: direct_film.samples().min(indirect_film.samples()),
+            noise_psnr: noise_psnr(&direct_film, &indirect_film, exposure.unwrap_or_else(own)),
         };
-        Ok(Reference { direct: pictures.0, indirect: pictures.1, told })
+        Ok(Reference { direct, indirect, told })
     }
 
     /// One part of it, which is also the name of its file.
@@ -78,10 +76,10 @@ impl BenchQuality {
         &self,
         subject: &Subject<'_>,
         size: UVec2,
+        key: u64,
         parts: Parts,
         name: &'static str,
     ) -> Result<Film> {
-        let key = self.key(subject);
         let scene = subject.scene.name();
         let file = format!("{scene}-{}x{}-{key:016x}.{name}.film", size.x, size.y);
         let path = self.keep.as_ref().map(|folder| folder.join(file));
