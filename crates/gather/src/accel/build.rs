@@ -9,7 +9,7 @@ use super::Aabb;
 /// The most bins, a power of two.
 const BINS: usize = 16;
 /// Below this depth, splits halve the number of items, so that depth is bounded whatever the input.
-const SAH_DEPTH: u32 = 40;
+pub(super) const SAH_DEPTH: u32 = 40;
 /// Ranges smaller than this are built by one thread.
 const PARALLEL: usize = 4096;
 /// Cost of visiting a node, in units of testing one full leaf.

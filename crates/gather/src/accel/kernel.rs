@@ -3,7 +3,9 @@
 //! Several rays are in flight at once, one step of each in turn: a step waits for a node from the
 //! caches, then for one instruction after another, and meanwhile the processor works on the next
 //! ray's. That only helps while it knows which instructions come next, so with AVX2 children are
-//! sorted and put on the stack without a branch on which and how many they are.
+//! put on the stack without a branch on which and how many they are. Their order is not that of their
+//! distances, which would have to be sorted, but one that the tree holds for the eight octants of
+//! directions (Fuetterling et al. 2017, "Accelerated single ray tracing for wide vector units").
 //!
 //! The walk itself ([`trace_with`]) is written once; what tests eight boxes or a block of triangles is
 //! passed in, so that it can be compiled for AVX2 or NEON or neither; [`Kernel::detect`] chooses.
@@ -18,6 +20,7 @@
 
 use glam::Vec3A;
 
+use super::build::SAH_DEPTH;
 use super::mesh_bvh::{Block, LANES};
 use super::wide::{LEAF, Node};
 use super::{Accel, Hit, Placed, Ray};
@@ -25,7 +28,7 @@ use super::{Accel, Hit, Placed, Ray};
 /// Directions' components are kept at least this far from zero, so that no infinities arise.
 pub(super) const TINY: f32 = 1e-18;
 /// 1 + 2γ(3).
-const WIDEN: f32 = 1.0 + 2.0 * 3.0 * f32::EPSILON;
+pub(super) const WIDEN: f32 = 1.0 + 2.0 * 3.0 * f32::EPSILON;
 
 /// Which instructions to use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,87 +67,76 @@ impl Kernel {
     }
 }
 
-/// Rays in flight. Of one to eight, three were fastest over the scenes measured.
-const IN_FLIGHT: usize = 3;
+/// Rays in flight. One fewer is 5 % faster where all is in the caches (`cornell`), two more are 8 %
+/// faster where nothing is (shuffled rays on Sponza); whole paths do not care.
+const IN_FLIGHT: usize = 4;
 
 /// What is still to be visited by the rays in flight; kept by the caller so that rays need not allocate.
 #[derive(Debug, Default)]
-pub(crate) struct Stacks([Stack; IN_FLIGHT]);
+pub(crate) struct Stacks(Box<[Stack; IN_FLIGHT]>);
 
-/// What is still to be visited by one ray. Rays to the nearest hit keep distances, others do not.
-#[derive(Debug, Default)]
+/// The most that a ray ever has still to visit. A tree has at most [`SAH_DEPTH`] + 31 binary levels,
+/// each node takes one of them at least and leaves at most seven children behind: 498 entries for
+/// each of the two hierarchies.
+const DEPTH: usize = 1024;
+const _: () = assert!(2 * (1 + 7 * (SAH_DEPTH as usize + 31)) <= DEPTH);
+
+/// What is still to be visited by one ray, the next on top.
+#[derive(Debug)]
 pub(super) struct Stack {
-    /// Of a ray to the nearest hit: a child, and above it the bits of its distance, of which the last
-    /// three count for nothing ([`LANE_BITS`]).
-    near: Vec<u64>,
-    /// Of a ray to any hit.
-    any: Vec<u32>,
+    /// Nodes and leaves.
+    children: [u32; DEPTH + 8],
+    /// Where the ray enters their boxes; only kept for rays to the nearest hit.
+    distances: [f32; DEPTH + 8],
     len: usize,
 }
 
-/// The bits of a distance that hold the child's lane while children are sorted.
-pub(super) const LANE_BITS: u32 = 7;
+impl Default for Stack {
+    fn default() -> Self {
+        Self { children: [0; DEPTH + 8], distances: [0.0; DEPTH + 8], len: 0 }
+    }
+}
 
 impl Stack {
-    fn push<const ANY: bool>(&mut self, child: u32) {
-        if ANY {
-            self.any_room()[0] = child;
-        } else {
-            self.near_room()[0] = child.into();
-        }
+    #[inline(always)]
+    fn push(&mut self, child: u32) {
+        let (children, distances) = self.room();
+        children[0] = child;
+        distances[0] = 0.0;
         self.len += 1;
     }
 
     #[inline(always)]
     fn pop<const ANY: bool>(&mut self) -> (u32, f32) {
         self.len -= 1;
-        if ANY {
-            return (self.any[self.len], 0.0);
-        }
-        let entry = self.near[self.len];
-        (entry as u32, f32::from_bits((entry >> 32) as u32 & !LANE_BITS))
+        let at = self.len % DEPTH;
+        (self.children[at], if ANY { 0.0 } else { self.distances[at] })
     }
 
-    /// What [`Self::pop`] would take.
+    /// What [`Self::pop`] would take; anything where there is nothing.
     #[inline(always)]
-    fn next<const ANY: bool>(&self) -> Option<u32> {
-        let at = self.len.wrapping_sub(1);
-        if ANY { self.any.get(at).copied() } else { self.near.get(at).map(|&entry| entry as u32) }
+    fn next(&self) -> u32 {
+        self.children[self.len.wrapping_sub(1) % DEPTH]
     }
 
     /// Room for a node's children above what is there. What counts of it, [`Self::keep`] says.
     #[inline(always)]
-    pub(super) fn near_room(&mut self) -> &mut [u64; 8] {
-        room(&mut self.near, self.len)
-    }
-
-    /// The same; twice as much as a node has.
-    #[inline(always)]
-    pub(super) fn any_room(&mut self) -> &mut [u32; 16] {
-        room(&mut self.any, self.len)
+    pub(super) fn room(&mut self) -> (&mut [u32; 8], &mut [f32; 8]) {
+        let at = self.len % DEPTH;
+        let children = self.children[at..].first_chunk_mut();
+        let distances = self.distances[at..].first_chunk_mut();
+        match (children, distances) {
+            (Some(children), Some(distances)) => (children, distances),
+            _ => unreachable!("there is room for eight above the deepest"),
+        }
     }
 
     /// Adds what was written to the room's beginning.
     #[inline(always)]
     pub(super) fn keep(&mut self, count: u32) {
         self.len += count as usize;
+        debug_assert!(self.len <= DEPTH);
     }
-}
-
-#[inline(always)]
-fn room<T: Copy + Default, const N: usize>(entries: &mut Vec<T>, len: usize) -> &mut [T; N] {
-    if entries.len() < len + N {
-        grow(entries);
-    }
-    match entries[len..].first_chunk_mut() {
-        Some(room) => room,
-        None => unreachable!("it has grown"),
-    }
-}
-
-#[cold]
-fn grow<T: Copy + Default>(entries: &mut Vec<T>) {
-    entries.resize((2 * entries.len()).max(256), T::default());
 }
 
 /// A ray as the box and triangle tests want it.
@@ -152,10 +144,11 @@ fn grow<T: Copy + Default>(entries: &mut Vec<T>) {
 pub(super) struct Setup {
     pub(super) origin: [f32; 3],
     pub(super) inverse: [f32; 3],
-    /// The same times [`WIDEN`].
-    pub(super) widened: [f32; 3],
-    /// The axes along which it goes down, so that it meets the greatest coordinates first.
-    pub(super) down: [bool; 3],
+    /// A bit for each axis along which it goes down, so that it meets the greatest coordinates first;
+    /// x is the lowest.
+    pub(super) octant: u32,
+    /// How many bytes into a node the planes are that it meets first.
+    pub(super) near: [u32; 3],
     /// The axes, the direction's longest last.
     pub(super) axes: [usize; 3],
     /// What to subtract of the last axis to shear the ray upright, and what scales t.
@@ -175,15 +168,20 @@ impl Setup {
         let scale = 1.0 / direction[axes[2]];
         let shear = [direction[axes[0]] * scale, direction[axes[1]] * scale, scale];
         let safe = direction.map(|d| if d.abs() < TINY { TINY.copysign(d) } else { d });
-        let inverse = safe.map(|d| 1.0 / d);
+        let down = safe.map(|d| u32::from(d < 0.0));
         Self {
             origin: origin.to_array(),
-            inverse,
-            widened: inverse.map(|i| i * WIDEN),
-            down: safe.map(|d| d < 0.0),
+            inverse: safe.map(|d| 1.0 / d),
+            octant: down[0] | down[1] << 1 | down[2] << 2,
+            near: std::array::from_fn(|axis| 64 * axis as u32 + 32 * down[axis]),
             axes,
             shear,
         }
+    }
+
+    /// Whether it meets the greatest coordinates first.
+    pub(super) fn goes_down(&self, axis: usize) -> bool {
+        self.octant >> axis & 1 == 1
     }
 
     /// The same ray in the space of an instance.
@@ -232,7 +230,9 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
             stacks,
             accept,
             found,
-            |node, ray, t_max, stack| put::<ANY>(node, &boxes_portable(node, ray, t_max), stack),
+            |node, ray, t_max, stack| {
+                put::<ANY>(node, ray, &boxes_portable(node, ray, t_max), stack)
+            },
             triangles_portable,
         ),
         #[cfg(target_arch = "x86_64")]
@@ -255,7 +255,7 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
 }
 
 /// The walk, both levels. `open` puts the children that a ray meets before `t_max` on the stack, the
-/// one to visit first on top: the nearest, or with `ANY` leaves before nodes.
+/// one to visit first on top: by the node's order for its octant, or with `ANY` the last lane.
 #[inline(always)]
 pub(super) fn trace_with<const ANY: bool, T: Copy>(
     accel: &Accel,
@@ -268,9 +268,9 @@ pub(super) fn trace_with<const ANY: bool, T: Copy>(
 ) {
     let mut flights: [Option<Flight<'_, T>>; IN_FLIGHT] = [const { None }; IN_FLIGHT];
     let mut left = 0;
-    for (flight, stack) in flights.iter_mut().zip(&mut stacks.0) {
+    for (flight, stack) in flights.iter_mut().zip(stacks.0.iter_mut()) {
         let Some((ray, with)) = rays.next() else { break };
-        *flight = Some(Flight::new::<ANY>(accel, ray, with, stack));
+        *flight = Some(Flight::new(accel, ray, with, stack));
         left += 1;
     }
     let mut turn = 0;
@@ -282,7 +282,7 @@ pub(super) fn trace_with<const ANY: bool, T: Copy>(
         }
         found(flight.with, flight.best);
         if let Some((ray, with)) = rays.next() {
-            flight.start::<ANY>(accel, ray, with);
+            flight.start(accel, ray, with);
         } else {
             left -= 1;
             flights.swap(turn, left);
@@ -309,38 +309,46 @@ struct Flight<'a, T> {
 }
 
 impl<'a, T: Copy> Flight<'a, T> {
-    fn new<const ANY: bool>(accel: &'a Accel, ray: Ray, with: T, stack: &'a mut Stack) -> Self {
+    fn new(accel: &'a Accel, ray: Ray, with: T, stack: &'a mut Stack) -> Self {
         let world = Setup::new(ray.origin.into(), ray.direction.into());
-        let (nodes, blocks): (&[Node], &[Block]) = (&accel.nodes, &[]);
-        let t_max = ray.t_max;
-        stack.len = 0;
-        stack.push::<ANY>(0);
-        Self {
+        let mut flight = Self {
             with,
             ray,
             world,
             local: world,
-            nodes,
-            blocks,
+            nodes: &[],
+            blocks: &[],
             instance: None,
-            t_max,
+            t_max: ray.t_max,
             best: None,
             stack,
             floor: 0,
-        }
+        };
+        flight.begin(accel);
+        flight
     }
 
     /// Begins anew with another ray.
     #[inline(always)]
-    fn start<const ANY: bool>(&mut self, accel: &'a Accel, ray: Ray, with: T) {
+    fn start(&mut self, accel: &'a Accel, ray: Ray, with: T) {
         self.with = with;
         self.ray = ray;
         self.world = Setup::new(ray.origin.into(), ray.direction.into());
         self.t_max = ray.t_max;
         self.best = None;
-        self.back_to_top(accel);
+        self.begin(accel);
+    }
+
+    /// A scene of one instance has no top level to speak of: rays begin in the instance. On Sponza, of
+    /// which every ray visits 27 nodes and leaves, that saves three steps and their branches.
+    #[inline(always)]
+    fn begin(&mut self, accel: &'a Accel) {
         self.stack.len = 0;
-        self.stack.push::<ANY>(0);
+        if let [only] = accel.placed.as_slice() {
+            return self.enter(only);
+        }
+        self.back_to_top(accel);
+        self.stack.push(0);
     }
 
     /// Visits what is on top of the stack; whether the ray is done.
@@ -366,11 +374,11 @@ impl<'a, T: Copy> Flight<'a, T> {
         let index = (child & !LEAF) as usize;
         if child & LEAF == 0 {
             open(&self.nodes[index], &self.local, self.t_max, self.stack);
-            self.fetch_next::<ANY>();
+            self.fetch_next();
             return false;
         }
         let Some(instance) = self.instance else {
-            self.enter::<ANY>(&accel.placed[index]);
+            self.enter(&accel.placed[index]);
             return false;
         };
         let block = &self.blocks[index];
@@ -387,12 +395,12 @@ impl<'a, T: Copy> Flight<'a, T> {
     }
 
     #[inline(always)]
-    fn enter<const ANY: bool>(&mut self, placed: &'a Placed) {
+    fn enter(&mut self, placed: &'a Placed) {
         self.local = self.world.in_object(&self.ray, placed);
         (self.nodes, self.blocks) = (&placed.bvh.nodes, &placed.bvh.blocks);
         self.instance = Some(placed.instance);
         self.floor = self.stack.len;
-        self.stack.push::<ANY>(0);
+        self.stack.push(0);
     }
 
     #[inline(always)]
@@ -405,8 +413,8 @@ impl<'a, T: Copy> Flight<'a, T> {
 
     /// Asks for what the next step reads: most comes from the third level of cache.
     #[inline(always)]
-    fn fetch_next<const ANY: bool>(&self) {
-        let Some(child) = self.stack.next::<ANY>() else { return };
+    fn fetch_next(&self) {
+        let child = self.stack.next();
         let index = (child & !LEAF) as usize;
         let node = self.nodes.as_ptr().wrapping_add(index).cast::<i8>();
         let block = self.blocks.as_ptr().wrapping_add(index).cast::<i8>();
@@ -419,33 +427,19 @@ impl<'a, T: Copy> Flight<'a, T> {
 
 /// Puts the children that a ray meets on the stack.
 #[inline(always)]
-pub(super) fn put<const ANY: bool>(node: &Node, hits: &BoxHits, stack: &mut Stack) {
-    let (mut mask, mut count) = (hits.mask, 0);
-    while mask != 0 {
-        let lane = mask.trailing_zeros() as usize & 7;
-        mask &= mask - 1;
-        let child = node.child[lane];
-        // Leaves are greater than nodes.
-        if ANY {
-            insert(stack.any_room(), count, child, |a, b| a > b);
-        } else {
-            let entry = u64::from(hits.t[lane].to_bits()) << 32 | u64::from(child);
-            insert(stack.near_room(), count, entry, |a, b| a >> 32 < b >> 32);
+pub(super) fn put<const ANY: bool>(node: &Node, ray: &Setup, hits: &BoxHits, stack: &mut Stack) {
+    let (children, distances) = stack.room();
+    let mut count = 0;
+    let far_first = node.far_first[ray.octant as usize & 7];
+    for n in 0..8 {
+        let lane = if ANY { n } else { far_first as usize >> (4 * n) & 7 };
+        if hits.mask >> lane & 1 == 1 {
+            children[count] = node.child[lane];
+            distances[count] = hits.t[lane];
+            count += 1;
         }
-        count += 1;
     }
     stack.keep(count as u32);
-}
-
-/// Adds one to those sorted already: at most eight, mostly one or two.
-#[inline(always)]
-fn insert<T: Copy>(sorted: &mut [T], count: usize, new: T, comes_after: impl Fn(T, T) -> bool) {
-    let mut at = count;
-    while at > 0 && comes_after(sorted[at - 1], new) {
-        sorted[at] = sorted[at - 1];
-        at -= 1;
-    }
-    sorted[at] = new;
 }
 
 /// Asks for what will be read soon.
@@ -524,14 +518,15 @@ pub(super) fn boxes_portable(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
     let mut hits = BoxHits { mask: 0, t: [0.0; 8] };
     for lane in 0..8 {
         let mut enter = 0.0f32;
-        let mut leave = t_max;
+        let mut leave = f32::INFINITY;
         for axis in 0..3 {
-            let (planes, down) = (&node.planes[axis], ray.down[axis]);
+            let (planes, down) = (&node.planes[axis], ray.goes_down(axis));
             let near = planes[usize::from(down)][lane] - ray.origin[axis];
             let far = planes[usize::from(!down)][lane] - ray.origin[axis];
             enter = enter.max(near * ray.inverse[axis]);
-            leave = leave.min(far * ray.widened[axis]);
+            leave = leave.min(far * ray.inverse[axis]);
         }
+        leave = (leave * WIDEN).min(t_max);
         hits.t[lane] = enter;
         hits.mask |= u32::from(enter <= leave) << lane;
     }

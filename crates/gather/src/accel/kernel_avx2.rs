@@ -1,20 +1,18 @@
 //! Eight boxes, or four triangles, at a time with AVX2 and FMA; see [`super::kernel`].
 
 use std::arch::x86_64::{
-    __m128, __m128i, __m256, __m256i, _CMP_LE_OQ, _mm_add_ps, _mm_and_ps, _mm_blend_epi32,
-    _mm_cmpge_ps, _mm_cmpgt_ps, _mm_cmple_ps, _mm_cmpneq_ps, _mm_cvtsi64_si128, _mm_div_ps,
-    _mm_fmadd_ps, _mm_fnmadd_ps, _mm_max_epi32, _mm_max_ps, _mm_min_epi32, _mm_min_ps,
-    _mm_movemask_ps, _mm_mul_ps, _mm_or_ps, _mm_set1_ps, _mm_setzero_ps, _mm_shuffle_epi32,
-    _mm_sub_ps, _mm_unpackhi_epi32, _mm_unpacklo_epi32, _mm256_andnot_si256, _mm256_castps_si256,
-    _mm256_castsi128_si256, _mm256_castsi256_ps, _mm256_castsi256_si128, _mm256_cmp_ps,
-    _mm256_cvtepi8_epi32, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps, _mm256_min_ps,
-    _mm256_movemask_ps, _mm256_mul_ps, _mm256_or_si256, _mm256_permutevar8x32_epi32,
-    _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_sub_ps,
+    __m128, __m256, __m256i, _CMP_LE_OQ, _mm_add_ps, _mm_and_ps, _mm_cmpge_ps, _mm_cmpgt_ps,
+    _mm_cmple_ps, _mm_cmpneq_ps, _mm_cvtsi64_si128, _mm_div_ps, _mm_fmadd_ps, _mm_fnmadd_ps,
+    _mm_max_ps, _mm_min_ps, _mm_movemask_ps, _mm_mul_ps, _mm_or_ps, _mm_set1_ps, _mm_setzero_ps,
+    _mm_sub_ps, _mm256_broadcast_ss, _mm256_cmp_ps, _mm256_cvtepi8_epi32, _mm256_loadu_ps,
+    _mm256_loadu_si256, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps,
+    _mm256_permutevar8x32_epi32, _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps,
+    _mm256_setr_epi32, _mm256_setzero_ps, _mm256_srlv_epi32, _mm256_sub_ps,
 };
 
 #[cfg(test)]
 use super::kernel::BoxHits;
-use super::kernel::{LANE_BITS, Setup, Stacks, TriangleHits, trace_with};
+use super::kernel::{Setup, Stacks, TriangleHits, WIDEN, trace_with};
 use super::mesh_bvh::{Block, LANES};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
@@ -36,39 +34,24 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
         found,
         |node, ray, t_max, stack| {
             // All in one place: called as a function, it would pass its vectors through memory.
-            let (mask, t) = slabs(node, ray, t_max);
-            let child = load8_bits(&node.child);
-            let count = mask.count_ones();
-            if ANY {
-                let room = stack.any_room();
-                let is_leaf = _mm256_movemask_ps(_mm256_castsi256_ps(child)) as u32;
-                let (nodes, leaves) = (mask & !is_leaf, mask & is_leaf);
-                let first = _mm256_permutevar8x32_epi32(child, members(nodes));
-                let last = _mm256_permutevar8x32_epi32(child, members(leaves));
-                let at = nodes.count_ones().min(8) as usize;
-                room[..8].copy_from_slice(&bytemuck::cast::<_, [u32; 8]>(first));
-                room[at..at + 8].copy_from_slice(&bytemuck::cast::<_, [u32; 8]>(last));
+            let (enter, leave) = slabs(node, ray, t_max);
+            let (children, distances) = stack.room();
+            let met = if ANY {
+                let met = not_after(enter, leave);
+                *children = bytemuck::cast(permuted_bits(&node.child, members(met)));
+                met
             } else {
-                let room = stack.near_room();
-                // Distances are not negative, so as whole numbers they have the same order. Their
-                // last bits make room for the lane; lanes that were not met come last.
-                let lane_bits = _mm256_set1_epi32(LANE_BITS as i32);
-                let t = _mm256_andnot_si256(lane_bits, _mm256_castps_si256(t));
-                let lanes = members(mask);
-                let keys = _mm256_or_si256(_mm256_permutevar8x32_epi32(t, lanes), lanes);
-                // The permutation takes the lane and leaves the rest.
-                if count <= 4 {
-                    let keys = far_first_of_4(_mm256_castsi256_si128(keys));
-                    let child = _mm256_permutevar8x32_epi32(child, _mm256_castsi128_si256(keys));
-                    let child = _mm256_castsi256_si128(child);
-                    let low = _mm_unpacklo_epi32(child, keys);
-                    let high = _mm_unpackhi_epi32(child, keys);
-                    room[..4].copy_from_slice(&bytemuck::cast::<_, [u64; 4]>([low, high]));
-                } else {
-                    *room = far_first_of_8(keys, &node.child);
-                }
-            }
-            stack.keep(count);
+                let order = four_bits_each(node.far_first[ray.octant as usize & 7]);
+                let enter = _mm256_permutevar8x32_ps(enter, order);
+                let leave = _mm256_permutevar8x32_ps(leave, order);
+                let child = permuted_bits(&node.child, order);
+                let met = not_after(enter, leave);
+                let first = members(met);
+                *children = bytemuck::cast(_mm256_permutevar8x32_epi32(child, first));
+                *distances = bytemuck::cast(_mm256_permutevar8x32_ps(enter, first));
+                met
+            };
+            stack.keep(met.count_ones());
         },
         |block, ray, t_max| triangles(block, ray, t_max),
     );
@@ -78,25 +61,61 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
 #[cfg(test)]
 #[target_feature(enable = "avx2,fma")]
 pub(super) fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
-    let (mask, t) = slabs(node, ray, t_max);
-    BoxHits { mask, t: bytemuck::cast(t) }
+    let (enter, leave) = slabs(node, ray, t_max);
+    BoxHits { mask: not_after(enter, leave), t: bytemuck::cast(enter) }
 }
 
-/// Which boxes the ray meets before `t_max`, and where.
+/// Where the ray enters boxes and where it leaves them, between 0 and `t_max`; it misses those that
+/// it leaves first.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn slabs(node: &Node, ray: &Setup, t_max: f32) -> (u32, __m256) {
+fn slabs(node: &Node, ray: &Setup, t_max: f32) -> (__m256, __m256) {
     let mut enter = _mm256_setzero_ps();
-    let mut leave = _mm256_set1_ps(t_max);
+    let mut leave = _mm256_set1_ps(f32::INFINITY);
     for axis in 0..3 {
-        let (planes, down) = (&node.planes[axis], ray.down[axis]);
-        let origin = _mm256_set1_ps(ray.origin[axis]);
-        let near = _mm256_sub_ps(load8(&planes[usize::from(down)]), origin);
-        let far = _mm256_sub_ps(load8(&planes[usize::from(!down)]), origin);
-        enter = _mm256_max_ps(_mm256_mul_ps(near, _mm256_set1_ps(ray.inverse[axis])), enter);
-        leave = _mm256_min_ps(_mm256_mul_ps(far, _mm256_set1_ps(ray.widened[axis])), leave);
+        // Read where they are needed: read before a branch, numbers that lie side by side are loaded
+        // as one vector and taken out of it again.
+        let origin = _mm256_broadcast_ss(&ray.origin[axis]);
+        let inverse = _mm256_broadcast_ss(&ray.inverse[axis]);
+        let [near, far] = planes(node, ray, axis).map(|plane| _mm256_sub_ps(plane, origin));
+        enter = _mm256_max_ps(_mm256_mul_ps(near, inverse), enter);
+        leave = _mm256_min_ps(_mm256_mul_ps(far, inverse), leave);
     }
-    (_mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave)) as u32, enter)
+    let leave = _mm256_mul_ps(leave, _mm256_set1_ps(WIDEN));
+    (enter, _mm256_min_ps(leave, _mm256_set1_ps(t_max)))
+}
+
+/// The boxes' planes across an axis that the ray meets first, and those that it meets last.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn planes(node: &Node, ray: &Setup, axis: usize) -> [__m256; 2] {
+    let near = ray.near[axis] as usize;
+    let read = |at: usize| {
+        debug_assert!(at % 32 == 0 && at < size_of_val(&node.planes));
+        let plane = std::ptr::from_ref(&node.planes).wrapping_byte_add(at).cast::<f32>();
+        #[expect(unsafe_code, reason = "from an index, the place takes three instructions more")]
+        // SAFETY: `Setup` has multiples of 32 up to 160 for the nearer planes, of the six times eight
+        // numbers that begin here; the other one of the pair differs in the bit of 32.
+        unsafe {
+            _mm256_loadu_ps(plane)
+        }
+    };
+    [read(near), read(near ^ 32)]
+}
+
+/// Lanes where `a` is not greater than `b`.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn not_after(a: __m256, b: __m256) -> u32 {
+    _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32
+}
+
+/// Eight numbers of four bits, of which three count in a permutation.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn four_bits_each(numbers: u32) -> __m256i {
+    let places = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+    _mm256_srlv_epi32(_mm256_set1_epi32(numbers as i32), places)
 }
 
 /// For every set of lanes its members, eight bits each, the lowest first; then ones.
@@ -122,27 +141,6 @@ static MEMBERS: [u64; 256] = {
 #[inline]
 fn members(set: u32) -> __m256i {
     _mm256_cvtepi8_epi32(_mm_cvtsi64_si128(MEMBERS[set as usize & 0xff] as i64))
-}
-
-/// The greatest first.
-#[target_feature(enable = "avx2,fma")]
-#[inline]
-fn far_first_of_4(k: __m128i) -> __m128i {
-    // A network of three stages: neighbours, halves, the middle two.
-    let other = _mm_shuffle_epi32::<0b10_11_00_01>(k);
-    let k = _mm_blend_epi32::<0b1010>(_mm_max_epi32(k, other), _mm_min_epi32(k, other));
-    let other = _mm_shuffle_epi32::<0b01_00_11_10>(k);
-    let k = _mm_blend_epi32::<0b1100>(_mm_max_epi32(k, other), _mm_min_epi32(k, other));
-    let other = _mm_shuffle_epi32::<0b11_01_10_00>(k);
-    _mm_blend_epi32::<0b1100>(_mm_max_epi32(k, other), _mm_min_epi32(k, other))
-}
-
-/// Entries of the stack for keys whose last bits are lanes, the greatest first.
-#[cold]
-fn far_first_of_8(keys: __m256i, child: &[u32; 8]) -> [u64; 8] {
-    let mut keys: [i32; 8] = bytemuck::cast(keys);
-    keys.sort_unstable_by(|a, b| b.cmp(a));
-    keys.map(|key| u64::from(key as u32) << 32 | u64::from(child[key as usize & 7]))
 }
 
 #[target_feature(enable = "avx2,fma")]
@@ -205,20 +203,9 @@ fn load4(lanes: &[f32; LANES]) -> __m128 {
 
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn load8(lanes: &[f32; 8]) -> __m256 {
+fn permuted_bits(lanes: &[u32; 8], permutation: __m256i) -> __m256i {
     #[expect(unsafe_code, reason = "copies by value are spilled to the stack")]
     // SAFETY: the reference is valid for reads of eight numbers.
-    unsafe {
-        _mm256_loadu_ps(lanes.as_ptr())
-    }
-}
-
-#[target_feature(enable = "avx2,fma")]
-#[inline]
-fn load8_bits(lanes: &[u32; 8]) -> __m256i {
-    #[expect(unsafe_code, reason = "copies by value are spilled to the stack")]
-    // SAFETY: the reference is valid for reads of eight numbers.
-    unsafe {
-        _mm256_loadu_si256(lanes.as_ptr().cast())
-    }
+    let lanes = unsafe { _mm256_loadu_si256(lanes.as_ptr().cast()) };
+    _mm256_permutevar8x32_epi32(lanes, permutation)
 }

@@ -6,7 +6,7 @@ use std::arch::aarch64::{
     vmvnq_u32, vorrq_u32, vsubq_f32,
 };
 
-use super::kernel::{BoxHits, Setup, Stacks, TriangleHits, put, trace_with};
+use super::kernel::{BoxHits, Setup, Stacks, TriangleHits, WIDEN, put, trace_with};
 use super::mesh_bvh::{Block, LANES};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
@@ -29,7 +29,7 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
         stacks,
         accept,
         found,
-        |node, ray, t_max, stack| put::<ANY>(node, &boxes(node, ray, t_max), stack),
+        |node, ray, t_max, stack| put::<ANY>(node, ray, &boxes(node, ray, t_max), stack),
         |block, ray, t_max| triangles(block, ray, t_max),
     );
 }
@@ -40,20 +40,21 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
 #[inline]
 pub(super) fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
     let mut enter = [vdupq_n_f32(0.0); 2];
-    let mut leave = [vdupq_n_f32(t_max); 2];
+    let mut leave = [vdupq_n_f32(f32::INFINITY); 2];
     for axis in 0..3 {
         let origin = vdupq_n_f32(ray.origin[axis]);
         let inverse = vdupq_n_f32(ray.inverse[axis]);
-        let widened = vdupq_n_f32(ray.widened[axis]);
-        let (planes, down) = (&node.planes[axis], ray.down[axis]);
+        let (planes, down) = (&node.planes[axis], ray.goes_down(axis));
         let (near, far) = (load8(&planes[usize::from(down)]), load8(&planes[usize::from(!down)]));
         for half in 0..2 {
             let t_near = vmulq_f32(vsubq_f32(near[half], origin), inverse);
-            let t_far = vmulq_f32(vsubq_f32(far[half], origin), widened);
+            let t_far = vmulq_f32(vsubq_f32(far[half], origin), inverse);
             enter[half] = vmaxnmq_f32(enter[half], t_near);
             leave[half] = vminnmq_f32(leave[half], t_far);
         }
     }
+    let (widen, end) = (vdupq_n_f32(WIDEN), vdupq_n_f32(t_max));
+    let leave = leave.map(|leave| vminnmq_f32(vmulq_f32(leave, widen), end));
     let met = [vcleq_f32(enter[0], leave[0]), vcleq_f32(enter[1], leave[1])];
     let low = vandq_u32(met[0], bytemuck::cast([1, 2, 4, 8]));
     let high = vandq_u32(met[1], bytemuck::cast([16, 32, 64, 128]));

@@ -2,13 +2,15 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use glam::Vec3A;
+
 use super::Aabb;
 use super::build::{Item, Tree, tree};
 
 /// Marks a child as a leaf; the other bits are its index.
 pub(super) const LEAF: u32 = 1 << 31;
 
-/// Eight boxes and what they contain: 224 bytes, padded to four cache lines.
+/// Eight boxes and what they contain: four cache lines.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Node {
@@ -16,14 +18,18 @@ pub(super) struct Node {
     pub(super) planes: [[[f32; 8]; 2]; 3],
     /// Index of a node, or [`LEAF`] and the index of a leaf.
     pub(super) child: [u32; 8],
-    unused: [u32; 8],
+    /// For each octant of directions (see [`Setup::octant`]) the children's lanes, four bits each, the
+    /// farthest first.
+    ///
+    /// [`Setup::octant`]: super::kernel::Setup::octant
+    pub(super) far_first: [u32; 8],
 }
 
 impl Node {
     pub(super) const EMPTY: Self = Self {
         planes: [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3],
         child: [LEAF; 8],
-        unused: [0; 8],
+        far_first: [0x7654_3210; 8],
     };
 
     pub(super) fn set_bounds(&mut self, lane: usize, bounds: Aabb) {
@@ -131,6 +137,9 @@ fn emit<'a>(
             open(&pair[1], 8 - k, &mut children);
         }
     }
+    // Rays to any hit take the last first, and leaves may end them.
+    children.sort_by_key(|child| matches!(child, Tree::Leaf(..)));
+    node.far_first = std::array::from_fn(|octant| far_first(&children, octant as u32));
     for (lane, child) in children.into_iter().enumerate() {
         node.set_bounds(lane, child.bounds());
         node.child[lane] = match child {
@@ -140,6 +149,27 @@ fn emit<'a>(
     }
     nodes[index] = node;
     index as u32
+}
+
+/// Children in the order in which rays of an octant of directions should not visit them, four bits
+/// each: by the corner at which such a ray leaves their boxes, the farthest first. By that corner
+/// large boxes come after small ones in front of them; by centres rays visit 5 % more leaves, by
+/// the nearest corners 27 %.
+fn far_first(children: &[&Tree<'_>], octant: u32) -> u32 {
+    let direction = Vec3A::from_array(std::array::from_fn(|axis| match octant >> axis & 1 {
+        0 => 1.0,
+        _ => -1.0,
+    }));
+    let leaves_at = |lane: u32| match children.get(lane as usize) {
+        Some(child) => {
+            let Aabb { min, max } = child.bounds();
+            (min * direction).max(max * direction).element_sum()
+        }
+        None => f32::NEG_INFINITY,
+    };
+    let mut lanes: [u32; 8] = std::array::from_fn(|lane| lane as u32);
+    lanes.sort_by(|&a, &b| leaves_at(b).total_cmp(&leaves_at(a)));
+    lanes.iter().rev().fold(0, |order, lane| order << 4 | lane)
 }
 
 /// The forest of at most `roots` children that [`plan`] chose.
