@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::Gather;
 use lumencast_gather::blend::BlendSettings;
-use lumencast_gather::path_trace::{CpuPathTracer, MaterialModel, Options};
+use lumencast_gather::path_trace::{CpuPathTracer, Levels, MaterialModel, Options};
 use lumencast_light::{Grid, Offset, Order};
 use lumencast_scene::{Edit, Scene, Script, VolumeSpec};
 use lumencast_server::{FitOptions, GatherOptions, SampleRange, TickOptions};
@@ -94,8 +94,8 @@ impl GatherArguments {
         reading.gathered(self.bounces, self.clamp, blend)
     }
 
-    pub(crate) fn gatherer(&self) -> Result<Box<dyn Gather>> {
-        let options = Options { materials: self.materials.model(), threads: None };
+    pub(crate) fn gatherer(&self, levels: Levels) -> Result<Box<dyn Gather>> {
+        let options = Options { materials: self.materials.model(), threads: None, levels };
         let tracer = CpuPathTracer::new(options).context("cannot start the threads that trace")?;
         Ok(Box::new(tracer))
     }

@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use lumencast_codec::{Epoch, LightFile, SceneInfo, UpdateInfo};
 use lumencast_gather::blend::BlendSettings;
+use lumencast_gather::path_trace::Levels;
 use serde_json::json;
 
 use crate::arguments::{GatherArguments, SceneArguments, source};
@@ -42,7 +43,7 @@ impl Bake {
         let mut scene = self.scene.source.open()?;
         let volumes = self.scene.volumes(&scene)?;
         let snapshot = scene.snapshot();
-        let mut gatherer = self.gather.gatherer()?;
+        let mut gatherer = self.gather.gatherer(Levels::One)?;
         let options = self.gather.options(BlendSettings::default(), self.gather.reading.baked());
         let bar = output::bar(1000, "Baking");
         let light = lumencast_server::bake(

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use anyhow::{Result, bail};
 use clap::Args;
 use glam::{UVec2, Vec3};
-use lumencast_gather::path_trace::Options;
+use lumencast_gather::path_trace::{Levels, Options};
 use lumencast_gather::reference::PictureSettings;
 use lumencast_scene::{NamedView, Scene, View};
 
@@ -36,7 +36,8 @@ pub(crate) struct PictureArguments {
 impl PictureArguments {
     /// How probes of the same picture are traced.
     pub(crate) fn tracing(&self) -> Options {
-        Options { materials: self.materials.model(), threads: self.threads }
+        let (materials, threads) = (self.materials.model(), self.threads);
+        Options { materials, threads, levels: Levels::One }
     }
 
     pub(crate) fn settings(&self) -> PictureSettings {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use lumencast_gather::path_trace::Levels;
 use lumencast_server::{Server, ServerConfig};
 use lumencast_transport::{Access, Key, Tls};
 use serde_json::json;
@@ -79,7 +80,7 @@ impl Serve {
         let mut config = ServerConfig::new(network);
         config.tick = options;
         config.page = self.page.clone();
-        let gatherer = self.gather.gatherer()?;
+        let gatherer = self.gather.gatherer(Levels::Two)?;
         spinner.finish_and_clear();
 
         let runtime = tokio::runtime::Builder::new_multi_thread()

@@ -7,6 +7,7 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::UVec2;
 use lumencast_client::{Session, SessionOptions, download};
+use lumencast_gather::path_trace::Levels;
 use lumencast_light::LightField;
 use lumencast_picture::ToneMap;
 use lumencast_scene::Scene;
@@ -174,7 +175,7 @@ impl View {
         let loopback = std::net::SocketAddr::from(([127, 0, 0, 1], 0));
         let mut config = ServerConfig::new(lumencast_transport::ServerConfig::new(loopback));
         config.tick = self.tick.options(&scene, &self.scene, &self.gather)?;
-        let gatherer = self.gather.gatherer()?;
+        let gatherer = self.gather.gatherer(Levels::Two)?;
         let (address, running) = runtime.block_on(async {
             let server = Server::bind(scene, gatherer, config).await?;
             let address = format!("http://{}/{}", server.local_addr(), server.scene_name());

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::accel::{AccelCache, Hit, Kernel, Ray, Stacks};
 use crate::bsdf::frame;
-use crate::path_trace::MaterialModel;
+use crate::path_trace::{Levels, MaterialModel};
 use crate::sampling::{Sampler, cosine_hemisphere, mix2};
 use crate::world::{Passing, World, WorldCache, itself};
 
@@ -83,12 +83,13 @@ impl RayBench {
         view: View,
         count: usize,
         threads: Option<NonZeroUsize>,
+        levels: Levels,
     ) -> std::io::Result<Self> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads.map_or(0, NonZeroUsize::get))
             .build()
             .map_err(std::io::Error::other)?;
-        let world = pool.install(|| world(scene));
+        let world = pool.install(|| world(scene, levels));
         let mut next = 0;
         let mut count_from = |n: usize| {
             next += n as u32;
@@ -225,25 +226,26 @@ impl RayBench {
     }
 }
 
-fn world(scene: &Arc<Snapshot>) -> World {
-    World::new(scene.clone(), MaterialModel::Lambert, Kernel::detect(), &mut WorldCache::default())
+fn world(scene: &Arc<Snapshot>, levels: Levels) -> World {
+    let mut cache = WorldCache::new(levels);
+    World::new(scene.clone(), MaterialModel::Lambert, Kernel::detect(), &mut cache)
 }
 
 /// Seconds of building every hierarchy of a scene from nothing, on the calling thread's pool.
 #[must_use]
-pub fn build_seconds(scene: &Snapshot) -> f64 {
-    update_seconds(&mut AccelCache::default(), scene)
+pub fn build_seconds(scene: &Arc<Snapshot>, levels: Levels) -> f64 {
+    update_seconds(&mut AccelCache::new(levels), scene)
 }
 
 /// The most memory, bytes, that building every hierarchy of a scene takes at once, what is kept of it
 /// included; to be asked before other work leaves memory to be used again. `None` where the system
 /// does not tell.
 #[must_use]
-pub fn build_peak_bytes(scene: &Snapshot) -> Option<u64> {
+pub fn build_peak_bytes(scene: &Arc<Snapshot>, levels: Levels) -> Option<u64> {
     // Linux forgets the peak so far (man 5 proc_pid_clear_refs).
     std::fs::write("/proc/self/clear_refs", "5").ok()?;
     let before = memory("VmRSS:")?;
-    update_seconds(&mut AccelCache::default(), scene);
+    update_seconds(&mut AccelCache::new(levels), scene);
     Some(memory("VmHWM:")?.saturating_sub(before))
 }
 
@@ -260,9 +262,10 @@ fn memory(line: &str) -> Option<u64> {
 pub fn top_level_seconds(scene: &Snapshot, count: u32) -> f64 {
     let Some(instance) = scene.instances.first() else { return 0.0 };
     let mut cache = AccelCache::default();
-    let mut many = scene.clone();
+    let mut many = Snapshot::clone(scene);
     let place = |world_from_object| Instance { world_from_object, ..instance.clone() };
     many.instances = scattered(scene, count).into_iter().map(place).collect();
+    let many = Arc::new(many);
     update_seconds(&mut cache, &many);
     update_seconds(&mut cache, &many)
 }
@@ -280,7 +283,7 @@ pub fn scattered(scene: &Snapshot, count: u32) -> Vec<Affine3A> {
 }
 
 /// Seconds of bringing a cache to a scene; dropping the result is not counted.
-fn update_seconds(cache: &mut AccelCache, scene: &Snapshot) -> f64 {
+fn update_seconds(cache: &mut AccelCache, scene: &Arc<Snapshot>) -> f64 {
     let start = Instant::now();
     let accel = cache.update(scene, Kernel::detect());
     let seconds = start.elapsed().as_secs_f64();

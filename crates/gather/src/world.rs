@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use lumencast_scene::{AlphaMode, Instance, Material, Snapshot};
 
-use crate::accel::{Accel, AccelCache, Hit, Kernel, Ray, Stacks};
+use crate::accel::{Accel, AccelCache, Hit, Kernel, Levels, Ray, Stacks};
 use crate::bsdf::Scatter;
 use crate::lights::emission::EmissionCache;
 use crate::lights::environment::{Sky, SkyCache};
@@ -20,6 +20,12 @@ pub(crate) struct WorldCache {
     accel: AccelCache,
     sky: SkyCache,
     emission: EmissionCache,
+}
+
+impl WorldCache {
+    pub(crate) fn new(levels: Levels) -> Self {
+        Self { accel: AccelCache::new(levels), ..Self::default() }
+    }
 }
 
 /// A snapshot with its acceleration structure and tables of lights.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 use lumencast_gather::measure::{RayBench, TestRay};
+use lumencast_gather::path_trace::Levels;
 use lumencast_scene::{Scene, View};
 use lumencast_testkit::embree::{Embree, Quality};
 
@@ -67,20 +68,26 @@ fn exactly(triangle: [Vec3; 3], ray: &TestRay) -> (f64, f64) {
 #[test]
 fn a_million_random_rays_agree_on_sponza() {
     let (Some(scene), Some(library)) = (sponza(), library()) else { return };
-    agree_but_for_ties(scene, &library);
+    agree_but_for_ties(scene, Levels::One, &library);
 }
 
 /// Many instances, some of them deformed.
 #[test]
 fn a_million_random_rays_agree_in_the_tomb() {
     let Some(library) = library() else { return };
-    agree_but_for_ties(Scene::open("tomb").unwrap(), &library);
+    agree_but_for_ties(Scene::open("tomb").unwrap(), Levels::Two, &library);
 }
 
-fn agree_but_for_ties(mut scene: Scene, library: &Path) {
+#[test]
+fn a_million_random_rays_agree_in_the_tomb_as_a_whole() {
+    let Some(library) = library() else { return };
+    agree_but_for_ties(Scene::open("tomb").unwrap(), Levels::One, &library);
+}
+
+fn agree_but_for_ties(mut scene: Scene, levels: Levels, library: &Path) {
     let bounds = scene.bounds();
     let view = View::look_at(bounds.min, bounds.max, 1.0).unwrap();
-    let bench = RayBench::new(&scene.snapshot(), view, 0, None).unwrap();
+    let bench = RayBench::new(&scene.snapshot(), view, 0, None, levels).unwrap();
     let triangles = bench.triangles();
     let rays: Vec<_> =
         (0..u64::from(RAYS)).map(|i| random_ray(i, bounds.min, bounds.max)).collect();

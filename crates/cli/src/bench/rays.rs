@@ -6,6 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use lumencast_gather::measure::{RayBench, build_peak_bytes, build_seconds, top_level_seconds};
+use lumencast_gather::path_trace::Levels;
 use serde_json::json;
 
 use super::Spread;
@@ -36,6 +37,10 @@ pub(crate) struct BenchRays {
     /// Threads; all cores unless given.
     #[arg(long)]
     threads: Option<NonZeroUsize>,
+    /// Hierarchies above each other: two, as for scenes that move (one a mesh, one over the
+    /// instances), or one over all triangles, as for pictures.
+    #[arg(long, value_name = "1|2", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=2))]
+    levels: u32,
     /// Times that everything is measured.
     #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
@@ -52,9 +57,10 @@ impl BenchRays {
         let mut scene = self.scene.open()?;
         let view = camera::view(&scene, self.camera.as_ref())?;
         let snapshot = scene.snapshot();
-        let peak = build_peak_bytes(&snapshot);
+        let levels = if self.levels == 1 { Levels::One } else { Levels::Two };
+        let peak = build_peak_bytes(&snapshot, levels);
         let spinner = output::spinner("Finding rays".into());
-        let bench = RayBench::new(&snapshot, view, self.rays as usize, self.threads)
+        let bench = RayBench::new(&snapshot, view, self.rays as usize, self.threads, levels)
             .context("cannot start the threads that trace")?;
         spinner.finish_and_clear();
         ensure!(
@@ -72,7 +78,7 @@ impl BenchRays {
             let occluded = bench.trace_any(&bench.any);
             any.push(bench.any.len() as f64 / start.elapsed().as_secs_f64());
             hits = (found.iter().flatten().count(), occluded.iter().filter(|o| **o).count());
-            build.push(1e3 * bench.install(|| build_seconds(&snapshot)));
+            build.push(1e3 * bench.install(|| build_seconds(&snapshot, levels)));
             top.push(1e3 * bench.install(|| top_level_seconds(&snapshot, INSTANCES)));
             bar.inc(1);
         }
@@ -89,6 +95,7 @@ impl BenchRays {
                 "scene": scene.name(),
                 "triangles": triangles,
                 "threads": threads,
+                "levels": self.levels,
                 "rays": { "closest": bench.closest.len(), "any": bench.any.len() },
                 "hits": { "closest": hits.0, "any": hits.1 },
                 "closest_a_second": closest,

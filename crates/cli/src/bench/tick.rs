@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use clap::Args;
 use lumencast_codec::{EncodedRegion, Epoch, ProbeHeader};
+use lumencast_gather::path_trace::Levels;
 use lumencast_server::{Mail, Outlet, Report, Stage, Tick};
 use serde_json::{Value, json};
 
@@ -46,7 +47,7 @@ impl BenchTick {
         let scene = self.scene.source.open()?;
         let options = self.tick.options(&scene, &self.scene, &self.gather)?;
         let period = options.period;
-        let mut tick = Tick::new(scene, self.gather.gatherer()?, options, Epoch(0))?;
+        let mut tick = Tick::new(scene, self.gather.gatherer(Levels::Two)?, options, Epoch(0))?;
         let ticks = SETTLING + (self.seconds * self.tick.rate).ceil().clamp(1.0, 1e7) as usize;
         let bar = output::bar(ticks as u64, "Ticks");
         let mut sent = Sent::default();

@@ -1,16 +1,21 @@
 //! Hierarchies kept from snapshot to snapshot.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use lumencast_scene::{Deformation, Instance, Mesh, NodeId, Snapshot};
 
-use super::{Accel, Kernel, MeshBvh};
+use glam::Affine3A;
+
+use super::{Accel, Kernel, Levels, TriangleBvh};
 
 /// Keeps one hierarchy a mesh (by the mesh's pointer) and one a deforming instance (by its node),
-/// and drops those that the latest snapshot does not use.
+/// and drops those that the latest snapshot does not use. With one level, keeps that of the latest
+/// snapshot.
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
+    levels: Levels,
+    whole: Option<(Arc<Snapshot>, Arc<TriangleBvh>)>,
     pub(super) rigid: HashMap<Address, Kept<()>>,
     pub(super) deforming: HashMap<(NodeId, Address), Kept<Arc<Deformation>>>,
 }
@@ -21,7 +26,7 @@ pub(super) struct Kept<D> {
     mesh: Arc<Mesh>,
     /// What the hierarchy was last fitted to.
     deformation: D,
-    bvh: Arc<MeshBvh>,
+    bvh: Arc<TriangleBvh>,
     used: bool,
 }
 
@@ -33,8 +38,16 @@ fn address(mesh: &Arc<Mesh>) -> Address {
 }
 
 impl AccelCache {
+    pub(crate) fn new(levels: Levels) -> Self {
+        Self { levels, ..Self::default() }
+    }
+
     /// The structure of a snapshot; what has not changed since the last one is taken from there.
-    pub(crate) fn update(&mut self, snapshot: &Snapshot, kernel: Kernel) -> Accel {
+    pub(crate) fn update(&mut self, snapshot: &Arc<Snapshot>, kernel: Kernel) -> Accel {
+        if self.levels == Levels::One && copies_are_few(&snapshot.instances) {
+            let whole = (0, Affine3A::IDENTITY, self.whole(snapshot));
+            return Accel::new([whole], kernel);
+        }
         self.rigid.values_mut().for_each(|k| k.used = false);
         self.deforming.values_mut().for_each(|k| k.used = false);
         let placed: Vec<_> = (0..)
@@ -52,23 +65,38 @@ impl AccelCache {
         Accel::new(placed, kernel)
     }
 
-    fn rigid(&mut self, instance: &Instance) -> Arc<MeshBvh> {
+    fn whole(&mut self, snapshot: &Arc<Snapshot>) -> Arc<TriangleBvh> {
+        if let Some((of, bvh)) = &self.whole
+            && Arc::ptr_eq(of, snapshot)
+        {
+            return bvh.clone();
+        }
+        let bvh = Arc::new(TriangleBvh::whole(&snapshot.instances));
+        self.whole = Some((snapshot.clone(), bvh.clone()));
+        bvh
+    }
+
+    fn rigid(&mut self, instance: &Instance) -> Arc<TriangleBvh> {
         let kept = self.rigid.entry(address(&instance.mesh)).or_insert_with(|| Kept {
             mesh: instance.mesh.clone(),
             deformation: (),
-            bvh: Arc::new(MeshBvh::build(&instance.mesh, None)),
+            bvh: Arc::new(TriangleBvh::build(&instance.mesh, None)),
             used: true,
         });
         kept.used = true;
         kept.bvh.clone()
     }
 
-    fn deformed(&mut self, instance: &Instance, deformation: &Arc<Deformation>) -> Arc<MeshBvh> {
+    fn deformed(
+        &mut self,
+        instance: &Instance,
+        deformation: &Arc<Deformation>,
+    ) -> Arc<TriangleBvh> {
         let key = (instance.node, address(&instance.mesh));
         let kept = self.deforming.entry(key).or_insert_with(|| Kept {
             mesh: instance.mesh.clone(),
             deformation: deformation.clone(),
-            bvh: Arc::new(MeshBvh::build(&instance.mesh, Some(deformation.vertices()))),
+            bvh: Arc::new(TriangleBvh::build(&instance.mesh, Some(deformation.vertices()))),
             used: true,
         });
         if !Arc::ptr_eq(&kept.deformation, deformation) {
@@ -79,4 +107,22 @@ impl AccelCache {
         kept.used = true;
         kept.bvh.clone()
     }
+}
+
+/// Up to so many triangles, however often the same one, are taken into one hierarchy anyway: about
+/// 40 MB.
+const FEW: usize = 1 << 19;
+
+/// Whether a scene's instances have at most twice as many triangles as its meshes.
+fn copies_are_few(instances: &[Instance]) -> bool {
+    let mut seen = HashSet::new();
+    let (mut all, mut distinct) = (0, 0);
+    for instance in instances {
+        let count = instance.mesh.triangle_count();
+        all += count;
+        if instance.deformation.is_some() || seen.insert(address(&instance.mesh)) {
+            distinct += count;
+        }
+    }
+    all <= 2 * distinct.max(FEW / 2)
 }

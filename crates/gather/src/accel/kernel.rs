@@ -21,7 +21,7 @@
 use glam::Vec3A;
 
 use super::build::SAH_DEPTH;
-use super::mesh_bvh::{Block, LANES};
+use super::triangle_bvh::{Block, LANES};
 use super::wide::{LEAF, Node};
 use super::{Accel, Hit, Placed, Ray};
 
@@ -501,7 +501,7 @@ fn nearest(
             t: hits.t[lane],
             u: hits.u[lane],
             v: hits.v[lane],
-            instance,
+            instance: instance + block.instance[lane],
             primitive: block.primitive[lane],
             triangle: block.triangle[lane],
         };

@@ -13,7 +13,7 @@ use std::arch::x86_64::{
 #[cfg(test)]
 use super::kernel::BoxHits;
 use super::kernel::{Setup, Stacks, TriangleHits, WIDEN, trace_with};
-use super::mesh_bvh::{Block, LANES};
+use super::triangle_bvh::{Block, LANES};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
 
@@ -91,7 +91,7 @@ fn slabs(node: &Node, ray: &Setup, t_max: f32) -> (__m256, __m256) {
 fn planes(node: &Node, ray: &Setup, axis: usize) -> [__m256; 2] {
     let near = ray.near[axis] as usize;
     let read = |at: usize| {
-        debug_assert!(at % 32 == 0 && at < size_of_val(&node.planes));
+        debug_assert!(at.is_multiple_of(32) && at < size_of_val(&node.planes));
         let plane = std::ptr::from_ref(&node.planes).wrapping_byte_add(at).cast::<f32>();
         #[expect(unsafe_code, reason = "from an index, the place takes three instructions more")]
         // SAFETY: `Setup` has multiples of 32 up to 160 for the nearer planes, of the six times eight

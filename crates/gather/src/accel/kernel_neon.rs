@@ -7,7 +7,7 @@ use std::arch::aarch64::{
 };
 
 use super::kernel::{BoxHits, Setup, Stacks, TriangleHits, WIDEN, put, trace_with};
-use super::mesh_bvh::{Block, LANES};
+use super::triangle_bvh::{Block, LANES};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
 

@@ -82,7 +82,7 @@ fn ball(rings: u32, bumps: f32) -> Arc<Mesh> {
 
 fn accel(meshes: &[(Affine3A, Arc<Mesh>)], kernel: Kernel) -> Accel {
     let built =
-        (0..).zip(meshes).map(|(i, (m, mesh))| (i, *m, Arc::new(MeshBvh::build(mesh, None))));
+        (0..).zip(meshes).map(|(i, (m, mesh))| (i, *m, Arc::new(TriangleBvh::build(mesh, None))));
     Accel::new(built, kernel)
 }
 
@@ -367,9 +367,9 @@ fn refitted_is_as_good_as_rebuilt() {
             .map(|(i, p)| p + strength * (random(6, i / 3) - 0.5))
             .collect();
         let moved = vec![Vertices { positions, ..rest.clone() }];
-        let mut refitted = MeshBvh::build(&mesh, None);
+        let mut refitted = TriangleBvh::build(&mesh, None);
         refitted.refit(&mesh, &moved);
-        let rebuilt = MeshBvh::build(&mesh, Some(&moved));
+        let rebuilt = TriangleBvh::build(&mesh, Some(&moved));
         assert_eq!(refitted.bounds(), rebuilt.bounds());
         let accel = |bvh| Accel::new([(0, Affine3A::IDENTITY, Arc::new(bvh))], Kernel::detect());
         let (a, b) = (accel(refitted), accel(rebuilt));
@@ -379,6 +379,17 @@ fn refitted_is_as_good_as_rebuilt() {
             assert_eq!(a.map(|h| h.triangle), b.map(|h| h.triangle));
         }
     }
+}
+
+fn snapshot(instances: Vec<Instance>) -> Arc<Snapshot> {
+    Arc::new(Snapshot {
+        version: 0,
+        time: 0.0,
+        instances,
+        materials: Arc::new([]),
+        lights: vec![],
+        environment: Default::default(),
+    })
 }
 
 #[test]
@@ -392,16 +403,8 @@ fn cache_keeps_what_has_not_changed() {
         deformation,
         world_from_object: Affine3A::IDENTITY,
     };
-    let snapshot = |instances| Snapshot {
-        version: 0,
-        time: 0.0,
-        instances,
-        materials: Arc::new([]),
-        lights: vec![],
-        environment: Default::default(),
-    };
     let mut cache = AccelCache::default();
-    let mut update = |s: &Snapshot| {
+    let mut update = |s: &Arc<Snapshot>| {
         let accel = cache.update(s, Kernel::detect());
         accel.placed.iter().map(|p| Arc::as_ptr(&p.bvh)).collect::<Vec<_>>()
     };
@@ -414,6 +417,55 @@ fn cache_keeps_what_has_not_changed() {
     assert_eq!(update(&moved)[0], first[0]);
     update(&snapshot(vec![]));
     assert!(cache.rigid.is_empty() && cache.deforming.is_empty());
+}
+
+/// One hierarchy over all triangles finds what two levels find, names it alike, and is kept for as long
+/// as the snapshot is the same; meshes that are there very often are not multiplied.
+#[test]
+fn one_level_finds_what_two_levels_find() {
+    let (soup, ball) = (soup(300, 0.15), ball(12, 0.2));
+    let instance = |node, mesh: &Arc<Mesh>, deformation, world_from_object| Instance {
+        node: NodeId(node),
+        mesh_id: MeshId(node),
+        mesh: mesh.clone(),
+        deformation,
+        world_from_object,
+    };
+    let deformation = Some(Arc::new(Deformation::new(ball.clone(), vec![], None)));
+    let both = snapshot(vec![
+        instance(0, &soup, None, Affine3A::IDENTITY),
+        instance(1, &soup, None, placed_soups()[1].0),
+        instance(2, &ball, deformation, Affine3A::from_scale(Vec3::new(0.5, -0.25, 0.5))),
+    ]);
+    let mut cache = AccelCache::new(Levels::One);
+    let whole = cache.update(&both, Kernel::detect());
+    let two = AccelCache::new(Levels::Two).update(&both, Kernel::detect());
+    assert_eq!((whole.placed.len(), two.placed.len()), (1, 3));
+    let mut met = [0; 3];
+    for i in 0..4000 {
+        let origin = 3.0 * random(17, i) - 1.0;
+        let ray = ray(origin, random(18, i) - origin);
+        let found = [&whole, &two].map(|accel| closest(accel, &ray, |_| true));
+        let [Some(a), Some(b)] = found else {
+            assert_eq!(found, [None, None], "{ray:?}");
+            continue;
+        };
+        met[a.instance as usize] += 1;
+        let names = [a, b].map(|hit| (hit.instance, hit.primitive, hit.triangle));
+        assert_eq!(names[0], names[1]);
+        assert!((a.t - b.t).abs() < 1e-4 * b.t.max(0.1), "{} {}", a.t, b.t);
+        assert!((a.weights() - b.weights()).abs().max_element() < 1e-2);
+    }
+    assert!(met.iter().all(|&n| n > 20), "{met:?}");
+
+    let again = cache.update(&both, Kernel::detect());
+    assert!(Arc::ptr_eq(&again.placed[0].bvh, &whole.placed[0].bvh));
+    let other = cache.update(&snapshot(both.instances.clone()), Kernel::detect());
+    assert!(!Arc::ptr_eq(&other.placed[0].bvh, &whole.placed[0].bvh));
+
+    let place = |n| Affine3A::from_translation(Vec3::X * n as f32);
+    let many = (0..3000).map(|n| instance(n, &soup, None, place(n))).collect();
+    assert_eq!(cache.update(&snapshot(many), Kernel::detect()).placed.len(), 3000);
 }
 
 /// Rays that leave a surface do not meet it again, at any scale and place.

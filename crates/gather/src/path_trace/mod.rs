@@ -19,6 +19,7 @@ use crate::accel::Kernel;
 use crate::world::{World, WorldCache};
 use crate::{Gather, Gathered, Job, Progress, Ticket};
 
+pub use crate::accel::Levels;
 pub use crate::surface::MaterialModel;
 use job::Watch;
 
@@ -29,6 +30,8 @@ pub struct Options {
     pub materials: MaterialModel,
     /// Threads to trace with; as many as there are cores when absent.
     pub threads: Option<NonZeroUsize>,
+    /// How rays find surfaces: two levels for scenes that move, one where jobs share a moment.
+    pub levels: Levels,
 }
 
 /// A path tracer on the CPU.
@@ -160,7 +163,7 @@ fn work(options: &Options, jobs: &Receiver<(Ticket, Job)>, shared: &Shared) {
     let pool =
         rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("gather {i}"));
     let ended = pool.build_scoped(rayon::ThreadBuilder::run, |pool| {
-        let mut cache = WorldCache::default();
+        let mut cache = WorldCache::new(options.levels);
         while let Ok((ticket, job)) = jobs.recv() {
             let Some(watch) = watch(shared, ticket) else { continue };
             let run = || pool.install(|| run(options.materials, &job, &mut cache, &watch));

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use super::{Film, Filter};
 use crate::accel::Kernel;
-use crate::path_trace::MaterialModel;
 use crate::path_trace::integrator::{Integrator, Look, Paths, Seen};
+use crate::path_trace::{Levels, MaterialModel};
 use crate::sampling::Sampler;
 use crate::world::{World, WorldCache};
 
@@ -130,7 +130,7 @@ impl Renderer {
                 scene.clone(),
                 settings.materials,
                 Kernel::detect(),
-                &mut WorldCache::default(),
+                &mut WorldCache::new(Levels::One),
             )
         };
         let world = pool.install(build);

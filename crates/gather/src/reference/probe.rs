@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use lumencast_light::Order;
 use lumencast_scene::Snapshot;
 
-use crate::path_trace::{CpuPathTracer, MaterialModel, Options};
+use crate::path_trace::{CpuPathTracer, Levels, MaterialModel, Options};
 use crate::{Gather, Job, Receiver, Sums};
 
 /// What to compute at each point.
@@ -63,7 +63,7 @@ pub fn probe_sh(
     points: &[Vec3],
     settings: &ProbeSettings,
 ) -> std::io::Result<Vec<ProbeEstimate>> {
-    let options = Options { materials: settings.materials, threads: None };
+    let options = Options { materials: settings.materials, threads: None, levels: Levels::One };
     let mut tracer = CpuPathTracer::new(options)?;
     let samples = settings.samples.max(1);
     let receivers: Arc<[_]> =

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::Vec3;
-use lumencast_gather::path_trace::{MaterialModel, Options};
+use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
 use lumencast_light::LightField;
 use lumencast_picture::{Picture, ToneMap};
 use lumencast_scene::{Environment, Material, Scene, Snapshot, View, VolumeSpec};
@@ -166,7 +166,8 @@ impl BenchPeers {
         grid: VolumeSpec,
         reading: Reading,
     ) -> Result<LightField> {
-        let tracing = Options { materials: MaterialModel::Lambert, threads: None };
+        let materials = MaterialModel::Lambert;
+        let tracing = Options { materials, threads: None, levels: Levels::One };
         let (samples, bounces) = (self.probe_samples, self.bounces);
         let computed = Computed { samples, bounces, clamp: f32::INFINITY, reading, tracing };
         Ok(LightField::new(computed.volumes(snapshot, &[grid])?))

@@ -10,7 +10,7 @@ use crate::accel::kernel::{
 use crate::accel::kernel_avx2 as compiled;
 #[cfg(target_arch = "aarch64")]
 use crate::accel::kernel_neon as compiled;
-use crate::accel::mesh_bvh::{Block, LANES};
+use crate::accel::triangle_bvh::{Block, LANES};
 use crate::accel::wide::Node;
 
 fn boxes(kernel: Kernel, node: &Node, ray: &Setup, t_max: f32) -> BoxHits {

@@ -1,8 +1,8 @@
-//! The hierarchy over the triangles of one mesh, in object space.
+//! The hierarchy over triangles: of one mesh, in object space, or of a whole scene, in the world.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3A;
-use lumencast_scene::{Mesh, Vertices};
+use lumencast_scene::{Instance, Mesh, Vertices};
 use rayon::prelude::*;
 
 use super::Aabb;
@@ -25,8 +25,8 @@ pub(super) struct Block {
     pub(super) corners: [[[f32; LANES]; 3]; 3],
     pub(super) primitive: [u32; LANES],
     pub(super) triangle: [u32; LANES],
-    /// Up to three cache lines.
-    unused: [u32; 4],
+    /// Counted from the instance that the hierarchy is placed as.
+    pub(super) instance: [u32; LANES],
 }
 
 impl Block {
@@ -34,7 +34,7 @@ impl Block {
         corners: [[[0.0; LANES]; 3]; 3],
         primitive: [0; LANES],
         triangle: [UNUSED; LANES],
-        unused: [0; 4],
+        instance: [0; LANES],
     };
 
     pub(super) fn set(&mut self, lane: usize, corners: [Vec3A; 3]) {
@@ -46,9 +46,25 @@ impl Block {
     }
 }
 
-/// A bounding-volume hierarchy over a mesh's triangles.
+/// Names a triangle.
+#[derive(Clone, Copy)]
+struct Id {
+    instance: u32,
+    primitive: u32,
+    triangle: u32,
+}
+
+/// The triangles of a mesh.
+fn ids(instance: u32, mesh: &Mesh) -> impl Iterator<Item = Id> + '_ {
+    (0..).zip(&mesh.primitives).flat_map(move |(primitive, p)| {
+        let count = p.triangles.len() as u32;
+        (0..count).map(move |triangle| Id { instance, primitive, triangle })
+    })
+}
+
+/// A bounding-volume hierarchy over triangles.
 #[derive(Clone, Debug)]
-pub(crate) struct MeshBvh {
+pub(crate) struct TriangleBvh {
     pub(super) nodes: Pages<Node>,
     pub(super) blocks: Pages<Block>,
     bounds: Aabb,
@@ -56,21 +72,32 @@ pub(crate) struct MeshBvh {
     cost: f32,
 }
 
-impl MeshBvh {
+impl TriangleBvh {
     /// Builds over the mesh at rest, or over `deformed` vertices (one entry a primitive).
     pub(crate) fn build(mesh: &Mesh, deformed: Option<&[Vertices]>) -> Self {
         let source = Source { mesh, deformed };
-        let mut ids = Vec::with_capacity(mesh.triangle_count());
-        let mut items = Vec::with_capacity(mesh.triangle_count());
-        for (p, primitive) in (0..).zip(&mesh.primitives) {
-            for t in 0..primitive.triangles.len() as u32 {
-                let bounds = around(source.corners(p, t));
-                if bounds.min.is_finite() && bounds.max.is_finite() {
-                    items.push(Item { bounds, index: ids.len() as u32 });
-                }
-                ids.push((p, t));
-            }
-        }
+        Self::over(ids(0, mesh).collect(), |id| source.corners(id.primitive, id.triangle))
+    }
+
+    /// Builds over all triangles of instances, in world space.
+    pub(crate) fn whole(instances: &[Instance]) -> Self {
+        let all = (0..).zip(instances).flat_map(|(n, instance)| ids(n, &instance.mesh));
+        Self::over(all.collect(), |id| {
+            let instance = &instances[id.instance as usize];
+            let deformed = instance.deformation.as_ref().map(|d| d.vertices());
+            let source = Source { mesh: &instance.mesh, deformed };
+            let to_world = |corner| instance.world_from_object.transform_point3a(corner);
+            source.corners(id.primitive, id.triangle).map(to_world)
+        })
+    }
+
+    fn over(ids: Vec<Id>, corners: impl Fn(Id) -> [Vec3A; 3] + Sync) -> Self {
+        let bounds = ids.iter().map(|&id| around(corners(id)));
+        let mut items: Vec<_> = (0..)
+            .zip(bounds)
+            .filter(|(_, bounds)| bounds.min.is_finite() && bounds.max.is_finite())
+            .map(|(index, bounds)| Item { bounds, index })
+            .collect();
         let mut root = tree(&mut items, LANES);
         let mut leaves = Vec::with_capacity(ids.len() / LANES);
         let nodes = collapse(&mut root, &mut |items| {
@@ -80,10 +107,11 @@ impl MeshBvh {
         let block = |items: &&[Item]| {
             let mut block = Block::EMPTY;
             for (lane, item) in items.iter().enumerate() {
-                let (p, t) = ids[item.index as usize];
-                block.primitive[lane] = p;
-                block.triangle[lane] = t;
-                block.set(lane, source.corners(p, t));
+                let id = ids[item.index as usize];
+                block.instance[lane] = id.instance;
+                block.primitive[lane] = id.primitive;
+                block.triangle[lane] = id.triangle;
+                block.set(lane, corners(id));
             }
             block
         };
