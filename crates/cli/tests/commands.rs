@@ -396,20 +396,24 @@ fn bench_prints_figures() {
 
 #[test]
 fn bench_rays_and_paths_print_figures() {
-    let ran = run(&["bench", "rays", "cornell", "--rays", "2000", "--rounds", "2", "--json"]);
-    assert_eq!(ran.code, Some(0), "{ran:?}");
-    let figures = ran.json();
-    for pointer in [
-        "/triangles",
-        "/hits/closest",
-        "/closest_a_second/median",
-        "/any_a_second/median",
-        "/build_ms/median",
-        "/top_level_ms/median",
-        "/bytes_a_triangle",
-    ] {
-        let value = figures.pointer(pointer).and_then(Value::as_f64);
-        assert!(value.is_some_and(|v| v > 0.0), "{pointer}: {figures}");
+    for levels in ["1", "2"] {
+        let few = ["--rays", "2000", "--rounds", "2", "--levels", levels, "--json"];
+        let ran = run(&[&["bench", "rays", "cornell"], few.as_slice()].concat());
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        let figures = ran.json();
+        assert_eq!(figures["levels"].to_string(), levels);
+        for pointer in [
+            "/triangles",
+            "/hits/closest",
+            "/closest_a_second/median",
+            "/any_a_second/median",
+            "/build_ms/median",
+            "/top_level_ms/median",
+            "/bytes_a_triangle",
+        ] {
+            let value = figures.pointer(pointer).and_then(Value::as_f64);
+            assert!(value.is_some_and(|v| v > 0.0), "{pointer}: {figures}");
+        }
     }
     let ran = run(&["bench", "paths", "cornell", "--size", "32x24", "--rounds", "2", "--json"]);
     assert_eq!(ran.code, Some(0), "{ran:?}");

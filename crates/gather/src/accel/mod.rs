@@ -2,9 +2,9 @@
 //!
 //! Two levels: one bounding-volume hierarchy a mesh in object space ([`triangle_bvh`]), kept from
 //! snapshot to snapshot by [`cache`], and a small one over the placed instances, rebuilt whenever
-//! the scene has changed. Or one, over all triangles of a moment ([`Levels`]). All are built as binary trees by binned SAH ([`build`]), collapsed to
-//! eight children a node ([`wide`]) and walked by the code in [`kernel`], with AVX2 or NEON where the
-//! processor has it.
+//! the scene has changed. Or one, over all triangles of a moment ([`Levels`]). All are built as binary
+//! trees by binned SAH ([`build`]), collapsed to eight children a node ([`wide`]) and walked by the
+//! code in [`kernel`], with AVX2 or NEON where the processor has it.
 //!
 //! What holds at edges: triangles of one mesh that share an edge (bit-equal positions) leave no gap,
 //! since the edge functions of both are exact negatives of each other and box tests err outwards.
