@@ -3,9 +3,8 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use lumencast_scene::{Deformation, Instance, Mesh, NodeId, Snapshot};
-
 use glam::Affine3A;
+use lumencast_scene::{Deformation, Instance, Mesh, NodeId, Snapshot};
 
 use super::{Accel, Kernel, Levels, TriangleBvh};
 
@@ -113,7 +112,7 @@ impl AccelCache {
 /// 40 MB.
 const FEW: usize = 1 << 19;
 
-/// Whether a scene's instances have at most twice as many triangles as its meshes.
+/// Whether a scene's instances have at most twice as many triangles as its meshes, or [`FEW`].
 fn copies_are_few(instances: &[Instance]) -> bool {
     let mut seen = HashSet::new();
     let (mut all, mut distinct) = (0, 0);
@@ -124,5 +123,5 @@ fn copies_are_few(instances: &[Instance]) -> bool {
             distinct += count;
         }
     }
-    all <= 2 * distinct.max(FEW / 2)
+    all <= FEW.max(2 * distinct)
 }
