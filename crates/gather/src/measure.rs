@@ -140,7 +140,7 @@ impl RayBench {
             let passing = |_| Passing { ends: [from, None], key: 0 };
             self.world.closest(std::iter::once((ray, 0)), stacks, passing, |_, found| hit = found);
             let hit = hit?;
-            let point = self.world.point(hit, direction)?;
+            let point = self.world.point(&hit, direction)?.place;
             direction = frame(point.normal) * cosine_hemisphere(sampler.square());
             origin = point.leave(direction);
             from = Some(itself(&hit));

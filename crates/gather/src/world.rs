@@ -127,6 +127,11 @@ impl World {
         self.lights.emitters = emitters;
     }
 
+    /// What rays are traced with.
+    pub(crate) fn kernel(&self) -> Kernel {
+        self.accel.kernel()
+    }
+
     /// The acceleration structure alone, for which every surface is whole.
     pub(crate) fn accel(&self) -> &Accel {
         &self.accel
@@ -148,8 +153,8 @@ impl World {
     /// Direction (unit) and distance of a source of light, were nothing in between.
     pub(crate) fn aim(&self, from: Vec3, choice: f32, u: Vec2) -> Option<(Vec3, f32)> {
         let facing = |_: Vec3| Scatter { value: Vec3::ONE, pdf: 0.0 };
-        if let Some((incident, _)) = self.lights.punctual.choose(from, choice, || u, facing) {
-            return Some((incident.direction, incident.distance));
+        if let Some(chosen) = self.lights.punctual.choose(from, choice, u, facing) {
+            return Some((chosen.direction, chosen.distance));
         }
         match self.lights.sample_area(from, choice, u)? {
             AreaSample::Sky { direction, .. } => Some((direction, f32::INFINITY)),
@@ -169,7 +174,8 @@ impl World {
         &self.parts[(self.first_part[instance as usize] + primitive) as usize]
     }
 
-    fn material(&self, instance: u32, primitive: u32) -> &Material {
+    #[inline]
+    pub(crate) fn material(&self, instance: u32, primitive: u32) -> &Material {
         let id = self.part(instance, primitive).material as usize;
         self.snapshot.materials.get(id).unwrap_or(&self.fallback)
     }
@@ -178,6 +184,7 @@ impl World {
         &self.snapshot.instances[index as usize]
     }
 
+    #[inline]
     pub(crate) fn frames(&self, instance: u32) -> &Frames {
         &self.frames[instance as usize]
     }
@@ -221,7 +228,7 @@ impl World {
     #[cold]
     fn covers_in_part(&self, hit: &Hit, key: u64) -> bool {
         let material = self.material(hit.instance, hit.primitive);
-        let coverage = self.triangle(hit).coverage(material, hit.weights());
+        let coverage = self.triangle(hit).at(material, hit.weights()).coverage();
         let place = u64::from(hit.instance) << 40
             ^ u64::from(hit.primitive) << 32
             ^ u64::from(hit.triangle);
@@ -235,27 +242,16 @@ impl World {
         Triangle::fetch(self.instance(hit.instance), hit.primitive, hit.triangle);
     }
 
-    /// Asks for a hit's vertices.
+    /// A hit's triangle.
     #[inline]
-    pub(crate) fn fetch_vertices(&self, hit: &Hit) {
-        self.triangle(hit).fetch_vertices();
-    }
-
-    /// Asks for the texels at a hit.
-    #[inline]
-    pub(crate) fn fetch_texels(&self, hit: &Hit) {
-        let material = self.material(hit.instance, hit.primitive);
-        self.triangle(hit).fetch_texels(material, hit.weights(), self.model);
-    }
-
-    fn triangle(&self, hit: &Hit) -> Triangle<'_> {
+    pub(crate) fn triangle(&self, hit: &Hit) -> Triangle<'_> {
         Triangle::new(self.instance(hit.instance), hit.primitive, hit.triangle)
     }
 
     /// The point of a hit.
-    pub(crate) fn point(&self, hit: Hit, direction: Vec3) -> Option<Point<'_>> {
+    pub(crate) fn point(&self, hit: &Hit, direction: Vec3) -> Option<Point<'_>> {
         let material = self.material(hit.instance, hit.primitive);
-        Point::new(hit, self.instance(hit.instance), self.frames(hit.instance), material, direction)
+        Point::new(hit, self.triangle(hit), self.frames(hit.instance), material, direction)
     }
 
     /// The number of a hit's triangle among the emitters.
@@ -268,11 +264,12 @@ impl World {
         let triangle =
             Triangle::new(self.instance(sample.instance), sample.primitive, sample.triangle);
         let material = self.material(sample.instance, sample.primitive);
+        let spot = triangle.at(material, sample.weights);
         let coverage = match self.model {
-            MaterialModel::Full => triangle.coverage(material, sample.weights),
+            MaterialModel::Full => spot.coverage(),
             MaterialModel::Lambert => 1.0,
         };
-        coverage * triangle.emission(material, sample.weights)
+        coverage * spot.emission()
     }
 }
 

@@ -61,7 +61,7 @@ pub use mesh::{Mesh, MorphTarget, Primitive, Vertices};
 pub use scene::{AnimationInfo, EditError, NodeInfo, PlacedCamera, Scene};
 pub use script::{Script, ScriptError};
 pub use snapshot::{Instance, Snapshot};
-pub use view::{NamedView, View};
+pub use view::{NamedView, Rays, View};
 pub use volume::VolumeSpec;
 
 macro_rules! id {

@@ -70,20 +70,49 @@ impl View {
     #[inline]
     #[must_use]
     pub fn ray(&self, at: Vec2, aspect: f32) -> (Vec3, Vec3) {
-        let at = Vec2::new((2.0 * at.x - 1.0) * aspect, 1.0 - 2.0 * at.y);
+        self.rays(aspect).through(at)
+    }
+
+    /// All rays of a picture, for whoever wants many.
+    #[must_use]
+    pub fn rays(&self, aspect: f32) -> Rays {
         let m = &self.world_from_camera;
         let axis = |v: glam::Vec3A| Vec3::from(v).normalize_or_zero();
-        let (right, up) = (axis(m.matrix3.x_axis), axis(m.matrix3.y_axis));
-        let (forward, eye) = (-axis(m.matrix3.z_axis), Vec3::from(m.translation));
-        match self.projection {
-            Projection::Perspective { yfov, .. } => {
-                let at = at * (0.5 * yfov).tan();
-                (eye, (forward + at.x * right + at.y * up).normalize())
-            }
-            Projection::Orthographic { half_height, .. } => {
-                let at = at * half_height;
-                (eye + at.x * right + at.y * up, forward)
-            }
+        let (half_height, is_perspective) = match self.projection {
+            Projection::Perspective { yfov, .. } => ((0.5 * yfov).tan(), true),
+            Projection::Orthographic { half_height, .. } => (half_height, false),
+        };
+        Rays {
+            eye: m.translation.into(),
+            forward: -axis(m.matrix3.z_axis),
+            right: half_height * aspect * axis(m.matrix3.x_axis),
+            up: half_height * axis(m.matrix3.y_axis),
+            is_perspective,
+        }
+    }
+}
+
+/// The rays of a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Rays {
+    eye: Vec3,
+    forward: Vec3,
+    /// From the middle of the picture to its edge; of a perspective view at a distance of 1.
+    right: Vec3,
+    up: Vec3,
+    is_perspective: bool,
+}
+
+impl Rays {
+    /// As [`View::ray`].
+    #[inline]
+    #[must_use]
+    pub fn through(&self, at: Vec2) -> (Vec3, Vec3) {
+        let off = (2.0 * at.x - 1.0) * self.right + (1.0 - 2.0 * at.y) * self.up;
+        if self.is_perspective {
+            (self.eye, (self.forward + off).normalize())
+        } else {
+            (self.eye + off, self.forward)
         }
     }
 }

@@ -123,6 +123,10 @@ impl Accel {
         Self { nodes, placed, bounds, kernel }
     }
 
+    pub(crate) fn kernel(&self) -> Kernel {
+        self.kernel
+    }
+
     /// World bounds of everything; empty for an empty scene.
     pub(crate) fn bounds(&self) -> Aabb {
         self.bounds

@@ -503,7 +503,8 @@ fn surfaces_do_not_shade_themselves() {
             // From outside, where the ball is convex: nothing lies ahead.
             let from_outside = ray(center + direction * 4.0 * scale, -direction);
             let Some(hit) = closest(world.accel(), &from_outside, |_| true) else { continue };
-            let Some(point) = world.point(hit, from_outside.direction) else { continue };
+            let Some(point) = world.point(&hit, from_outside.direction) else { continue };
+            let point = point.place;
             let away = (point.normal + 0.99 * sphere(random(9, i).truncate())).normalize();
             // No identity given: only the offset protects.
             let leaving = ray(point.leave(away), away);

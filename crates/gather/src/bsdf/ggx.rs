@@ -1,8 +1,10 @@
 //! The GGX microfacet distribution (Walter et al. 2007; Heitz 2014, 2018), isotropic.
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
+
+use crate::sampling::turned;
 
 /// The smallest α: below it the lobe is narrower than f32 can integrate (perceptual roughness 0.032).
 pub(crate) const MIN_ALPHA: f32 = 1e-3;
@@ -19,6 +21,7 @@ pub(crate) struct Lobe {
 
 impl Lobe {
     /// Both directions have z > 0.
+    #[inline(always)]
     pub(crate) fn reflect(v: Vec3, l: Vec3, alpha: f32) -> Self {
         let h = (v + l).normalize_or(Vec3::Z);
         let d = distribution(h, alpha);
@@ -32,6 +35,7 @@ impl Lobe {
 }
 
 /// Normals' density D(h), written so that it keeps its digits near the peak.
+#[inline(always)]
 fn distribution(h: Vec3, alpha: f32) -> f32 {
     let a2 = alpha * alpha;
     let t = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
@@ -39,6 +43,7 @@ fn distribution(h: Vec3, alpha: f32) -> f32 {
 }
 
 /// Smith's Λ; G₁ = 1/(1 + Λ), G₂ = 1/(1 + Λ_v + Λ_l).
+#[inline(always)]
 fn lambda(v: Vec3, alpha: f32) -> f32 {
     let tan2 = (v.x * v.x + v.y * v.y) / (v.z * v.z);
     0.5 * ((1.0 + alpha * alpha * tan2).sqrt() - 1.0)
@@ -46,11 +51,12 @@ fn lambda(v: Vec3, alpha: f32) -> f32 {
 
 /// A normal as seen from `v`: density D·G₁·max(v·h, 0)/n·v (Dupuy and Benyoub 2023, "Sampling
 /// visible GGX normals with spherical caps").
+#[inline(always)]
 pub(crate) fn visible_normal(v: Vec3, alpha: f32, u: Vec2) -> Vec3 {
     let stretched = Vec3::new(alpha * v.x, alpha * v.y, v.z).normalize();
     let z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
     let r = (1.0 - z * z).clamp(0.0, 1.0).sqrt();
-    let cap = (r * Vec2::from_angle(TAU * u.x)).extend(z);
+    let cap = (r * turned(u.x)).extend(z);
     let h = cap + stretched;
     Vec3::new(alpha * h.x, alpha * h.y, h.z.max(0.0)).normalize_or(Vec3::Z)
 }

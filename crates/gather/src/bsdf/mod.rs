@@ -75,8 +75,37 @@ pub(crate) struct Chosen {
     pub(crate) pdf: f32,
 }
 
+impl Chosen {
+    /// No direction.
+    pub(crate) const NONE: Self = Self { direction: Vec3::ZERO, weight: Vec3::ZERO, pdf: 0.0 };
+}
+
 impl Bsdf {
+    pub(crate) const NUMBERS: usize = 13;
+
+    #[inline(always)]
+    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
+        let Self { diffuse: d, transmission: t, f0, .. } = self;
+        let (f90, g0, g90) = (self.f90, self.dielectric_f0, self.dielectric_f90);
+        [d.x, d.y, d.z, t.x, t.y, t.z, f0.x, f0.y, f0.z, f90, g0, g90, self.alpha]
+    }
+
+    #[inline(always)]
+    pub(crate) fn from_array(numbers: [f32; Self::NUMBERS]) -> Self {
+        let [dx, dy, dz, tx, ty, tz, x, y, z, f90, dielectric_f0, dielectric_f90, alpha] = numbers;
+        Self {
+            diffuse: Vec3::new(dx, dy, dz),
+            transmission: Vec3::new(tx, ty, tz),
+            f0: Vec3::new(x, y, z),
+            f90,
+            dielectric_f0,
+            dielectric_f90,
+            alpha,
+        }
+    }
+
     /// A Lambert surface.
+    #[inline]
     pub(crate) fn lambert(albedo: Vec3) -> Self {
         Self {
             diffuse: albedo,
@@ -90,6 +119,7 @@ impl Bsdf {
     }
 
     /// A glTF surface.
+    #[inline]
     pub(crate) fn new(s: &Substance) -> Self {
         let by_ior = if s.ior == 0.0 { 1.0 } else { ((s.ior - 1.0) / (s.ior + 1.0)).powi(2) };
         let f0 = (by_ior * s.specular_color).min(Vec3::ONE) * s.specular;
@@ -106,6 +136,7 @@ impl Bsdf {
     }
 
     /// The scattering from l to v. `l` may lie on either side.
+    #[inline(always)]
     pub(crate) fn eval(&self, v: Vec3, l: Vec3) -> Scatter {
         let mut s = Scatter::default();
         if v.z <= 0.0 {
@@ -133,6 +164,7 @@ impl Bsdf {
     }
 
     /// Chooses a direction; `None` where no light comes from. `choice` picks the lobe.
+    #[inline(always)]
     pub(crate) fn sample(&self, v: Vec3, choice: f32, u: Vec2) -> Option<Chosen> {
         if self.is_lambert() {
             let direction = cosine_hemisphere(u);
@@ -163,11 +195,13 @@ impl Bsdf {
     }
 
     /// Whether there is but the diffuse lobe, and nothing above it that reflects.
+    #[inline(always)]
     fn is_lambert(&self) -> bool {
         self.f90 == 0.0 && self.f0 == Vec3::ZERO && self.transmission == Vec3::ZERO
     }
 
     /// Chance of each lobe to be sampled, by what it will about contribute.
+    #[inline(always)]
     fn chances(&self, v: Vec3) -> [f32; 3] {
         let f = self.reflectance(v.z);
         let diffuse = luminance(self.diffuse) * (1.0 - f);
@@ -178,16 +212,19 @@ impl Bsdf {
     }
 
     /// Schlick's Fresnel term.
+    #[inline(always)]
     fn fresnel(&self, cos: f32) -> Vec3 {
         self.f0 + (Vec3::splat(self.f90) - self.f0) * schlick(cos)
     }
 
     /// What the dielectric's surface takes from the lobes underneath.
+    #[inline(always)]
     fn reflectance(&self, cos: f32) -> f32 {
         self.dielectric_f0 + (self.dielectric_f90 - self.dielectric_f0) * schlick(cos)
     }
 
     /// What is left for the diffuse lobe, relative to Lambert.
+    #[inline(always)]
     fn coupling(&self, v: Vec3, l: Vec3) -> f32 {
         // ∫ F cos dω/π for Schlick's F.
         let mean = self.dielectric_f0 + (self.dielectric_f90 - self.dielectric_f0) / 21.0;
@@ -198,17 +235,20 @@ impl Bsdf {
     }
 }
 
+#[inline(always)]
 fn schlick(cos: f32) -> f32 {
     let m = (1.0 - cos).clamp(0.0, 1.0);
     m * m * m * m * m
 }
 
 /// Mirrors through the surface.
+#[inline(always)]
 fn through(d: Vec3) -> Vec3 {
     Vec3::new(d.x, d.y, -d.z)
 }
 
 /// A frame about a unit normal: columns x, y, z = n (Duff et al. 2017).
+#[inline(always)]
 pub(crate) fn frame(n: Vec3) -> glam::Mat3 {
     let sign = 1.0f32.copysign(n.z);
     let a = -1.0 / (sign + n.z);

@@ -20,13 +20,13 @@
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 use glam::{Vec2, Vec3};
-use lumencast_scene::{Light, LightKind, PlacedLight};
+use lumencast_scene::{LightKind, PlacedLight};
 
 use crate::bsdf::{Scatter, frame};
-use crate::sampling::{Table, luminance, power_heuristic};
+use crate::sampling::{Table, luminance, power_heuristic, turned};
 
 /// Up to so many lights are all looked at before one is chosen.
-const CANDIDATES: usize = 16;
+pub(crate) const CANDIDATES: usize = 16;
 
 /// Light arriving from a punctual light, were nothing in between.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,16 +43,19 @@ pub(crate) struct Incident {
 
 impl Incident {
     /// cos a.
+    #[inline(always)]
     fn cosine(&self) -> f32 {
         ((1.0 - self.sine) * (1.0 + self.sine)).sqrt()
     }
 
     /// 1 − cos a.
+    #[inline(always)]
     pub(super) fn height(&self) -> f32 {
         self.sine * self.sine / (1.0 + self.cosine())
     }
 
     /// Density per steradian of [`Incident::toward`]; infinite for a point.
+    #[inline(always)]
     fn pdf(&self) -> f32 {
         1.0 / (TAU * self.height())
     }
@@ -63,6 +66,7 @@ impl Incident {
     }
 
     /// Metres to the nearest point of a sphere in a direction `sine` off its middle.
+    #[inline(always)]
     fn distance_at(&self, sine: f32) -> f32 {
         if self.distance.is_infinite() {
             return f32::INFINITY;
@@ -73,10 +77,11 @@ impl Incident {
     }
 
     /// A point of the disc, chosen uniformly by solid angle; its `irradiance` is what it stands for.
+    #[inline(always)]
     pub(super) fn toward(&self, u: Vec2) -> Self {
         let height = u.x * self.height();
         let sine = (height * (2.0 - height)).max(0.0).sqrt();
-        let local = (sine * Vec2::from_angle(TAU * u.y)).extend(1.0 - height);
+        let local = (sine * turned(u.y)).extend(1.0 - height);
         Self {
             direction: (frame(self.direction) * local).normalize(),
             distance: self.distance_at(sine),
@@ -93,57 +98,184 @@ impl Incident {
     }
 }
 
-/// What a point receives from a light.
-pub(crate) fn incident(placed: &PlacedLight, at: Vec3) -> Option<Incident> {
-    let light = &placed.light;
-    let intensity = light.color * light.intensity;
-    let radius = match light.kind {
-        LightKind::Point { radius } | LightKind::Spot { radius, .. } => radius,
-        LightKind::Directional { angle } => {
+/// A light as points ask it: all that does not depend on the point worked out.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Source {
+    position: Vec3,
+    /// Along which it shines; unit.
+    direction: Vec3,
+    /// Candela, or of a directional light lux.
+    intensity: Vec3,
+    /// Metres; infinite where there is none.
+    range: f32,
+    /// Scale and offset of the spot's falloff by the cosine of the angle from its axis: 0 and 1 of
+    /// others.
+    cone: [f32; 2],
+    /// Metres; of a directional light the sine of the half-angle that it spans.
+    size: f32,
+    is_directional: bool,
+}
+
+impl Source {
+    pub(crate) const NUMBERS: usize = 14;
+
+    pub(crate) fn new(placed: &PlacedLight) -> Self {
+        let light = &placed.light;
+        let (size, cone) = match light.kind {
+            LightKind::Point { radius } => (radius, [0.0, 1.0]),
+            LightKind::Spot { inner, outer, radius } => {
+                let scale = 1.0 / (inner.cos() - outer.cos()).max(0.001);
+                (radius, [scale, -outer.cos() * scale])
+            }
+            LightKind::Directional { angle } => ((0.5 * angle).sin(), [0.0, 1.0]),
+        };
+        Self {
+            position: placed.position,
+            direction: placed.direction,
+            intensity: light.color * light.intensity,
+            range: light.range.unwrap_or(f32::INFINITY),
+            cone,
+            size,
+            is_directional: matches!(light.kind, LightKind::Directional { .. }),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
+        let Self { position: p, direction: d, intensity: i, range, cone, size, is_directional } =
+            self;
+        let directional = f32::from(is_directional);
+        [p.x, p.y, p.z, d.x, d.y, d.z, i.x, i.y, i.z, range, cone[0], cone[1], size, directional]
+    }
+
+    #[inline(always)]
+    pub(crate) fn from_array(numbers: [f32; Self::NUMBERS]) -> Self {
+        let [x, y, z, dx, dy, dz, r, g, b, range, scale, offset, size, directional] = numbers;
+        Self {
+            position: Vec3::new(x, y, z),
+            direction: Vec3::new(dx, dy, dz),
+            intensity: Vec3::new(r, g, b),
+            range,
+            cone: [scale, offset],
+            size,
+            is_directional: directional != 0.0,
+        }
+    }
+
+    /// What a point receives.
+    #[inline(always)]
+    pub(crate) fn incident(&self, at: Vec3) -> Option<Incident> {
+        if self.is_directional {
             return Some(Incident {
-                direction: -placed.direction,
+                direction: -self.direction,
                 distance: f32::INFINITY,
-                irradiance: intensity,
-                sine: if angle > 0.0 { (0.5 * angle).sin() } else { 0.0 },
+                irradiance: self.intensity,
+                sine: self.size,
             });
         }
-    };
-    let to_light = placed.position - at;
-    let distance = to_light.length();
-    let direction = to_light.try_normalize()?;
-    let falloff = window(distance, light) * cone(direction.dot(-placed.direction), light);
-    // Within the sphere it is as bright as on it.
-    let outside = distance.max(radius);
-    // In two steps, since the square of a small distance may vanish.
-    let irradiance = intensity * falloff / outside / outside;
-    (falloff > 0.0 && irradiance.is_finite()).then_some(Incident {
-        direction,
-        distance,
-        irradiance,
-        sine: radius / outside,
-    })
+        let to_light = self.position - at;
+        let distance = to_light.length();
+        let direction = to_light.try_normalize()?;
+        let falloff = self.window(distance) * self.cone(direction.dot(-self.direction));
+        // Within the sphere it is as bright as on it.
+        let outside = distance.max(self.size);
+        // In two steps, since the square of a small distance may vanish.
+        let irradiance = self.intensity * falloff / outside / outside;
+        (falloff > 0.0 && irradiance.is_finite()).then_some(Incident {
+            direction,
+            distance,
+            irradiance,
+            sine: self.size / outside,
+        })
+    }
+
+    /// max(min(1 − (d/range)⁴, 1), 0).
+    #[inline(always)]
+    fn window(&self, distance: f32) -> f32 {
+        let share = distance / self.range;
+        let square = share * share;
+        (1.0 - square * square).clamp(0.0, 1.0)
+    }
+
+    /// The spot's falloff at the cosine of the angle from its axis; 1 for point lights.
+    #[inline(always)]
+    fn cone(&self, cos: f32) -> f32 {
+        let t = (cos * self.cone[0] + self.cone[1]).clamp(0.0, 1.0);
+        t * t
+    }
+
+    /// The light as a point may reach for it, standing for `copies` of its kind. Of a light with a
+    /// size one point counts, which `on_disc` chooses.
+    #[inline(always)]
+    pub(crate) fn point_for(&self, at: Vec3, copies: f32, on_disc: Vec2) -> LightPoint {
+        let Some(incident) = self.incident(at) else { return LightPoint::NONE };
+        let (incident, pdf) = if incident.sine > 0.0 {
+            (incident.toward(on_disc), incident.pdf())
+        } else {
+            (incident, f32::INFINITY)
+        };
+        let Incident { direction, distance, irradiance, .. } = incident;
+        LightPoint { direction, distance, irradiance: copies * irradiance, pdf }
+    }
 }
 
-/// max(min(1 − (d/range)⁴, 1), 0).
-fn window(distance: f32, light: &Light) -> f32 {
-    light.range.map_or(1.0, |range| (1.0 - (distance / range).powi(4)).clamp(0.0, 1.0))
+/// A light, or a point of it, that a point may reach for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightPoint {
+    /// Unit.
+    pub(crate) direction: Vec3,
+    distance: f32,
+    irradiance: Vec3,
+    /// Density per steradian of the direction; infinite for a point.
+    pdf: f32,
 }
 
-/// The spot's falloff at the cosine of the angle from its axis; 1 for point lights.
-fn cone(cos: f32, light: &Light) -> f32 {
-    let LightKind::Spot { inner, outer, .. } = light.kind else { return 1.0 };
-    let scale = 1.0 / (inner.cos() - outer.cos()).max(0.001);
-    let t = (cos * scale - outer.cos() * scale).clamp(0.0, 1.0);
-    t * t
+impl LightPoint {
+    const NONE: Self =
+        Self { direction: Vec3::Z, distance: 0.0, irradiance: Vec3::ZERO, pdf: f32::INFINITY };
+
+    /// With what is scattered of light from there.
+    #[inline(always)]
+    pub(crate) fn scattered(self, scatter: Scatter) -> Candidate {
+        let share = power_heuristic(self.pdf, scatter.pdf);
+        let light = scatter.value * self.irradiance * share;
+        Candidate { direction: self.direction, distance: self.distance, light }
+    }
+}
+
+/// A light that a vertex may reach for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Candidate {
+    /// Towards the light; unit.
+    pub(crate) direction: Vec3,
+    /// Metres; infinite for directional lights.
+    pub(crate) distance: f32,
+    /// What the vertex scatters of it, cd/m².
+    pub(crate) light: Vec3,
+}
+
+impl Candidate {
+    pub(crate) const NUMBERS: usize = 7;
+
+    #[inline(always)]
+    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
+        let Self { direction: d, distance, light } = self;
+        [d.x, d.y, d.z, distance, light.x, light.y, light.z]
+    }
+
+    #[inline(always)]
+    pub(crate) fn from_array([x, y, z, distance, r, g, b]: [f32; Self::NUMBERS]) -> Self {
+        Self { direction: Vec3::new(x, y, z), distance, light: Vec3::new(r, g, b) }
+    }
 }
 
 /// The punctual lights of a snapshot.
 #[derive(Debug)]
 pub(crate) struct Punctual {
-    lights: Vec<PlacedLight>,
+    sources: Vec<Source>,
     by_power: Table,
     /// Those with a size.
-    sized: Vec<PlacedLight>,
+    sized: Vec<Source>,
 }
 
 impl Punctual {
@@ -156,12 +288,9 @@ impl Punctual {
             };
             luminance(placed.light.color) * placed.light.intensity * reach
         }));
-        let has_size = |placed: &&PlacedLight| match placed.light.kind {
-            LightKind::Point { radius } | LightKind::Spot { radius, .. } => radius > 0.0,
-            LightKind::Directional { angle } => angle > 0.0,
-        };
-        let sized = lights.iter().filter(has_size).copied().collect();
-        Self { lights: lights.to_vec(), by_power, sized }
+        let sources: Vec<_> = lights.iter().map(Source::new).collect();
+        let sized = sources.iter().filter(|source| source.size > 0.0).copied().collect();
+        Self { sources, by_power, sized }
     }
 
     /// Whether rays can meet a light.
@@ -172,74 +301,92 @@ impl Punctual {
     /// Radiance of the discs that a ray meets before `end`, weighed against [`Punctual::choose`];
     /// `pdf` is the density with which the BSDF chose the ray.
     pub(crate) fn met(&self, at: Vec3, direction: Vec3, end: f32, pdf: f32) -> Vec3 {
-        let light = |placed: &PlacedLight| {
-            let disc = incident(placed, at)?;
+        let light = |source: &Source| {
+            let disc = source.incident(at)?;
             let is_met = disc.met(direction).is_some_and(|distance| distance <= end);
             is_met.then(|| power_heuristic(pdf, disc.pdf()) * disc.radiance())
         };
         self.sized.iter().filter_map(light).filter(|light| light.is_finite()).sum()
     }
 
-    /// Chooses a light in proportion to what `scatter` makes of it at this point, were nothing in
-    /// between, and returns where it is and its scattered light over the probability of the choice.
-    /// Where lights are many, the choice is among a few chosen by power (resampled importance
-    /// sampling, Talbot et al. 2005), still unbiased. Of lights with a size one point counts, which
-    /// `on_disc` chooses; it is not asked for others.
-    pub(crate) fn choose(
+    /// How many lights a vertex looks at before it chooses one: all, or where they are many, some.
+    #[inline]
+    pub(crate) fn candidates(&self) -> usize {
+        if self.by_power.is_empty() { 0 } else { self.sources.len().min(CANDIDATES) }
+    }
+
+    /// The light that all vertices look at as their candidate number `k`; `None` where they are so
+    /// many that each vertex looks at others.
+    #[inline]
+    pub(crate) fn shared_candidate(&self, k: usize) -> Option<&Source> {
+        if self.sources.len() <= CANDIDATES { self.sources.get(k) } else { None }
+    }
+
+    /// The light that a vertex looks at as its candidate number `k`, and how many lights it stands for.
+    pub(crate) fn candidate(&self, k: usize, u: f32) -> (&Source, f32) {
+        if let Some(source) = self.shared_candidate(k) {
+            return (source, 1.0);
+        }
+        let (index, p, _) = self.by_power.choose((k as f32 + u) / CANDIDATES as f32);
+        (&self.sources[index], 1.0 / (p * CANDIDATES as f32))
+    }
+
+    /// Which of the candidates to reach for, in proportion to the luminance of their light, and that
+    /// luminance over the probability of the choice. `u` is what the candidates were chosen with.
+    #[inline]
+    pub(crate) fn pick(
         &self,
-        at: Vec3,
         u: f32,
-        on_disc: impl FnOnce() -> Vec2,
-        scatter: impl Fn(Vec3) -> Scatter,
-    ) -> Option<(Incident, Vec3)> {
-        if self.by_power.is_empty() {
-            return None;
+        luminances: impl Iterator<Item = f32> + Clone,
+    ) -> Option<(usize, f32)> {
+        if self.sources.len() == 1 {
+            return luminances
+                .take(1)
+                .next()
+                .filter(|&luminance| luminance > 0.0)
+                .map(|_| (0, 1.0));
         }
-        let on_disc = if self.have_size() { on_disc() } else { Vec2::ZERO };
-        let all = self.lights.len() <= CANDIDATES;
-        let count = if all { self.lights.len() } else { CANDIDATES };
-        let mut candidates = [None; CANDIDATES];
-        let mut total = 0.0;
-        for (k, candidate) in candidates.iter_mut().enumerate().take(count) {
-            let (index, copies) = if all {
-                (k, 1.0)
-            } else {
-                let (index, p, _) = self.by_power.choose((k as f32 + u) / count as f32);
-                (index, 1.0 / (p * count as f32))
-            };
-            let Some(incident) = incident(&self.lights[index], at) else { continue };
-            let (incident, density) = if incident.sine > 0.0 {
-                (incident.toward(on_disc), incident.pdf())
-            } else {
-                (incident, f32::INFINITY)
-            };
-            let Scatter { value, pdf } = scatter(incident.direction);
-            let share = power_heuristic(density, pdf);
-            let light = value * incident.irradiance * (share * copies);
-            let weight = luminance(light);
-            if weight > 0.0 {
-                if count == 1 {
-                    return Some((incident, light));
-                }
-                total += weight;
-                *candidate = Some((incident, light, weight));
-            }
-        }
-        // Which one: the digits of u that stratified the candidates are used up.
-        let mut rest = if all {
+        let shining = luminances.enumerate().filter(|(_, luminance)| *luminance > 0.0);
+        let total: f32 = shining.clone().map(|(_, luminance)| luminance).sum();
+        // The digits of u that stratified the candidates are used up.
+        let u = if self.sources.len() <= CANDIDATES {
             u
         } else {
             crate::sampling::unit(crate::sampling::mix(u64::from(u.to_bits())) as u32)
         };
-        rest *= total;
+        let mut rest = u * total;
         let mut last = None;
-        for (incident, light, weight) in candidates.iter().flatten() {
-            last = Some((*incident, *light * (total / weight)));
-            rest -= weight;
+        for (k, luminance) in shining {
+            last = Some((k, total / luminance));
+            rest -= luminance;
             if rest < 0.0 {
                 break;
             }
         }
         last
+    }
+
+    /// Chooses a light in proportion to what `scatter` makes of it at this point, were nothing in
+    /// between, and returns where it is and its scattered light over the probability of the choice.
+    /// Where lights are many, the choice is among a few chosen by power (resampled importance
+    /// sampling, Talbot et al. 2005), still unbiased. Of lights with a size one point counts, which
+    /// `on_disc` chooses.
+    ///
+    /// Many vertices at once do the same step by step.
+    pub(crate) fn choose(
+        &self,
+        at: Vec3,
+        u: f32,
+        on_disc: Vec2,
+        scatter: impl Fn(Vec3) -> Scatter,
+    ) -> Option<Candidate> {
+        let candidate = |k| {
+            let (source, copies) = self.candidate(k, u);
+            let point = source.point_for(at, copies, on_disc);
+            point.scattered(scatter(point.direction))
+        };
+        let found: Vec<_> = (0..self.candidates()).map(candidate).collect();
+        let (k, scale) = self.pick(u, found.iter().map(|c| luminance(c.light)))?;
+        Some(Candidate { light: found[k].light * scale, ..found[k] })
     }
 }

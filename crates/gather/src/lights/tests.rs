@@ -5,12 +5,17 @@ use glam::Vec3;
 use lumencast_scene::{Environment, HdrImage, Light, LightKind, NodeId, PlacedLight};
 
 use super::environment::{Sky, SkyCache};
-use super::punctual::{Punctual, incident};
+use super::punctual::{Incident, Punctual, Source};
 use crate::bsdf::{Bsdf, Scatter, Substance};
 use crate::sampling::{Sampler, sphere};
 
 fn placed(light: Light, position: Vec3, direction: Vec3) -> PlacedLight {
     PlacedLight { node: NodeId(0), light, position, direction: direction.normalize() }
+}
+
+/// What a point receives.
+fn incident(placed: &PlacedLight, at: Vec3) -> Option<Incident> {
+    Source::new(placed).incident(at)
 }
 
 fn point(intensity: f32, range: Option<f32>) -> Light {
@@ -78,8 +83,8 @@ fn choosing_among_lights_is_unbiased() {
             let mut s = Sampler::new(9, 1, i);
             let choice = s.number();
             let light = punctual
-                .choose(at, choice, || s.square(), scatter)
-                .map_or(Vec3::ZERO, |(_, light)| light);
+                .choose(at, choice, s.square(), scatter)
+                .map_or(Vec3::ZERO, |chosen| chosen.light);
             mean += light / n as f32;
             squares += light * light / n as f32;
         }
@@ -226,8 +231,8 @@ fn both_ways_of_finding_a_disc_count_once() {
                 .map(|l| incident(l, Vec3::ZERO).unwrap().toward(on_disc))
                 .map(|point| eval(point.direction).value.x * point.irradiance.x)
                 .sum();
-            let mixed = punctual.choose(Vec3::ZERO, choice, || on_disc, eval);
-            let mixed = mixed.map_or(0.0, |(_, light)| light.x);
+            let mixed = punctual.choose(Vec3::ZERO, choice, on_disc, eval);
+            let mixed = mixed.map_or(0.0, |chosen| chosen.light.x);
             let (mut weighed, mut unweighed) = (0.0, 0.0);
             if let Some(chosen) = bsdf.sample(view, s.number(), s.square()) {
                 let met = |pdf| punctual.met(Vec3::ZERO, chosen.direction, end, pdf).x;

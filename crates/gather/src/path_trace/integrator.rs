@@ -3,13 +3,13 @@
 //! Unidirectional, with next-event estimation at every vertex and multiple importance sampling
 //! (Veach 1997) where a source can also be met by chance. Russian roulette is for pictures with many
 //! bounces only: paths of probes all have the same length, so that every sample counts alike. What
-//! happens at a vertex is in [`super::vertex`].
+//! happens at the vertices is in [`super::group`].
 
 use glam::Vec3;
 use lumencast_light::LightField;
 
-use super::vertex::Shader;
-use crate::accel::{Hit, Ray, Stacks};
+use super::group::{Group, Shader};
+use crate::accel::{Hit, Kernel, Ray, Stacks};
 use crate::sampling::Sampler;
 use crate::world::{Itself, Passing, World};
 
@@ -125,10 +125,6 @@ pub(super) struct Connection {
     pub(super) passing: Passing,
 }
 
-/// Points whose vertices and texels are asked for before the first of them is shaded: enough to wait
-/// for all at once, few enough that all stay in the first level of cache.
-const AHEAD: usize = 16;
-
 /// Follows paths through a world, many at a time: all their rays are traced, then all that they met
 /// is shaded, then all shadow rays are traced. What a path finds does not depend on the others.
 ///
@@ -145,6 +141,7 @@ pub(crate) struct Integrator<'a> {
     hits: Vec<Option<Hit>>,
     /// Indices of the paths that go on.
     alive: Vec<u32>,
+    group: Group<'a>,
     connections: Vec<Connection>,
     /// Whether something lies on them.
     occluded: Vec<bool>,
@@ -160,6 +157,7 @@ impl<'a> Integrator<'a> {
             paths: Vec::new(),
             hits: Vec::new(),
             alive: Vec::new(),
+            group: Group::default(),
             connections: Vec::new(),
             occluded: Vec::new(),
         }
@@ -239,33 +237,123 @@ impl<'a> Integrator<'a> {
 
     /// Goes one scattering event further on every path.
     fn shade(&mut self, depth: u32) {
-        let Self { world, paths, hits, limits, connections, .. } = self;
-        let mut shader = Shader { world, limits, depth, connections };
-        let mut kept = 0;
-        for first in (0..self.alive.len()).step_by(AHEAD) {
-            let group = first..self.alive.len().min(first + AHEAD);
-            let met = || {
-                let alive = self.alive[group.clone()].iter();
-                alive.filter_map(|&index| hits[index as usize].as_ref())
-            };
-            met().for_each(|hit| world.fetch_vertices(hit));
-            met().for_each(|hit| world.fetch_texels(hit));
-            for at in group {
-                let index = self.alive[at];
-                let (path, hit) = (&mut paths[index as usize], hits[index as usize]);
-                if shader.vertex(index, path, hit).is_some() {
-                    self.alive[kept] = index;
-                    kept += 1;
+        match self.world.kernel() {
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Avx2(_) => {
+                #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
+                // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for what it needs.
+                unsafe {
+                    shade_avx2(self, depth);
                 }
             }
+            _ => self.shade_with(depth),
         }
-        self.alive.truncate(kept);
     }
+
+    #[inline(always)]
+    fn shade_with(&mut self, depth: u32) {
+        let Self { world, limits, paths, hits, alive, connections, group, .. } = self;
+        let mut shader = Shader { world, limits, depth, paths, connections, group };
+        let mut kept = 0;
+        for at in 0..alive.len() {
+            let index = alive[at];
+            shader.arrive(index, hits[index as usize]);
+            if shader.is_ready() || at + 1 == alive.len() {
+                shader.shade(|index| {
+                    alive[kept] = index;
+                    kept += 1;
+                });
+            }
+        }
+        alive.truncate(kept);
+    }
+}
+
+/// [`Integrator::shade_with`] compiled for AVX2.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,popcnt")]
+fn shade_avx2(integrator: &mut Integrator<'_>, depth: u32) {
+    integrator.shade_with(depth);
 }
 
 impl Path {
     /// Four keys for each segment, for decisions about surfaces that cover in part.
     pub(super) fn key(&self, depth: u32) -> u64 {
         self.key.wrapping_add(u64::from(depth) * 4)
+    }
+}
+
+#[cfg(all(test, target_arch = "x86_64"))]
+mod tests {
+    use lumencast_scene::{Light, LightKind, Material};
+    use lumencast_testkit::scenes::{Stage, lambert};
+
+    use super::*;
+    use crate::sampling::sphere;
+    use crate::surface::MaterialModel;
+    use crate::world::WorldCache;
+
+    /// A room of several materials with so many lights, every other of them with a size.
+    fn room(lights: u32) -> Stage {
+        let mut stage = Stage::default();
+        let grey = Material { roughness: 0.8, ..lambert(Vec3::splat(0.6), Vec3::ZERO) };
+        let glass = Material { transmission: 0.8, roughness: 0.2, specular: 1.0, ..grey.clone() };
+        let metal = Material { metallic: 1.0, roughness: 0.3, ..grey.clone() };
+        let lamp = Material { emissive: Vec3::new(3.0, 2.0, 1.0), ..grey.clone() };
+        let [grey, glass, metal, lamp] = [grey, glass, metal, lamp].map(|m| stage.material(m));
+        stage.room(Vec3::ZERO, Vec3::splat(4.0), grey);
+        for (n, material) in (0..).zip([grey, glass, metal, lamp]) {
+            stage.sphere(Vec3::new(n as f32 - 1.5, -1.0, -0.5), 0.45, 8, material);
+        }
+        for n in 0..lights {
+            let radius = if n % 2 == 0 { 0.0 } else { 0.1 };
+            let kind = match n % 3 {
+                0 => LightKind::Point { radius },
+                1 => LightKind::Spot { inner: 0.3, outer: 1.2, radius },
+                _ => LightKind::Directional { angle: radius },
+            };
+            let light = Light { kind, color: Vec3::ONE, intensity: 2.0, range: Some(9.0) };
+            stage.light(light, sphere(Sampler::new(6, 0, n).square()), Vec3::NEG_Y);
+        }
+        stage
+    }
+
+    fn looks() -> impl Iterator<Item = Look> {
+        (0..300).map(|sample| {
+            let mut sampler = Sampler::new(8, 0, sample);
+            let direction = sphere(sampler.square()).normalize();
+            Look { origin: Vec3::new(0.1, 0.4, 1.0), direction, sampler }
+        })
+    }
+
+    /// Vector instructions find what single numbers find, bit for bit.
+    #[test]
+    fn vectors_change_nothing() {
+        if Kernel::detect() == Kernel::Portable {
+            return;
+        }
+        for lights in [0, 1, 3, 20] {
+            let (scene, cache) = (room(lights).snapshot(), &mut WorldCache::default());
+            let world = World::new(scene, MaterialModel::Full, Kernel::detect(), cache);
+            let limits =
+                Paths { bounces: 3, clamp: f32::INFINITY, roulette_from: u32::MAX, previous: None };
+            let [mut one, mut eight] = [0, 1].map(|_| Integrator::new(&world, limits));
+            one.begin(looks());
+            eight.begin(looks());
+            for depth in 0..=limits.bounces {
+                one.find_surfaces(depth);
+                eight.find_surfaces(depth);
+                one.shade_with(depth);
+                eight.shade(depth);
+                assert_eq!(one.alive, eight.alive, "{lights} {depth}");
+                assert!(one.alive.len() > 100 || depth == limits.bounces, "{lights} {depth}");
+                let text = |of: &Integrator<'_>| format!("{:?} {:?}", of.paths, of.connections);
+                assert!(text(&one) == text(&eight), "{lights} {depth}");
+                one.connect();
+                eight.connect();
+            }
+            let light: Vec3 = one.paths.iter().map(|path| path.seen.radiance()).sum();
+            assert!(light.is_finite() && light.min_element() > 0.0, "{lights}: {light}");
+        }
     }
 }

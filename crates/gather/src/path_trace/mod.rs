@@ -1,6 +1,8 @@
 //! Gathering by path tracing.
 
 mod aim;
+mod columns;
+mod group;
 pub(crate) mod integrator;
 mod job;
 #[cfg(test)]

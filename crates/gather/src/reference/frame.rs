@@ -79,12 +79,11 @@ fn met(world: &World, direction: Vec3, hit: Option<Hit>) -> Sample {
     let Some(hit) = hit else {
         return Sample { emitted: world.lights.sky.radiance(direction), ..Sample::default() };
     };
-    let Some(point) = world.point(hit, direction) else { return Sample::default() };
-    let scattering = point.scattering(world.frames(hit.instance), world.model);
-    let surface = scattering.map(|(_, frame)| Surface {
-        position: point.position,
-        normal: frame.z_axis,
-        base_color: point.base_color(),
+    let Some(point) = world.point(&hit, direction) else { return Sample::default() };
+    let surface = point.shading_normal(world.model).map(|normal| Surface {
+        position: point.place.position,
+        normal,
+        base_color: point.spot.base_color(),
     });
     Sample { emitted: point.emission(world.model), surface, ..Sample::default() }
 }

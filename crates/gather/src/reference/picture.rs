@@ -222,14 +222,14 @@ impl Renderer {
     pub(super) fn looks(&self, corner: UVec2, places: &[u32]) -> impl Iterator<Item = Look> {
         let s = &self.settings;
         let end = (corner + TILE).min(s.size);
-        let aspect = s.size.x as f32 / s.size.y as f32;
+        let rays = self.view.rays(s.size.x as f32 / s.size.y as f32);
         let pixels =
             (corner.y..end.y).flat_map(move |y| (corner.x..end.x).map(move |x| UVec2::new(x, y)));
         pixels.flat_map(move |pixel| places.iter().map(move |&sample| (pixel, sample))).map(
             move |(pixel, sample)| {
                 let mut sampler = Sampler::new(s.seed, pixel.y * s.size.x + pixel.x, sample);
                 let place = pixel.as_vec2() + 0.5 + s.filter.place(sampler.square());
-                let (origin, direction) = self.view.ray(place / s.size.as_vec2(), aspect);
+                let (origin, direction) = rays.through(place / s.size.as_vec2());
                 Look { origin, direction, sampler }
             },
         )

@@ -5,18 +5,18 @@ pub(crate) mod lattice;
 mod sobol;
 mod table;
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use glam::{Vec2, Vec3};
 
-pub(crate) use sobol::Sampler;
+pub(crate) use sobol::{Draw, Sampler};
 pub(crate) use table::{Grid2, Table};
 
 /// The largest f32 below 1.
 pub(crate) const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// Rec. 709 luminance.
-#[inline]
+#[inline(always)]
 pub(crate) fn luminance(c: Vec3) -> f32 {
     c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
@@ -41,23 +41,40 @@ pub(crate) fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
 
+/// Cosine and sine of an angle of at most π/4 (Moshier's Cephes, sinf.c).
+#[inline(always)]
+fn cos_sin(angle: f32) -> Vec2 {
+    let z = angle * angle;
+    let cos = 1.0 - 0.5 * z + z * z * (4.166_664_6e-2 + z * (-1.388_731_6e-3 + z * 2.443_315_7e-5));
+    let sin = angle + angle * z * (-1.666_665_5e-1 + z * (8.332_161e-3 - z * 1.951_529_6e-4));
+    Vec2::new(cos, sin)
+}
+
+/// The point of the unit circle at 0 to 1 turns from +x, within 1.5·10⁻⁷. Unlike the library's functions
+/// it is no call, so that loops over it become vector instructions.
+#[inline(always)]
+pub(crate) fn turned(turns: f32) -> Vec2 {
+    let quarters = 4.0 * turns;
+    let nearest = (quarters + 0.5).floor();
+    let Vec2 { x: c, y: s } = cos_sin(FRAC_PI_2 * (quarters - nearest));
+    let (odd, low) = (nearest == 1.0 || nearest == 3.0, nearest == 2.0 || nearest == 3.0);
+    let (x, y) = if odd { (-s, c) } else { (c, s) };
+    if low { Vec2::new(-x, -y) } else { Vec2::new(x, y) }
+}
+
 /// The unit disc, equal areas, without tearing neighbours apart (Shirley and Chiu 1997).
-#[inline]
+#[inline(always)]
 pub(crate) fn disc(u: Vec2) -> Vec2 {
     let p = 2.0 * u - Vec2::ONE;
-    if p == Vec2::ZERO {
-        return Vec2::ZERO;
-    }
-    let (radius, angle) = if p.x.abs() > p.y.abs() {
-        (p.x, PI / 4.0 * (p.y / p.x))
-    } else {
-        (p.y, PI / 2.0 - PI / 4.0 * (p.x / p.y))
-    };
-    radius * Vec2::from_angle(angle)
+    let flat = p.x.abs() > p.y.abs();
+    let (radius, other) = if flat { (p.x, p.y) } else { (p.y, p.x) };
+    let ratio = if radius == 0.0 { 0.0 } else { other / radius };
+    let Vec2 { x: c, y: s } = radius * cos_sin(FRAC_PI_4 * ratio);
+    if flat { Vec2::new(c, s) } else { Vec2::new(s, c) }
 }
 
 /// The upper hemisphere with density cos θ/π.
-#[inline]
+#[inline(always)]
 pub(crate) fn cosine_hemisphere(u: Vec2) -> Vec3 {
     let d = disc(u);
     d.extend((1.0 - d.length_squared()).max(0.0).sqrt())
@@ -69,7 +86,7 @@ pub(crate) fn cosine_hemisphere(u: Vec2) -> Vec3 {
 pub(crate) fn sphere(u: Vec2) -> Vec3 {
     let z = 1.0 - 2.0 * u.x;
     let r = (1.0 - z * z).max(0.0).sqrt();
-    (r * Vec2::from_angle(TAU * u.y)).extend(z)
+    (r * turned(u.y)).extend(z)
 }
 
 /// Barycentric weights of the second and third vertex, uniform in area.
@@ -88,7 +105,7 @@ pub(crate) fn rotation(u: Vec3) -> glam::Quat {
 
 /// The weight of a strategy with density `a` beside one with density `b`: the power heuristic
 /// (Veach 1997, equation 9.13, β = 2).
-#[inline]
+#[inline(always)]
 pub(crate) fn power_heuristic(a: f32, b: f32) -> f32 {
     if a.is_infinite() {
         return 1.0;
@@ -119,6 +136,17 @@ mod tests {
         assert!((mean(&|u| disc(u).length_squared()) - 0.5).abs() < 1e-3);
         assert!((mean(&|u| triangle(u).x) - 1.0 / 3.0).abs() < 2e-3);
         assert!((mean(&|u| triangle(u).y) - 1.0 / 3.0).abs() < 2e-3);
+    }
+
+    #[test]
+    fn turns_are_points_of_the_circle() {
+        let n = 100_000;
+        for i in 0..=n {
+            let turns = i as f32 / n as f32;
+            let (sin, cos) = (f64::from(turns) * std::f64::consts::TAU).sin_cos();
+            let off = turned(turns).as_dvec2() - glam::DVec2::new(cos, sin);
+            assert!(off.abs().max_element() < 1.5e-7, "{turns}: {off}");
+        }
     }
 
     #[test]

@@ -28,18 +28,13 @@ impl Sampler {
     /// A point of the unit square; over the samples of a receiver these are well spread.
     #[inline]
     pub(crate) fn square(&mut self) -> Vec2 {
-        let (order, scramble) = self.keys();
-        let i = shuffled(self.reversed, order);
-        let x = owen_reversed(i, scramble as u32).reverse_bits();
-        let y = owen_reversed(sobol_reversed(i), (scramble >> 32) as u32).reverse_bits();
-        Vec2::new(unit(x), unit(y))
+        self.draw().square()
     }
 
     /// A number in [0, 1), likewise.
     #[inline]
     pub(crate) fn number(&mut self) -> f32 {
-        let (order, scramble) = self.keys();
-        unit(owen_reversed(shuffled(self.reversed, order), scramble as u32).reverse_bits())
+        self.draw().number()
     }
 
     /// A key of this path, for decisions by hash.
@@ -48,23 +43,62 @@ impl Sampler {
         mix2(self.sequence, u64::from(self.reversed))
     }
 
-    #[inline]
-    fn keys(&mut self) -> (u32, u64) {
+    /// What the next number or square is computed from.
+    #[inline(always)]
+    pub(crate) fn draw(&mut self) -> Draw {
         self.drawn += 1;
         let key = self.sequence.wrapping_add(self.drawn.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let scramble = mix(key);
-        ((scramble.wrapping_mul(0x5851_f42d_4c95_7f2d) >> 32) as u32, scramble)
+        let order = (scramble.wrapping_mul(0x5851_f42d_4c95_7f2d) >> 32) as u32;
+        let reversed = self.reversed;
+        Draw { reversed, order, scramble: [scramble as u32, (scramble >> 32) as u32] }
     }
 }
 
-#[inline]
+/// A number or a point of the unit square, not yet computed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Draw {
+    reversed: u32,
+    order: u32,
+    scramble: [u32; 2],
+}
+
+impl Draw {
+    pub(crate) const NUMBERS: usize = 4;
+
+    #[inline(always)]
+    pub(crate) fn to_array(self) -> [u32; Self::NUMBERS] {
+        [self.reversed, self.order, self.scramble[0], self.scramble[1]]
+    }
+
+    #[inline(always)]
+    pub(crate) fn from_array([reversed, order, a, b]: [u32; Self::NUMBERS]) -> Self {
+        Self { reversed, order, scramble: [a, b] }
+    }
+
+    #[inline(always)]
+    pub(crate) fn number(self) -> f32 {
+        let i = shuffled(self.reversed, self.order);
+        unit(owen_reversed(i, self.scramble[0]).reverse_bits())
+    }
+
+    #[inline(always)]
+    pub(crate) fn square(self) -> Vec2 {
+        let i = shuffled(self.reversed, self.order);
+        let x = owen_reversed(i, self.scramble[0]).reverse_bits();
+        let y = owen_reversed(sobol_reversed(i), self.scramble[1]).reverse_bits();
+        Vec2::new(unit(x), unit(y))
+    }
+}
+
+#[inline(always)]
 fn unit(bits: u32) -> f32 {
     (bits as f32 * (1.0 / 4_294_967_296.0)).min(ONE_MINUS_EPSILON)
 }
 
 /// The sample's place in the shuffled order: an Owen scramble of the index, which keeps every
 /// prefix of a power of two well spread.
-#[inline]
+#[inline(always)]
 fn shuffled(reversed: u32, key: u32) -> u32 {
     owen_reversed(reversed, key).reverse_bits()
 }
@@ -72,7 +106,7 @@ fn shuffled(reversed: u32, key: u32) -> u32 {
 /// Owen scrambling of a fraction given in reversed bits would need each bit to depend on the bits
 /// above it; in reversed order these are the bits below, which is what carries do (Laine and
 /// Karras 2011; constants by Vegdahl). Input: bits reversed, so bit 0 is the fraction's first.
-#[inline]
+#[inline(always)]
 fn owen_reversed(reversed: u32, key: u32) -> u32 {
     let mut x = reversed;
     x = x.wrapping_add(key);
@@ -85,7 +119,7 @@ fn owen_reversed(reversed: u32, key: u32) -> u32 {
 
 /// The second Sobol dimension in reversed bits: the index times Pascal's triangle mod 2, which is
 /// its own square root of structure and takes five steps (Ahmed 2024).
-#[inline]
+#[inline(always)]
 fn sobol_reversed(index: u32) -> u32 {
     let mut x = index;
     x ^= (x & 0xffff_0000) >> 16;

@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 use glam::{Vec2, Vec3, Vec4};
-use lumencast_scene::{Filter, Image, TextureRef, Vertices, Wrap};
+use lumencast_scene::{Filter, Image, TextureRef, Wrap};
 
 use crate::accel::fetch_ahead;
 
@@ -49,6 +49,7 @@ impl Coding {
 }
 
 /// The texture at mesh coordinates `uv` (before KHR_texture_transform).
+#[inline]
 pub(crate) fn sample(texture: &TextureRef, uv: Vec2, coding: Coding) -> Vec4 {
     let image = &*texture.image;
     let at = in_texels(texture, uv);
@@ -60,39 +61,50 @@ pub(crate) fn sample(texture: &TextureRef, uv: Vec2, coding: Coding) -> Vec4 {
     let row = |y| wrapped(y, image.height, texture.wrap[1]);
     match texture.filter {
         Filter::Nearest => {
-            let p = at.floor().as_ivec2();
-            texel(image, column(p.x), row(p.y), rgb)
+            let (x, y) = (below(at.x), below(at.y));
+            texel(image, column(x), row(y), rgb)
         }
         Filter::Linear => {
             let at = at - 0.5;
-            let corner = at.floor();
-            let f = at - corner;
-            let p = corner.as_ivec2();
-            let [left, right] = [column(p.x), column(p.x.wrapping_add(1))];
+            let (x, y) = (below(at.x), below(at.y));
+            // Beyond ±2³¹ texels there is nothing to blend.
+            let f = Vec2::new(at.x - x as f32, at.y - y as f32).clamp(Vec2::ZERO, Vec2::ONE);
+            let [left, right] = [column(x), column(x.wrapping_add(1))];
             let along = |y| texel(image, left, y, rgb).lerp(texel(image, right, y, rgb), f.x);
-            along(row(p.y)).lerp(along(row(p.y.wrapping_add(1))), f.y)
+            along(row(y)).lerp(along(row(y.wrapping_add(1))), f.y)
         }
     }
 }
 
 /// Where mesh coordinates lie in the texture, in texels from its corner.
+#[inline]
 fn in_texels(texture: &TextureRef, uv: Vec2) -> Vec2 {
     let size = Vec2::new(texture.image.width as f32, texture.image.height as f32);
     texture.texture_from_mesh.transform_point2(uv) * size
 }
 
+/// The whole number at or below, without a call of the library where the processor may not round.
+#[inline]
+fn below(x: f32) -> i32 {
+    let toward_zero = x as i32;
+    toward_zero.saturating_sub(i32::from(toward_zero as f32 > x))
+}
+
 /// Asks for the texels that [`sample`] reads; the next in a row is mostly in the same line.
+#[inline]
 pub(crate) fn fetch_texels(texture: &TextureRef, uv: Vec2) {
     let image = &*texture.image;
-    let p = (in_texels(texture, uv) - 0.5).floor().as_ivec2();
-    let x = wrapped(p.x, image.width, texture.wrap[0]);
-    for y in [p.y, p.y.wrapping_add(1)] {
+    let at = in_texels(texture, uv) - 0.5;
+    let (x, y) = (below(at.x), below(at.y));
+    let x = wrapped(x, image.width, texture.wrap[0]);
+    for y in [y, y.wrapping_add(1)] {
         let y = wrapped(y, image.height, texture.wrap[1]);
         image.texels.get(y * image.width as usize + x).map(fetch_ahead);
     }
 }
 
 /// White beyond the image's end.
+#[inline]
 fn texel(image: &Image, column: usize, row: usize, rgb: &Decoded) -> Vec4 {
     let Some(&[r, g, b, a]) = image.texels.get(row * image.width as usize + column) else {
         return Vec4::ONE;
@@ -106,10 +118,13 @@ pub(crate) fn color(image: &Image, column: usize, row: usize) -> Vec3 {
     texel(image, column, row, Coding::Srgb.rgb()).truncate()
 }
 
+#[inline]
 pub(crate) fn wrapped(i: i32, size: u32, wrap: Wrap) -> usize {
-    if i >= 0 && (i as u32) < size {
-        return i as usize;
-    }
+    if (i as u32) < size { i as usize } else { wrapped_around(i, size, wrap) }
+}
+
+#[inline(never)]
+fn wrapped_around(i: i32, size: u32, wrap: Wrap) -> usize {
     let (i, n) = (i64::from(i), i64::from(size));
     let j = match wrap {
         Wrap::Repeat => i.rem_euclid(n),
@@ -128,12 +143,6 @@ pub(crate) fn interpolate_uv(uv: &[Vec2], corners: [u32; 3], weights: Vec3) -> V
         return Vec2::ZERO;
     }
     let [a, b, c] = corners.map(|i| uv[i as usize]);
-    weights.x * a + weights.y * b + weights.z * c
-}
-
-/// Normals at weights of a triangle's vertices, not normalised.
-pub(crate) fn interpolate_normal(vertices: &Vertices, corners: [u32; 3], weights: Vec3) -> Vec3 {
-    let [a, b, c] = corners.map(|i| vertices.normals[i as usize]);
     weights.x * a + weights.y * b + weights.z * c
 }
 

@@ -1,0 +1,486 @@
+//! Shading: what happens where the rays of paths have arrived.
+//!
+//! Each step is taken for a group of vertices before the next: what it needs is looked up vertex by
+//! vertex, and then a loop over all of them computes it in vectors.
+
+use glam::Vec3;
+use lumencast_light::LightField;
+
+use super::columns::{Columns, GROUP};
+use super::integrator::{Connection, Part, Path, Paths, Segment};
+use super::vertex::{Scattered, Vertices};
+use crate::accel::{Hit, Ray};
+use crate::bsdf::Scatter;
+use crate::lights::AreaSample;
+use crate::lights::punctual::{CANDIDATES, Candidate, Source};
+use crate::sampling::{Draw, Sampler, luminance, power_heuristic};
+use crate::surface::{Bump, Frames, Place, Spot, Triangle, interpolate};
+use crate::world::{Passing, World, itself};
+
+/// A surface that a path has met.
+#[derive(Clone, Copy)]
+struct Met<'a> {
+    /// The path.
+    index: u32,
+    hit: Hit,
+    triangle: Triangle<'a>,
+}
+
+/// Vertices that are shaded together. Its columns also hold vertices that are not there: what is
+/// computed of them is not looked at.
+#[derive(Default)]
+pub(super) struct Group<'a> {
+    met: Vec<Met<'a>>,
+    spots: Vec<Spot<'a>>,
+    /// Whether the path goes on.
+    going: [bool; GROUP],
+    /// Which instance's frames are in the columns; they stay from group to group.
+    instances: [Option<u32>; GROUP],
+    vertices: Vertices,
+    /// The corners of each triangle, object space.
+    corners: Columns<9>,
+    /// The vertex normals at each point, object space.
+    vertex_normals: Columns<3>,
+    /// Barycentric weights of the second and third corner.
+    weights: Columns<2>,
+    frames: Columns<{ Frames::NUMBERS }>,
+    bumps: Columns<{ Bump::NUMBERS }>,
+    draws: [Columns<{ Draw::NUMBERS }, u32>; 2],
+    numbers: Columns<1>,
+    squares: Columns<2>,
+    sources: Columns<{ Source::NUMBERS }>,
+    copies: Columns<1>,
+    candidates: [Columns<{ Candidate::NUMBERS }>; CANDIDATES],
+    directions: Columns<3>,
+}
+
+/// What happens where paths' rays have arrived.
+pub(super) struct Shader<'s, 'a> {
+    pub(super) world: &'a World,
+    pub(super) limits: &'s Paths<'a>,
+    /// Scattering events so far.
+    pub(super) depth: u32,
+    pub(super) paths: &'s mut [Path],
+    /// Lights to reach for.
+    pub(super) connections: &'s mut Vec<Connection>,
+    pub(super) group: &'s mut Group<'a>,
+}
+
+impl Shader<'_, '_> {
+    /// Adds what a path sees of sources that are no surfaces, and puts the surface that it has met into
+    /// the group.
+    #[inline(always)]
+    pub(super) fn arrive(&mut self, index: u32, hit: Option<Hit>) {
+        let (world, depth) = (self.world, self.depth);
+        if depth > 0 && world.lights.punctual.have_size() {
+            let end = hit.map_or(f32::INFINITY, |hit| hit.t);
+            let path = &self.paths[index as usize];
+            let discs = path.throughput * self.discs(&path.segment, end);
+            let discs = self.limited(depth, discs);
+            self.paths[index as usize].seen.add(Part::after(depth - 1), discs);
+        }
+        let Some(hit) = hit else {
+            let path = &self.paths[index as usize];
+            let sky = self.limited(depth, path.throughput * self.sky(&path.segment));
+            return self.paths[index as usize].seen.add(Part::after(depth), sky);
+        };
+        let triangle = world.triangle(&hit);
+        triangle.fetch_vertices();
+        self.group.met.push(Met { index, hit, triangle });
+    }
+
+    /// Whether the group is full.
+    #[inline(always)]
+    pub(super) fn is_ready(&self) -> bool {
+        self.group.met.len() == GROUP
+    }
+
+    /// Shades the group and empties it: adds what shines, notes which lights to reach for, and turns
+    /// the rays of the paths that go on, which it tells.
+    #[inline(always)]
+    pub(super) fn shade(&mut self, mut goes_on: impl FnMut(u32)) {
+        self.find_places();
+        self.add_emission();
+        let previous = self.limits.previous;
+        let is_last = self.depth == self.limits.bounces;
+        if !is_last || previous.is_some() {
+            self.find_scattering();
+            self.reach_for_punctual(is_last);
+            if let Some(field) = previous.filter(|_| is_last) {
+                self.add_field(field);
+            } else {
+                self.go_on();
+            }
+        }
+        if !is_last {
+            let going = self.group.met.iter().zip(self.group.going).filter(|(_, going)| *going);
+            going.for_each(|(met, _)| goes_on(met.index));
+        }
+        self.group.met.clear();
+    }
+
+    /// Light reached for by chance: an emissive triangle or the environment, and the next ray.
+    #[inline(always)]
+    fn go_on(&mut self) {
+        let are_points = self.world.lights.are_points();
+        if !are_points {
+            self.reach_for_area();
+        }
+        let only_sources = self.depth + 1 == self.limits.bounces && self.limits.previous.is_none();
+        if only_sources && are_points {
+            self.group.going = [false; GROUP];
+        } else {
+            self.scatter();
+        }
+    }
+
+    /// Where the group's rays have arrived.
+    #[inline(always)]
+    fn find_places(&mut self) {
+        let Self { world, group, paths, .. } = self;
+        let Group {
+            met,
+            spots,
+            going,
+            instances,
+            vertices,
+            corners,
+            weights,
+            frames,
+            vertex_normals,
+            ..
+        } = &mut **group;
+        spots.clear();
+        for (vertex, Met { index, hit, triangle }) in met.iter().enumerate().take(GROUP) {
+            corners.set(vertex, bytemuck::cast(triangle.positions()));
+            weights.set(vertex, [hit.u, hit.v]);
+            let normal = interpolate(triangle.normals(), hit.weights());
+            vertex_normals.set(vertex, normal.to_array());
+            if instances[vertex] != Some(hit.instance) {
+                instances[vertex] = Some(hit.instance);
+                frames.set(vertex, world.frames(hit.instance).to_array());
+            }
+            let view = -paths[*index as usize].segment.ray.direction;
+            vertices.views.set(vertex, view.to_array());
+            let material = world.material(hit.instance, hit.primitive);
+            let spot = triangle.at(material, hit.weights());
+            spot.fetch_texels(world.model);
+            spots.push(spot);
+        }
+        for vertex in 0..GROUP {
+            let [u, v] = weights.get(vertex);
+            let place = Place::new(
+                &Frames::from_array(frames.get(vertex)),
+                bytemuck::cast(corners.get(vertex)),
+                Vec3::new(1.0 - u - v, u, v),
+                -Vec3::from(vertices.views.get(vertex)),
+            );
+            vertices.places.set(vertex, place.to_array());
+        }
+        // Triangles so thin that they have no normal end paths.
+        *going = std::array::from_fn(|vertex| vertices.place(vertex).normal != Vec3::ZERO);
+    }
+
+    /// What the surfaces send out by themselves, and for the first of a path what they are.
+    #[inline(always)]
+    fn add_emission(&mut self) {
+        let (world, depth) = (self.world, self.depth);
+        for vertex in 0..self.group.met.len().min(GROUP) {
+            let (Met { index, hit, .. }, spot) = (self.group.met[vertex], self.group.spots[vertex]);
+            if !self.group.going[vertex] {
+                continue;
+            }
+            let place = self.group.vertices.place(vertex);
+            let front = place.is_front();
+            let path = &mut self.paths[index as usize];
+            if depth == 0 {
+                path.seen.distance = hit.t;
+                path.seen.normal = place.normal;
+                path.seen.front = front;
+                path.seen.back = !front && !spot.material.double_sided;
+            }
+            let mut emitted = spot.emission_seen(front, world.model);
+            if emitted == Vec3::ZERO {
+                continue;
+            }
+            if let Some(emitter) = world.emitter(&hit) {
+                let Segment { ray, pdf, .. } = &path.segment;
+                let other = world.lights.emitter_pdf(emitter, ray.origin, place.position);
+                emitted *= power_heuristic(*pdf, other);
+            }
+            let emitted = path.throughput * emitted;
+            let emitted = self.limited(depth, emitted);
+            self.paths[index as usize].seen.add(Part::after(depth), emitted);
+        }
+    }
+
+    /// How the surfaces scatter; ends paths where they do not.
+    #[inline(always)]
+    fn find_scattering(&mut self) {
+        let model = self.world.model;
+        let Group { spots, going, vertices, vertex_normals, frames, bumps, .. } = &mut *self.group;
+        for (vertex, spot) in spots.iter().enumerate().take(GROUP) {
+            let front = vertices.place(vertex).is_front();
+            let Some(bsdf) = spot.bsdf(front, model) else {
+                going[vertex] = false;
+                continue;
+            };
+            vertices.bsdfs.set(vertex, bsdf.to_array());
+            bumps.set(vertex, spot.bump(model).to_array());
+        }
+        for vertex in 0..GROUP {
+            let normal = vertices.place(vertex).shading_normal(
+                &Frames::from_array(frames.get(vertex)),
+                vertex_normals.get(vertex).into(),
+                &Bump::from_array(bumps.get(vertex)),
+                vertices.views.get(vertex).into(),
+            );
+            vertices.normals.set(vertex, normal.to_array());
+        }
+    }
+
+    /// Reaches from each vertex for one punctual light; from the last vertex of a path no scattered
+    /// ray will meet it by chance.
+    #[inline(always)]
+    fn reach_for_punctual(&mut self, is_last: bool) {
+        let (world, depth, model) = (self.world, self.depth, self.world.model);
+        let lights = &world.lights.punctual;
+        let count = lights.candidates();
+        let sized = lights.have_size();
+        self.draw(0, |sampler| sampler.draw());
+        if sized {
+            self.draw(1, |sampler| sampler.draw());
+        }
+        let Group { met, vertices, draws, numbers, squares, sources, copies, candidates, .. } =
+            &mut *self.group;
+        for vertex in 0..GROUP {
+            numbers.set(vertex, [Draw::from_array(draws[0].get(vertex)).number()]);
+            if sized {
+                let square = Draw::from_array(draws[1].get(vertex)).square();
+                squares.set(vertex, square.to_array());
+            }
+        }
+        for (k, candidates) in candidates.iter_mut().enumerate().take(count) {
+            if let Some(source) = lights.shared_candidate(k) {
+                sources.fill(source.to_array());
+                copies.fill([1.0]);
+            } else {
+                for vertex in 0..met.len().min(GROUP) {
+                    let [u] = numbers.get(vertex);
+                    let (source, count) = lights.candidate(k, u);
+                    sources.set(vertex, source.to_array());
+                    copies.set(vertex, [count]);
+                }
+            }
+            for vertex in 0..GROUP {
+                let v = vertices.get(vertex);
+                let [copies] = copies.get(vertex);
+                let on_disc = squares.get(vertex).into();
+                let source = Source::from_array(sources.get(vertex));
+                let point = source.point_for(v.place.position, copies, on_disc);
+                let found = v.eval(point.direction, model);
+                let pdf = if is_last { 0.0 } else { found.pdf };
+                let candidate = point.scattered(Scatter { pdf, ..found });
+                candidates.set(vertex, candidate.to_array());
+            }
+        }
+        for vertex in 0..self.group.met.len().min(GROUP) {
+            let Group { met, going, vertices, numbers, candidates, .. } = &*self.group;
+            let Met { index, hit, .. } = met[vertex];
+            let candidate = |k: usize| Candidate::from_array(candidates[k].get(vertex));
+            let [u] = numbers.get(vertex);
+            let luminances = (0..count).map(|k| luminance(candidate(k).light));
+            let Some((k, scale)) = lights.pick(u, luminances).filter(|_| going[vertex]) else {
+                continue;
+            };
+            let Candidate { direction, distance, light } = candidate(k);
+            let path = &self.paths[index as usize];
+            let light = self.limited(depth + 1, path.throughput * (light * scale));
+            let origin = vertices.place(vertex).leave(direction);
+            let key = path.key(depth) + 1;
+            self.connections.push(Connection {
+                path: index,
+                part: Part::after(depth),
+                light,
+                ray: Ray { origin, direction, t_max: distance },
+                passing: Passing { ends: [Some(itself(&hit)), None], key },
+            });
+        }
+    }
+
+    /// Reaches from each vertex for one point of an emissive triangle or of the environment.
+    #[inline(always)]
+    fn reach_for_area(&mut self) {
+        let (world, depth) = (self.world, self.depth);
+        let mut samples = [None; GROUP];
+        for vertex in 0..self.group.met.len().min(GROUP) {
+            let Group { met, vertices, directions, .. } = &mut *self.group;
+            let Met { index, .. } = met[vertex];
+            let sampler = &mut self.paths[index as usize].sampler;
+            let (choice, u) = (sampler.number(), sampler.square());
+            let from = vertices.place(vertex).position;
+            let Some(sample) = world.lights.sample_area(from, choice, u) else { continue };
+            let to = AreaLight::new(&sample, from);
+            directions.set(vertex, to.direction.to_array());
+            samples[vertex] = Some((sample, to));
+        }
+        let scattered = self.group.vertices.eval(&self.group.directions, world.model);
+        for (vertex, sample) in samples.iter().enumerate() {
+            let Some((sample, to)) = sample else { continue };
+            let Met { index, hit, .. } = self.group.met[vertex];
+            let [r, g, b, other] = scattered.get(vertex);
+            let value = Vec3::new(r, g, b);
+            if !self.group.going[vertex] || value == Vec3::ZERO || !to.direction.is_finite() {
+                continue;
+            }
+            let emitted = match sample {
+                AreaSample::Sky { radiance, .. } => *radiance,
+                AreaSample::Emitter(e) => world.emitted(e),
+            };
+            let light = value * emitted * (power_heuristic(to.pdf, other) / to.pdf);
+            if light == Vec3::ZERO {
+                continue;
+            }
+            let path = &self.paths[index as usize];
+            let light = self.limited(depth + 1, path.throughput * light);
+            let origin = self.group.vertices.place(vertex).leave(to.direction);
+            let key = path.key(depth) + 2;
+            self.connections.push(Connection {
+                path: index,
+                part: Part::Indirect,
+                light,
+                ray: Ray { origin, direction: to.direction, t_max: to.distance },
+                passing: Passing { ends: [Some(itself(&hit)), to.target], key },
+            });
+        }
+    }
+
+    /// Draws what the next rays are chosen by, and chooses them.
+    #[inline(always)]
+    fn choose_rays(&mut self) -> Columns<10> {
+        self.draw(0, Sampler::draw);
+        self.draw(1, Sampler::draw);
+        let model = self.world.model;
+        let Group { vertices, draws, .. } = &*self.group;
+        let mut rays = Columns::default();
+        for vertex in 0..GROUP {
+            let draws = [0, 1].map(|n: usize| Draw::from_array(draws[n].get(vertex)));
+            rays.set(vertex, vertices.get(vertex).scatter(draws, model).to_array());
+        }
+        rays
+    }
+
+    /// Turns the rays.
+    #[inline(always)]
+    fn scatter(&mut self) {
+        let rays = self.choose_rays();
+        let Group { met, going, .. } = &mut *self.group;
+        for (vertex, met) in met.iter().enumerate().take(GROUP) {
+            let Scattered { origin, direction, weight, pdf } =
+                Scattered::from_array(rays.get(vertex));
+            let going = &mut going[vertex];
+            *going &= pdf > 0.0;
+            let path = &mut self.paths[met.index as usize];
+            path.throughput *= weight;
+            if *going && self.depth + 1 >= self.limits.roulette_from {
+                let survival = path.throughput.max_element().min(1.0);
+                *going = path.sampler.number() < survival;
+                path.throughput /= survival;
+            }
+            let ray = Ray { origin, direction, t_max: f32::INFINITY };
+            path.segment = Segment { ray, from: Some(itself(&met.hit)), pdf };
+        }
+    }
+
+    /// Adds what the last surfaces scatter of a field's light, and ends the paths. Negative lobes of
+    /// the field are kept: cut off here, light would be added at every bounce.
+    #[inline(always)]
+    fn add_field(&mut self, field: &LightField) {
+        let rays = self.choose_rays();
+        for vertex in 0..self.group.met.len().min(GROUP) {
+            let Met { index, .. } = self.group.met[vertex];
+            let Scattered { direction, weight, pdf, .. } = Scattered::from_array(rays.get(vertex));
+            if !self.group.going[vertex] || pdf <= 0.0 {
+                continue;
+            }
+            let vertices = &self.group.vertices;
+            let normal = Vec3::from(vertices.normals.get(vertex));
+            let side = normal * 1.0f32.copysign(normal.dot(direction));
+            let Some(arriving) = field.sample(vertices.place(vertex).position, side) else {
+                continue;
+            };
+            let path = &self.paths[index as usize];
+            let light = path.throughput * (weight * arriving.radiance(direction));
+            let light = self.limited(self.depth + 1, light);
+            self.paths[index as usize].seen.add(Part::Indirect, light);
+        }
+    }
+
+    /// Draws something of each path's numbers.
+    #[inline(always)]
+    fn draw(&mut self, to: usize, of: impl Fn(&mut Sampler) -> Draw) {
+        let Group { met, draws, .. } = &mut *self.group;
+        for (vertex, met) in met.iter().enumerate().take(GROUP) {
+            draws[to].set(vertex, of(&mut self.paths[met.index as usize].sampler).to_array());
+        }
+    }
+
+    /// Punctual lights with a size that a scattered ray meets before `end` metres.
+    fn discs(&self, segment: &Segment, end: f32) -> Vec3 {
+        let Ray { origin, direction, .. } = segment.ray;
+        self.world.lights.punctual.met(origin, direction, end, segment.pdf)
+    }
+
+    /// Environment seen along a ray that left the scene.
+    fn sky(&self, segment: &Segment) -> Vec3 {
+        let direction = segment.ray.direction;
+        let lights = &self.world.lights;
+        let weight = power_heuristic(segment.pdf, lights.sky_pdf(direction));
+        weight * lights.sky.radiance(direction)
+    }
+
+    /// Scattered light held to the limit; what the receiver sees itself is left alone. A value that
+    /// is not a number would spoil a whole field, so it counts as nothing.
+    #[inline]
+    fn limited(&self, scattered: u32, light: Vec3) -> Vec3 {
+        if !light.is_finite() {
+            return Vec3::ZERO;
+        }
+        let y = luminance(light);
+        if scattered == 0 || y <= self.limits.clamp {
+            light
+        } else {
+            light * (self.limits.clamp / y)
+        }
+    }
+}
+
+/// Where a point of an emissive triangle or of the environment is.
+#[derive(Clone, Copy)]
+struct AreaLight {
+    /// Unit.
+    direction: Vec3,
+    /// Metres.
+    distance: f32,
+    /// Density per steradian.
+    pdf: f32,
+    /// The triangle.
+    target: Option<(u32, u32, u32)>,
+}
+
+impl AreaLight {
+    #[inline]
+    fn new(sample: &AreaSample, from: Vec3) -> Self {
+        match sample {
+            AreaSample::Sky { direction, pdf, .. } => {
+                Self { direction: *direction, distance: f32::INFINITY, pdf: *pdf, target: None }
+            }
+            AreaSample::Emitter(e) => {
+                let to = e.position - from;
+                let distance = to.length();
+                let target = Some((e.instance, e.primitive, e.triangle));
+                Self { direction: to / distance, distance, pdf: e.pdf, target }
+            }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Instances: from object space to the world.
+
+use glam::{Affine3A, Mat3, Vec3, Vec3A};
+
+use crate::accel::abs;
+
+/// γ(n) of Higham: bound of the relative error of n roundings.
+pub(crate) const fn gamma(n: f32) -> f32 {
+    let e = n * f32::EPSILON * 0.5;
+    e / (1.0 - e)
+}
+
+/// What tracing needs to know of an instance beside its triangles.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frames {
+    world_from_object: Mat3,
+    translation: Vec3,
+    /// Inverse transpose, for normals.
+    normal_from_object: Mat3,
+    /// Bound of the rounding that a point gets from a metre of its largest world coordinate, metres.
+    rounding_by_place: Vec3,
+    /// And from where the instance is.
+    rounding: Vec3,
+}
+
+impl Frames {
+    pub(crate) const NUMBERS: usize = 27;
+
+    pub(crate) fn new(world_from_object: Affine3A) -> Self {
+        let object_from_world = world_from_object.inverse();
+        let (to_world, to_object) =
+            (abs(&world_from_object.matrix3), abs(&object_from_world.matrix3));
+        let moved = to_world * object_from_world.translation.abs();
+        Self {
+            world_from_object: world_from_object.matrix3.into(),
+            translation: world_from_object.translation.into(),
+            normal_from_object: Mat3::from(object_from_world.matrix3).transpose(),
+            rounding_by_place: (2.0 * gamma(4.0) * (to_world * (to_object * Vec3A::ONE))).into(),
+            rounding: (2.0 * gamma(4.0) * (moved + world_from_object.translation.abs())).into(),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
+        bytemuck::cast([
+            self.world_from_object.x_axis,
+            self.world_from_object.y_axis,
+            self.world_from_object.z_axis,
+            self.translation,
+            self.normal_from_object.x_axis,
+            self.normal_from_object.y_axis,
+            self.normal_from_object.z_axis,
+            self.rounding_by_place,
+            self.rounding,
+        ])
+    }
+
+    #[inline(always)]
+    pub(crate) fn from_array(numbers: [f32; Self::NUMBERS]) -> Self {
+        let [a, b, c, translation, d, e, f, rounding_by_place, rounding]: [Vec3; 9] =
+            bytemuck::cast(numbers);
+        Self {
+            world_from_object: Mat3::from_cols(a, b, c),
+            translation,
+            normal_from_object: Mat3::from_cols(d, e, f),
+            rounding_by_place,
+            rounding,
+        }
+    }
+
+    /// World normal of an object-space normal: unit length, or zero where that has no direction.
+    #[inline(always)]
+    pub(crate) fn normal(&self, object: Vec3) -> Vec3 {
+        (self.normal_from_object * object).normalize_or_zero()
+    }
+
+    #[inline(always)]
+    pub(crate) fn position(&self, object: Vec3) -> Vec3 {
+        self.world_from_object * object + self.translation
+    }
+
+    /// How far from the true surface a computed point of a triangle may lie, a component each:
+    /// errors of interpolating, of transforming to the world, and of transforming the next ray's
+    /// origin back (Pharr, Jakob and Humphreys 2023, section 6.8).
+    #[inline(always)]
+    pub(crate) fn error(&self, corners: [Vec3; 3], world: Vec3) -> Vec3 {
+        const OF_CORNERS: f32 = 2.0 * (gamma(16.0) + gamma(4.0));
+        let [a, b, c] = corners.map(Vec3::abs);
+        let largest = a.max(b).max(c);
+        let m = &self.world_from_object;
+        let turned =
+            largest.x * m.x_axis.abs() + largest.y * m.y_axis.abs() + largest.z * m.z_axis.abs();
+        OF_CORNERS * turned + world.abs().max_element() * self.rounding_by_place + self.rounding
+    }
+}

@@ -1,0 +1,133 @@
+//! Where a ray has arrived: position and normals.
+
+use glam::Vec3;
+
+use super::Frames;
+
+/// Where on a surface a ray has arrived.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    /// World.
+    pub(crate) position: Vec3,
+    /// Unit normal of the triangle on the side that the ray came from; zero for triangles so thin that
+    /// they have none.
+    pub(crate) normal: Vec3,
+    /// Bound of the position's error along the normal, metres.
+    offset: f32,
+    /// 1 where the ray came from the front, −1 from the back.
+    side: f32,
+}
+
+impl Place {
+    pub(crate) const NUMBERS: usize = 8;
+
+    /// The place on a triangle with these corners (object space) and weights; `direction` is the unit
+    /// direction of the ray.
+    #[inline(always)]
+    pub(crate) fn new(frames: &Frames, corners: [Vec3; 3], weights: Vec3, direction: Vec3) -> Self {
+        let [a, b, c] = corners;
+        let position = frames.position(weights.x * a + weights.y * b + weights.z * c);
+        let front = frames.normal(scaled_cross(b - a, c - a));
+        let side = if front.dot(direction) < 0.0 { 1.0 } else { -1.0 };
+        let normal = side * front;
+        Self { position, normal, offset: frames.error(corners, position).dot(normal.abs()), side }
+    }
+
+    #[inline(always)]
+    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
+        let Self { position: p, normal: n, offset, side } = self;
+        [p.x, p.y, p.z, n.x, n.y, n.z, offset, side]
+    }
+
+    #[inline(always)]
+    pub(crate) fn from_array([x, y, z, nx, ny, nz, offset, side]: [f32; Self::NUMBERS]) -> Self {
+        Self { position: Vec3::new(x, y, z), normal: Vec3::new(nx, ny, nz), offset, side }
+    }
+
+    /// Whether the ray came from the front.
+    #[inline(always)]
+    pub(crate) fn is_front(&self) -> bool {
+        self.side > 0.0
+    }
+
+    /// Where a ray along `direction` starts: off the surface by as much as rounding may have put
+    /// the position on its other side.
+    #[inline(always)]
+    pub(crate) fn leave(&self, direction: Vec3) -> Vec3 {
+        let side = 1.0f32.copysign(direction.dot(self.normal));
+        self.position + side * self.offset * self.normal
+    }
+
+    /// The shading normal (unit, world) on the ray's side, bent as little as makes it face the ray, which
+    /// came from `view` (unit): normal maps and coarse meshes would else show their back.
+    #[inline(always)]
+    pub(crate) fn shading_normal(
+        &self,
+        frames: &Frames,
+        vertex_normal: Vec3,
+        bump: &Bump,
+        view: Vec3,
+    ) -> Vec3 {
+        const LEAST: f32 = 1e-3;
+        let shading = frames.normal(bump.bend(vertex_normal));
+        let n = if shading.dot(self.normal) < 0.0 { -shading } else { shading };
+        if n == Vec3::ZERO {
+            return self.normal;
+        }
+        let cos = n.dot(view);
+        if cos >= LEAST {
+            return n;
+        }
+        (n + (2.0 * LEAST - cos) * view).normalize_or(self.normal)
+    }
+}
+
+/// A normal map's normal, and the frame that it is in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bump {
+    /// Object space.
+    pub(super) tangent: Vec3,
+    /// Of the bitangent, ±1.
+    pub(super) sign: f32,
+    /// In the frame of tangent, bitangent and vertex normal.
+    pub(super) normal: Vec3,
+}
+
+impl Bump {
+    pub(crate) const NUMBERS: usize = 7;
+    /// Leaves normals as they are.
+    pub(crate) const FLAT: Self = Self { tangent: Vec3::ZERO, sign: 1.0, normal: Vec3::Z };
+
+    #[inline(always)]
+    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
+        let Self { tangent: t, sign, normal: n } = self;
+        [t.x, t.y, t.z, sign, n.x, n.y, n.z]
+    }
+
+    #[inline(always)]
+    pub(crate) fn from_array([x, y, z, sign, nx, ny, nz]: [f32; Self::NUMBERS]) -> Self {
+        Self { tangent: Vec3::new(x, y, z), sign, normal: Vec3::new(nx, ny, nz) }
+    }
+
+    /// The shading normal in object space, of any length.
+    #[inline(always)]
+    fn bend(&self, vertex_normal: Vec3) -> Vec3 {
+        let n = vertex_normal.normalize_or_zero();
+        let bitangent = n.cross(self.tangent) * self.sign;
+        self.normal.x * self.tangent + self.normal.y * bitangent + self.normal.z * n
+    }
+}
+
+/// At weights of a triangle's vertices.
+#[inline(always)]
+pub(crate) fn interpolate([a, b, c]: [Vec3; 3], weights: Vec3) -> Vec3 {
+    weights.x * a + weights.y * b + weights.z * c
+}
+
+/// A cross product that neither overflows nor vanishes for very large or small triangles; only its
+/// direction counts.
+#[inline(always)]
+pub(crate) fn scaled_cross(a: Vec3, b: Vec3) -> Vec3 {
+    let largest = a.abs().max(b.abs()).max_element();
+    if largest == 0.0 { Vec3::ZERO } else { (a / largest).cross(b / largest) }
+}
