@@ -266,26 +266,24 @@ pub(super) fn trace_with<const ANY: bool, T: Copy>(
     open: impl Fn(&Node, &Setup, f32, &mut Stack),
     triangles: impl Fn(&Block, &Setup, f32) -> TriangleHits,
 ) {
-    let mut flights: [Option<Flight<'_, T>>; IN_FLIGHT] = [const { None }; IN_FLIGHT];
-    let mut left = 0;
-    for (flight, stack) in flights.iter_mut().zip(stacks.0.iter_mut()) {
-        let Some((ray, with)) = rays.next() else { break };
-        *flight = Some(Flight::new(accel, ray, with, stack));
-        left += 1;
-    }
-    let mut turn = 0;
-    while left > 0 {
-        turn = if turn + 1 < left { turn + 1 } else { 0 };
-        let Some(flight) = &mut flights[turn] else { return };
-        if !flight.step::<ANY>(accel, &accept, &open, &triangles) {
-            continue;
+    let begin = |stack| rays.next().map(|(ray, with)| Flight::new(accel, ray, with, stack));
+    let mut flights: Vec<_> = stacks.0.iter_mut().map_while(begin).collect();
+    while !flights.is_empty() {
+        let mut landed = None;
+        for (n, flight) in flights.iter_mut().enumerate() {
+            if !flight.step::<ANY>(accel, &accept, &open, &triangles) {
+                continue;
+            }
+            found(flight.with, flight.best);
+            if let Some((ray, with)) = rays.next() {
+                flight.start(accel, ray, with);
+            } else {
+                landed = Some(n);
+                break;
+            }
         }
-        found(flight.with, flight.best);
-        if let Some((ray, with)) = rays.next() {
-            flight.start(accel, ray, with);
-        } else {
-            left -= 1;
-            flights.swap(turn, left);
+        if let Some(n) = landed {
+            flights.swap_remove(n);
         }
     }
 }
@@ -351,7 +349,7 @@ impl<'a, T: Copy> Flight<'a, T> {
         self.stack.push(0);
     }
 
-    /// Visits what is on top of the stack; whether the ray is done.
+    /// Visits what is on top of the stack and not out of reach by now; whether the ray is done.
     #[inline(always)]
     fn step<const ANY: bool>(
         &mut self,
@@ -360,17 +358,19 @@ impl<'a, T: Copy> Flight<'a, T> {
         open: &impl Fn(&Node, &Setup, f32, &mut Stack),
         triangles: &impl Fn(&Block, &Setup, f32) -> TriangleHits,
     ) -> bool {
-        if self.stack.len == self.floor {
-            if self.stack.len == 0 {
-                return true;
+        let child = loop {
+            if self.stack.len == self.floor {
+                if self.stack.len == 0 {
+                    return true;
+                }
+                self.back_to_top(accel);
+                return false;
             }
-            self.back_to_top(accel);
-            return false;
-        }
-        let (child, t) = self.stack.pop::<ANY>();
-        if !ANY && t > self.t_max {
-            return false;
-        }
+            let (child, t) = self.stack.pop::<ANY>();
+            if ANY || t <= self.t_max {
+                break child;
+            }
+        };
         let index = (child & !LEAF) as usize;
         if child & LEAF == 0 {
             open(&self.nodes[index], &self.local, self.t_max, self.stack);

@@ -42,13 +42,11 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
                 met
             } else {
                 let order = four_bits_each(node.far_first[ray.octant as usize & 7]);
-                let enter = _mm256_permutevar8x32_ps(enter, order);
-                let leave = _mm256_permutevar8x32_ps(leave, order);
-                let child = permuted_bits(&node.child, order);
-                let met = not_after(enter, leave);
-                let first = members(met);
-                *children = bytemuck::cast(_mm256_permutevar8x32_epi32(child, first));
-                *distances = bytemuck::cast(_mm256_permutevar8x32_ps(enter, first));
+                let met = _mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave);
+                let met = _mm256_movemask_ps(_mm256_permutevar8x32_ps(met, order)) as u32;
+                let places = _mm256_permutevar8x32_epi32(order, members(met));
+                *children = bytemuck::cast(permuted_bits(&node.child, places));
+                *distances = bytemuck::cast(_mm256_permutevar8x32_ps(enter, places));
                 met
             };
             stack.keep(met.count_ones());
