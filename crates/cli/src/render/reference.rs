@@ -21,7 +21,7 @@ const SAMPLES: u32 = 64;
 impl Render {
     pub(super) fn trace_picture(&self, scene: &mut Scene, view: View) -> Result<()> {
         let settings = self.settings();
-        let key = self.key(scene, view, settings);
+        let key = self.key(scene, view, settings)?;
         let partial = unfinished(&self.output[0]);
         let mut film = self.begun(&partial, key);
         let before = film.samples();
@@ -88,10 +88,9 @@ impl Render {
     }
 
     /// All that a sample depends on.
-    fn key(&self, scene: &Scene, view: View, settings: PictureSettings) -> u64 {
+    fn key(&self, scene: &Scene, view: View, settings: PictureSettings) -> Result<u64> {
         let settings = PictureSettings { threads: None, ..settings };
-        let said =
-            format!("{} {view:?} {settings:?} {:?}", env!("CARGO_PKG_VERSION"), self.scene.source);
+        let said = format!("{} {view:?} {settings:?}", env!("CARGO_PKG_VERSION"));
         fingerprint::of(scene, (said, self.time.to_bits()))
     }
 
