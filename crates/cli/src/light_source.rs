@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use lumencast_codec::LightFile;
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::ProbeVolume;
+use lumencast_light::{Grid, ProbeVolume};
 use lumencast_scene::{Scene, Snapshot, VolumeSpec};
 
 use crate::arguments::Reading;
@@ -28,11 +28,11 @@ pub(crate) fn volumes(what: &str) -> Result<Vec<ProbeVolume>> {
     read().with_context(|| format!("{what} is no light field"))
 }
 
-/// Warns where a field lights no part of a scene.
-pub(crate) fn check_fits(what: &str, volumes: &[ProbeVolume], scene: &Scene) {
+/// Warns where no volume of a field lights any part of a scene.
+pub(crate) fn check_fits<'a>(what: &str, grids: impl IntoIterator<Item = &'a Grid>, scene: &Scene) {
     let bounds = scene.bounds();
     let (middle, reach) = (0.5 * (bounds.min + bounds.max), 0.5 * bounds.min.distance(bounds.max));
-    if !volumes.iter().any(|volume| volume.grid.distance(middle) <= reach) {
+    if !grids.into_iter().any(|grid| grid.distance(middle) <= reach) {
         eprintln!("warning: {what} lights no part of this scene; is it another scene's?");
     }
 }

@@ -103,10 +103,7 @@ impl View {
                 server = Some(running);
                 world
             }),
-            Some(url) if is_address(url) => {
-                let scene = self.scene.source.open()?;
-                runtime.block_on(connect(url)).map(|session| world(session, scene))
-            }
+            Some(url) if is_address(url) => self.under_a_servers_light(&runtime, url),
             Some(file) => self.saved(Path::new(file)),
         };
         let opened = shown.and_then(|world| {
@@ -150,8 +147,18 @@ impl View {
         let scene = self.scene.source.open()?;
         let name = file.display().to_string();
         let light = LightField::new(light_source::volumes(&name)?);
-        light_source::check_fits(&name, light.volumes(), &scene);
+        let grids = light.volumes().iter().map(|volume| &volume.grid);
+        light_source::check_fits(&name, grids, &scene);
         Ok(Box::new(Still::new(scene, light, name)))
+    }
+
+    /// A scene from here under a server's light.
+    fn under_a_servers_light(&self, runtime: &Runtime, url: &str) -> Result<Box<dyn World>> {
+        let scene = self.scene.source.open()?;
+        let session = runtime.block_on(connect(url))?;
+        let fields = session.catalog().map(|catalog| catalog.fields).unwrap_or_default();
+        light_source::check_fits(url, fields.iter().map(|field| &field.grid), &scene);
+        Ok(world(session, scene))
     }
 
     /// A server's scene, downloaded from it.

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Folder, run};
+use common::{Folder, run, run_with};
 use glam::Vec3;
 use lumencast_picture::{Loaded, Picture, ToneMap};
 use serde_json::{Value, json};
@@ -70,6 +70,27 @@ fn a_folder_is_no_scene_and_no_output() {
     let path = folder.0.to_str().expect("text");
     run(&["serve", path]).failed_saying(&[path, "not a regular file"]);
     run(&["bake", "cornell", "-o", path]).failed_saying(&[path, "is a folder"]);
+}
+
+/// A machine on which no driver for graphics is installed: the message names what to install.
+#[test]
+fn without_an_adapter_it_says_what_to_install() {
+    let folder = Folder::new("no-adapter");
+    let path = folder.0.join("picture.png");
+    let path = path.to_str().expect("text");
+    let small = ["--size", "8x8", "-o", path];
+    let no_driver = [("VK_DRIVER_FILES", "/dev/null"), ("VK_ICD_FILENAMES", "/dev/null")];
+    for lighting in ["none", "direct"] {
+        let arguments = [&["render", "cornell", "--lighting", lighting][..], &small].concat();
+        run_with(&arguments, &no_driver).failed_saying(&[
+            "no graphics adapter",
+            "Install",
+            "mesa-vulkan-drivers",
+        ]);
+        assert!(!folder.0.join("picture.png").exists());
+    }
+    let traced = [&["render", "cornell", "--lighting", "reference", "--spp", "1"][..], &small];
+    assert_eq!(run_with(&traced.concat(), &no_driver).code, Some(0), "needs none");
 }
 
 #[test]

@@ -87,3 +87,26 @@ fn says_what_is_missing() {
         .failed_saying(&["shot.jpg", ".png"]);
     run(&["view", "http://127.0.0.1:9/cornell"]).failed_saying(&["cannot connect"]);
 }
+
+/// Light from elsewhere is shown all the same, for nothing else is known to be wrong; but people are
+/// told.
+#[test]
+fn light_of_another_scene_is_told() {
+    let nowhere = [("DISPLAY", ""), ("WAYLAND_DISPLAY", "")];
+    let folder = Folder::new("view-elsewhere");
+    let field = folder.0.join("elsewhere.light");
+    let field = field.to_str().expect("text");
+    let volume = ["--volume", "1x1x1@500,0,0:2,2,2"];
+    let bake = ["bake", "cornell", "--samples", "1", "-o", field];
+    assert_eq!(run(&[&bake[..], &volume].concat()).code, Some(0));
+    let server = Serving::start("cornell", &volume);
+    let url = format!("http://{}/cornell", server.address);
+    for light in [field, &url] {
+        run_with(&["view", "cornell", "--light", light], &nowhere).failed_saying(&[
+            "warning",
+            light,
+            "no part of this scene",
+            "DISPLAY",
+        ]);
+    }
+}

@@ -24,7 +24,7 @@ const WIDEST_SPOT: f32 = 1.2;
 const LEAST_RESOLUTION: u32 = 128;
 /// Part of the depth of a view that is divided logarithmically, the rest evenly (Zhang et al. 2006).
 const LOGARITHMIC: f32 = 0.85;
-/// Texels that the filter reaches beyond its radius.
+/// Texels that the filter reaches beyond its radius, and one by which maps are moved.
 const MARGIN: f32 = 3.0;
 /// The widest edge that is looked for in parallel light, texels.
 const WIDEST_SEARCH: f32 = 96.0;
@@ -93,7 +93,7 @@ impl ShadowPlan {
             clip_from_world: clip_from_view * Mat4::look_to_rh(eye, forward, up),
             texel: 2.0 * tan / self.resolution as f32,
             near: NEAR,
-            reach: 1.0,
+            reach: Vec2::ONE,
             // Of what stands a quarter of the way from the light.
             search: 3.0 * radius,
             ..layout::ShadowView::default()
@@ -127,11 +127,13 @@ impl ShadowPlan {
             let middle = 0.5 * (low + high);
             let texels = self.resolution as f32;
             let inner = (0.5 * (high - low)).max(Vec2::splat(1e-3));
-            let texel = 2.0 * inner.max_element() / texels;
+            let search =
+                (size * depth_range).min(WIDEST_SEARCH * 2.0 * inner.max_element() / texels);
             // Wider by what edges at the border reach beyond it.
-            let search = (size * depth_range).min(WIDEST_SEARCH * texel);
-            let margin = search + (settings.filter_radius + MARGIN) * texel;
-            let half = inner + margin;
+            let extra = (settings.filter_radius + MARGIN).min(0.25 * texels);
+            let wide = inner + search;
+            let widest_texel = 2.0 * wide.max_element() / (texels - 2.0 * extra);
+            let half = wide + extra * widest_texel;
             let texel = 2.0 * half / texels;
             let snapped = (middle / texel).floor() * texel;
             // Depth 1 is nearest to the light, which looks along −z.
@@ -148,11 +150,12 @@ impl ShadowPlan {
             );
             self.views.push(layout::ShadowView {
                 clip_from_world: clip_from_light * light_from_world,
-                texel: texel.max_element(),
+                texel: widest_texel,
                 depth_range,
                 reach: match cascade + 1 == cascades {
-                    true => 1.0,
-                    false => 1.0 - margin / half.min_element(),
+                    true => Vec2::ONE,
+                    // Moved by less than a texel, its middle is.
+                    false => (inner + widest_texel) / half,
                 },
                 search,
                 ..layout::ShadowView::default()
@@ -279,6 +282,48 @@ mod tests {
         clip.truncate() / clip.w
     }
 
+    /// Where a cascade is used, all that is looked up about a point lies on its map: the widest edge that
+    /// its sun casts, and what the filter reaches beyond.
+    #[test]
+    fn edges_stay_on_their_cascades_map() {
+        let view = View::look_at(Vec3::new(0.0, 1.0, 8.0), Vec3::ZERO, 0.9).unwrap();
+        let camera = Camera::new(&view, UVec2::new(160, 90), Vec2::ZERO);
+        for (angle, steady) in [(0.0, false), (0.009, false), (0.009, true), (0.1, false)] {
+            let settings = Shadows { steady, ..Shadows::default() };
+            let plan = plan(&[placed(LightKind::Directional { angle }, 1.0)], &settings);
+            let mut nearest = [f32::INFINITY; 4];
+            for step in 1..1700_u16 {
+                let distance = 0.01 * f32::from(step);
+                let [a, b, c, d] = *camera.slice(distance, distance).first_chunk().unwrap();
+                let across = |u: f32, v: f32| a.lerp(b, u).lerp(d.lerp(c, u), v);
+                let points = [0.0, 0.3, 0.6, 1.0].map(|v| [0.0, 0.4, 1.0].map(|u| across(u, v)));
+                for point in points.into_iter().flatten() {
+                    if point != point.clamp(BOUNDS.min, BOUNDS.max) {
+                        continue;
+                    }
+                    let clip = |view| in_clip(view, point).truncate().abs();
+                    let is_used =
+                        |n: &usize| clip(&plan.views[*n]).cmplt(plan.views[*n].reach).all();
+                    let used = (0..4).find(is_used).expect("a cascade for what is seen");
+                    let view = &plan.views[used];
+                    let metres = |axis: usize| {
+                        (1.0 - clip(view)[axis])
+                            / view.clip_from_world.row(axis).truncate().length()
+                    };
+                    nearest[used] = nearest[used].min(metres(0)).min(metres(1));
+                }
+            }
+            for (view, nearest) in plan.views.iter().zip(nearest) {
+                let widest =
+                    ((0.5 * angle).tan() * view.depth_range).min(WIDEST_SEARCH * view.texel);
+                assert!(view.search >= 0.9 * widest, "{angle}: {} of {widest} m", view.search);
+                let needed = view.search + settings.filter_radius * view.texel;
+                assert!(nearest >= needed, "{angle}, {steady}: {nearest} of {needed} m");
+            }
+            assert!(nearest[0].is_finite() && nearest[1].is_finite(), "{nearest:?}");
+        }
+    }
+
     #[test]
     fn cascades_see_what_the_camera_sees() {
         let angle = 0.01;
@@ -297,7 +342,7 @@ mod tests {
             for corner in &camera.slice(distance, distance)[..4] {
                 let point = corner.clamp(BOUNDS.min, BOUNDS.max);
                 let seen = |view: &layout::ShadowView| {
-                    in_clip(view, point).truncate().abs().max_element() < view.reach
+                    in_clip(view, point).truncate().abs().cmplt(view.reach).all()
                 };
                 let first = plan.views.iter().position(seen);
                 let Some(first) = first else { panic!("{point} at {distance}") };

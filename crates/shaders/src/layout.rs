@@ -4,7 +4,7 @@
 #![expect(missing_docs, reason = "fields are explained where the shaders declare them")]
 
 use bytemuck::{Pod, Zeroable};
-use glam::{Affine3A, Mat4, Vec3, Vec4};
+use glam::{Affine3A, Mat4, Vec2, Vec3, Vec4};
 
 /// A row-major affine transform.
 pub type Rows = [Vec4; 3];
@@ -95,11 +95,10 @@ pub struct ShadowView {
     pub texel: f32,
     pub near: f32,
     pub depth_range: f32,
-    pub reach: f32,
     pub search: f32,
+    pub reach: Vec2,
     pub _pad0: f32,
     pub _pad1: f32,
-    pub _pad2: f32,
 }
 
 /// How many volumes there are. Group 2, binding 0.

@@ -128,20 +128,7 @@ fn layouts_agree() {
             shadow_count,
         }
     );
-    same!(
-        m,
-        ShadowView {
-            clip_from_world,
-            texel,
-            near,
-            depth_range,
-            reach,
-            search,
-            _pad0,
-            _pad1,
-            _pad2,
-        }
-    );
+    same!(m, ShadowView { clip_from_world, texel, near, depth_range, search, reach, _pad0, _pad1 });
     same!(m, Field { count });
     volumes_agree(m);
     same!(m, Map { row0, row1 });

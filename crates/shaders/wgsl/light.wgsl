@@ -30,13 +30,12 @@ struct ShadowView {
     // where rays are parallel.
     near: f32,
     depth_range: f32,
-    // How far this view reaches, in clip units, before the next cascade takes over.
-    reach: f32,
     // Half the widest edge that is looked for, metres.
     search: f32,
+    // How far this view reaches, in clip units, before the next cascade takes over.
+    reach: vec2f,
     _pad0: f32,
     _pad1: f32,
-    _pad2: f32,
 }
 
 struct Frame {
@@ -135,7 +134,7 @@ fn shadow_view_of(light: Light, point: vec3f) -> u32 {
     for (var i = 0u; i < light.shadow_count; i++) {
         let shadow = shadow_views[light.first_shadow + i];
         let clip = shadow.clip_from_world * vec4f(point, 1.0);
-        if max(abs(clip.x), abs(clip.y)) < shadow.reach {
+        if all(abs(clip.xy) < shadow.reach) {
             return i;
         }
     }

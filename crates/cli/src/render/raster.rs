@@ -152,7 +152,8 @@ impl Render {
     fn volumes(&self, scene: &mut Scene) -> Result<Vec<ProbeVolume>> {
         if let Some(light) = &self.raster.light {
             let volumes = light_source::volumes(light)?;
-            light_source::check_fits(light, &volumes, scene);
+            let grids = volumes.iter().map(|volume| &volume.grid);
+            light_source::check_fits(light, grids, scene);
             return Ok(volumes);
         }
         let specs = self.scene.volumes(scene)?;
