@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
-use lumencast_scene::{AlphaMode, Instance, Material, Snapshot};
+use lumencast_scene::{AlphaMode, Instance, Material, PlacedLight, Snapshot};
 
 use crate::accel::{Accel, AccelCache, Hit, Kernel, Levels, Ray, Stacks};
 use crate::bsdf::Scatter;
@@ -163,6 +163,11 @@ impl World {
                 Some((to.try_normalize()?, to.length()))
             }
         }
+    }
+
+    /// The punctual lights.
+    pub(crate) fn placed_lights(&self) -> &[PlacedLight] {
+        &self.snapshot.lights
     }
 
     /// Version of the snapshot.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{UVec2, Vec3};
 use lumencast_gather::path_trace::MaterialModel;
 use lumencast_gather::reference::{Film, Filter, Parts, PictureSettings, Renderer};
-use lumencast_scene::{Environment, Light, LightKind, Scene, Snapshot, View};
+use lumencast_scene::{Environment, Light, LightKind, Material, Scene, Snapshot, View};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 fn settings() -> PictureSettings {
@@ -210,4 +210,98 @@ fn frames_tell_what_is_met_first() {
         }
     }
     assert!(floors.min(lamps).min(skies) > 100, "{floors} {lamps} {skies}");
+}
+
+/// A room with a window, and the sun in it, `angle` radians wide: on a ball of metal and one of glass, or
+/// of what the walls are of.
+fn sunlit_room(angle: f32, shines: bool) -> (Arc<Snapshot>, View) {
+    let mut stage = Stage::default();
+    let wall = lambert(Vec3::new(0.8, 0.6, 0.4), Vec3::ZERO);
+    let shiny = Material { metallic: 1.0, roughness: 0.7, ..wall.clone() };
+    let glass = Material { transmission: 0.7, roughness: 0.5, specular: 1.0, ..wall.clone() };
+    let [wall, mut shiny, mut glass] = [wall, shiny, glass].map(|m| stage.material(m));
+    if !shines {
+        (shiny, glass) = (wall, wall);
+    }
+    let quad = |stage: &mut Stage, at: [f32; 3], u: [f32; 3], v: [f32; 3]| {
+        stage.quad(at.into(), u.into(), v.into(), wall);
+    };
+    quad(&mut stage, [-2.0, 0.0, 2.0], [4.0, 0.0, 0.0], [0.0, 0.0, -4.0]);
+    quad(&mut stage, [-2.0, 2.5, -2.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0]);
+    quad(&mut stage, [-2.0, 0.0, -2.0], [4.0, 0.0, 0.0], [0.0, 2.5, 0.0]);
+    quad(&mut stage, [2.0, 0.0, 2.0], [-4.0, 0.0, 0.0], [0.0, 2.5, 0.0]);
+    quad(&mut stage, [2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [0.0, 2.5, 0.0]);
+    // The wall with the window: below, above, left, right of it.
+    quad(&mut stage, [-2.0, 0.0, 2.0], [0.0, 0.0, -4.0], [0.0, 1.2, 0.0]);
+    quad(&mut stage, [-2.0, 1.8, 2.0], [0.0, 0.0, -4.0], [0.0, 0.7, 0.0]);
+    quad(&mut stage, [-2.0, 1.2, 2.0], [0.0, 0.0, -1.7], [0.0, 0.6, 0.0]);
+    quad(&mut stage, [-2.0, 1.2, -0.3], [0.0, 0.0, -1.7], [0.0, 0.6, 0.0]);
+    stage.sphere(Vec3::new(-0.6, 0.5, 0.2), 0.4, 12, shiny);
+    stage.sphere(Vec3::new(0.9, 0.5, -0.9), 0.4, 12, glass);
+    let kind = LightKind::Directional { angle };
+    let sun = Light { kind, color: Vec3::ONE, intensity: 10.0, range: None };
+    stage.light(sun, Vec3::ZERO, Vec3::new(1.0, -0.9, -0.1));
+    let lamp = Light { kind: LightKind::Point { radius: 0.0 }, intensity: 0.02, ..sun };
+    stage.light(lamp, Vec3::new(1.5, 2.2, 1.0), Vec3::NEG_Y);
+    let view = View::look_at(Vec3::new(1.7, 1.6, 1.7), Vec3::new(-0.4, 0.6, -0.4), 1.2).unwrap();
+    (stage.snapshot(), view)
+}
+
+/// Connected to what the sun was followed to, paths show the same light, with less noise: of a sun that
+/// is a point and of wide ones, whose discs rays meet by chance as well.
+#[test]
+fn following_the_sun_changes_noise_only() {
+    for (angle, shines) in [(0.0, false), (0.5, false), (0.0, true), (0.05, true), (0.5, true)] {
+        let (scene, view) = sunlit_room(angle, shines);
+        let parts = Parts::Indirect;
+        let of = |follow_sun: bool| {
+            let settings = PictureSettings {
+                follow_sun,
+                parts,
+                bounces: std::env::var("BB").map_or(4, |v| v.parse().unwrap()),
+                ..settings()
+            };
+            assert_eq!(Renderer::new(&scene, view, settings).unwrap().follows_sun(), follow_sun);
+            render(&scene, view, settings, if angle == 0.0 { 1024 } else { 256 })
+        };
+        let (without, with) = (of(false), of(true));
+        let noise = |film: &Film| film.noise(1.0).unwrap().relative_rms;
+        let (noisy, quiet) = (noise(&without), noise(&with));
+        let most = if angle < 0.1 { 0.45 } else { 0.65 };
+        assert!(quiet < most * noisy, "{angle} {shines}: {quiet} of {noisy}");
+        // In blocks of pixels and as a whole they agree within five standard errors.
+        let [a, b] = [without.picture(), with.picture()];
+        let size = settings().size;
+        let mean = |of: &[Vec3], pixels: &[u32]| {
+            pixels.iter().map(|n| of[*n as usize]).sum::<Vec3>() / pixels.len() as f32
+        };
+        let whole: Vec<u32> = (0..size.x * size.y).collect();
+        let corners = (0..size.y).step_by(14).flat_map(|y| [0, 20].map(|x| (x, y)));
+        let blocks =
+            corners.map(|(x, y)| (0..280).map(|n| (y + n / 20) * size.x + x + n % 20).collect());
+        for pixels in blocks.chain([whole.clone()]) {
+            let error = noisy.hypot(quiet) / (pixels.len() as f64).sqrt();
+            let apart = (mean(&a, &pixels) - mean(&b, &pixels)) / mean(&a, &whole);
+            let apart = f64::from(apart.abs().max_element());
+            assert!(apart < 5.0 * error, "{angle}: {apart}, {error} in {} pixels", pixels.len());
+        }
+    }
+}
+
+/// Where little of the noise is the sun's, or there is none, its rays would be wasted.
+#[test]
+fn the_sun_is_not_followed_where_that_gains_nothing() {
+    let follows = |scene: &Arc<Snapshot>, view: View, settings: PictureSettings| {
+        Renderer::new(scene, view, settings).unwrap().follows_sun()
+    };
+    let (scene, view) = sunlit_room(0.0, false);
+    assert!(follows(&scene, view, settings()));
+    assert!(!follows(&scene, view, PictureSettings { follow_sun: false, ..settings() }));
+    assert!(!follows(&scene, view, PictureSettings { parts: Parts::Direct, ..settings() }));
+    assert!(!follows(&scene, view, PictureSettings { bounces: 1, ..settings() }));
+    let bright = Environment::Constant { radiance: Vec3::splat(1000.0) };
+    let under_sky = Arc::new(Snapshot { environment: bright, ..(*scene).clone() });
+    assert!(!follows(&under_sky, view, settings()));
+    let (scene, view) = cornell();
+    assert!(!follows(&scene, view, settings()));
 }

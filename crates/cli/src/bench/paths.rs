@@ -38,7 +38,11 @@ impl BenchPaths {
     pub(crate) fn run(self) -> Result<()> {
         let mut scene = self.scene.open()?;
         let view = camera::view(&scene, self.picture.camera.as_ref())?;
-        let settings = PictureSettings { roulette_from: u32::MAX, ..self.picture.settings() };
+        let settings = PictureSettings {
+            roulette_from: u32::MAX,
+            follow_sun: false,
+            ..self.picture.settings()
+        };
         let renderer = Renderer::new(&scene.snapshot(), view, settings)
             .context("cannot start the threads that trace")?;
         let mut film = Film::new(self.picture.size, PASS * self.rounds);

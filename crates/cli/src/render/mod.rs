@@ -66,6 +66,10 @@ pub(crate) struct Render {
     /// Scattering events from which on paths may end by chance.
     #[arg(long, value_name = "N", default_value_t = 4)]
     roulette_from: u32,
+    /// Whether paths of the reference may be connected to what the sun shines on, where a short trial
+    /// shows that indirect light is found sooner so.
+    #[arg(long, value_name = "BOOL", default_value_t = true, action = clap::ArgAction::Set)]
+    follow_sun: bool,
     /// Scene time, seconds: animations are shown as they stand then.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = parse_time)]
     time: f64,

@@ -56,7 +56,8 @@ impl Render {
             fs::remove_file(&partial)
                 .with_context(|| format!("cannot remove {}", partial.display()))?;
         }
-        let done = Done { film, before, rays, seconds, exposure };
+        let done =
+            Done { follows_sun: renderer.follows_sun(), film, before, rays, seconds, exposure };
         if self.json {
             return output::json(&self.report(&done));
         }
@@ -72,6 +73,7 @@ impl Render {
         PictureSettings {
             clamp: self.clamp,
             roulette_from: self.roulette_from,
+            follow_sun: self.follow_sun,
             parts: match self.parts {
                 PartsArgument::All => Parts::All,
                 PartsArgument::Direct => Parts::Direct,
@@ -184,6 +186,7 @@ impl Render {
             "paths_a_second": done.paths(self.picture.size) / done.seconds,
             "rays_a_second": done.rays as f64 / done.seconds,
             "exposure": done.exposure,
+            "follows_sun": done.follows_sun,
             "noise_relative_rms": noise.map(|n| n.relative_rms),
             "noise_psnr": noise.map(|n| n.psnr),
         })
@@ -205,6 +208,7 @@ struct Done {
     rays: u64,
     seconds: f64,
     exposure: f32,
+    follows_sun: bool,
 }
 
 impl Done {

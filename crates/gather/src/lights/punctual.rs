@@ -162,6 +162,11 @@ impl Source {
         }
     }
 
+    /// Along which it shines; unit.
+    pub(crate) fn direction(&self) -> Vec3 {
+        self.direction
+    }
+
     /// What a point receives.
     #[inline(always)]
     pub(crate) fn incident(&self, at: Vec3) -> Option<Incident> {
@@ -274,8 +279,8 @@ impl Candidate {
 pub(crate) struct Punctual {
     sources: Vec<Source>,
     by_power: Table,
-    /// Those with a size.
-    sized: Vec<Source>,
+    /// Those with a size, and their numbers.
+    sized: Vec<(usize, Source)>,
 }
 
 impl Punctual {
@@ -289,7 +294,8 @@ impl Punctual {
             luminance(placed.light.color) * placed.light.intensity * reach
         }));
         let sources: Vec<_> = lights.iter().map(Source::new).collect();
-        let sized = sources.iter().filter(|source| source.size > 0.0).copied().collect();
+        let sized = sources.iter().copied().enumerate();
+        let sized = sized.filter(|(_, source)| source.size > 0.0).collect();
         Self { sources, by_power, sized }
     }
 
@@ -299,12 +305,21 @@ impl Punctual {
     }
 
     /// Radiance of the discs that a ray meets before `end`, weighed against [`Punctual::choose`];
-    /// `pdf` is the density with which the BSDF chose the ray.
-    pub(crate) fn met(&self, at: Vec3, direction: Vec3, end: f32, pdf: f32) -> Vec3 {
-        let light = |source: &Source| {
+    /// `pdf` is the density with which the BSDF chose the ray, `weight` what a light's disc is
+    /// multiplied by beside that, given its number.
+    pub(crate) fn met(
+        &self,
+        at: Vec3,
+        direction: Vec3,
+        end: f32,
+        pdf: f32,
+        weight: impl Fn(usize) -> f32,
+    ) -> Vec3 {
+        let light = |(number, source): &(usize, Source)| {
             let disc = source.incident(at)?;
             let is_met = disc.met(direction).is_some_and(|distance| distance <= end);
-            is_met.then(|| power_heuristic(pdf, disc.pdf()) * disc.radiance())
+            let weight = || weight(*number) * power_heuristic(pdf, disc.pdf());
+            is_met.then(|| weight() * disc.radiance())
         };
         self.sized.iter().filter_map(light).filter(|light| light.is_finite()).sum()
     }

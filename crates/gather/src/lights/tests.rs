@@ -235,7 +235,7 @@ fn both_ways_of_finding_a_disc_count_once() {
             let mixed = mixed.map_or(0.0, |chosen| chosen.light.x);
             let (mut weighed, mut unweighed) = (0.0, 0.0);
             if let Some(chosen) = bsdf.sample(view, s.number(), s.square()) {
-                let met = |pdf| punctual.met(Vec3::ZERO, chosen.direction, end, pdf).x;
+                let met = |pdf| punctual.met(Vec3::ZERO, chosen.direction, end, pdf, |_| 1.0).x;
                 weighed = chosen.weight.x * met(chosen.pdf);
                 unweighed = chosen.weight.x * met(f32::INFINITY);
             }

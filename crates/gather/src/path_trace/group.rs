@@ -6,6 +6,7 @@
 use glam::Vec3;
 use lumencast_light::LightField;
 
+use super::beam::{Found, Lit};
 use super::columns::{Columns, GROUP};
 use super::integrator::{Connection, Part, Path, Paths, Segment};
 use super::vertex::{Scattered, Vertices};
@@ -61,8 +62,12 @@ pub(super) struct Shader<'s, 'a> {
     /// Scattering events so far.
     pub(super) depth: u32,
     pub(super) paths: &'s mut [Path],
+    /// A point that a beam lights for each path.
+    pub(super) lit: &'s [Option<Lit>],
     /// Lights to reach for.
     pub(super) connections: &'s mut Vec<Connection>,
+    /// Those to the light to learn of, and where from.
+    pub(super) noted: &'s mut Vec<(u32, Found)>,
     pub(super) group: &'s mut Group<'a>,
 }
 
@@ -125,6 +130,9 @@ impl Shader<'_, '_> {
         let are_points = self.world.lights.are_points();
         if !are_points {
             self.reach_for_area();
+        }
+        if self.limits.beam.is_some() && self.depth + 2 <= self.limits.bounces {
+            self.reach_for_lit();
         }
         let only_sources = self.depth + 1 == self.limits.bounces && self.limits.previous.is_none();
         if only_sources && are_points {
@@ -294,9 +302,19 @@ impl Shader<'_, '_> {
                 continue;
             };
             let Candidate { direction, distance, light } = candidate(k);
+            let place = vertices.place(vertex);
             let path = &self.paths[index as usize];
-            let light = self.limited(depth + 1, path.throughput * (light * scale));
-            let origin = vertices.place(vertex).leave(direction);
+            let mut light = path.throughput * (light * scale);
+            if let Some(beam) = self.limits.beam.filter(|beam| beam.is_of(k)) {
+                let chosen = path.segment.density_on(hit.t, place.normal);
+                light *= beam.weight(place.position, place.normal, direction, chosen);
+            }
+            if depth > 0 && self.limits.learn == Some(k) {
+                let found = Found { at: place.position, luminance: luminance(light) };
+                self.noted.push((self.connections.len() as u32, found));
+            }
+            let light = self.limited(depth + 1, light);
+            let origin = place.leave(direction);
             let key = path.key(depth) + 1;
             self.connections.push(Connection {
                 path: index,
@@ -355,6 +373,43 @@ impl Shader<'_, '_> {
         }
     }
 
+    /// Connects each vertex to the point that the beam lights for its path.
+    #[inline(always)]
+    fn reach_for_lit(&mut self) {
+        let (world, depth, model) = (self.world, self.depth, self.world.model);
+        let Group { met, going, vertices, directions, .. } = &mut *self.group;
+        let mut lit = [None; GROUP];
+        for (vertex, met) in met.iter().enumerate().take(GROUP) {
+            lit[vertex] = self.lit[met.index as usize].as_ref().filter(|_| going[vertex]);
+            let Some(lit) = lit[vertex] else { continue };
+            let to = lit.at - vertices.place(vertex).position;
+            directions.set(vertex, to.normalize_or_zero().to_array());
+        }
+        let scattered = vertices.eval(directions, model);
+        for (vertex, lit) in lit.iter().enumerate() {
+            let Some(lit) = lit else { continue };
+            let Met { index, hit, .. } = self.group.met[vertex];
+            let [r, g, b, pdf] = scattered.get(vertex);
+            let (value, place) = (Vec3::new(r, g, b), self.group.vertices.place(vertex));
+            if value == Vec3::ZERO || lit.itself() == itself(&hit) {
+                continue;
+            }
+            let direction = Vec3::from(self.group.directions.get(vertex));
+            let Some(sent) = lit.toward(world, place.position, direction, pdf) else { continue };
+            let path = &self.paths[index as usize];
+            let light = self.limited(depth + 2, path.throughput * value * sent);
+            let origin = place.leave(direction);
+            let key = path.key(depth) + 3;
+            self.connections.push(Connection {
+                path: index,
+                part: Part::Indirect,
+                light,
+                ray: Ray { origin, direction, t_max: origin.distance(lit.at) },
+                passing: Passing { ends: [Some(itself(&hit)), Some(lit.itself())], key },
+            });
+        }
+    }
+
     /// Draws what the next rays are chosen by, and chooses them.
     #[inline(always)]
     fn choose_rays(&mut self) -> Columns<10> {
@@ -374,13 +429,18 @@ impl Shader<'_, '_> {
     #[inline(always)]
     fn scatter(&mut self) {
         let rays = self.choose_rays();
-        let Group { met, going, .. } = &mut *self.group;
+        let Group { met, going, vertices, .. } = &mut *self.group;
         for (vertex, met) in met.iter().enumerate().take(GROUP) {
             let Scattered { origin, direction, weight, pdf } =
                 Scattered::from_array(rays.get(vertex));
             let going = &mut going[vertex];
             *going &= pdf > 0.0;
             let path = &mut self.paths[met.index as usize];
+            let mut left = path.segment.left;
+            if self.limits.beam.is_some() {
+                let normal = vertices.place(vertex).normal;
+                left = (normal, path.segment.density_on(met.hit.t, normal));
+            }
             path.throughput *= weight;
             if *going && self.depth + 1 >= self.limits.roulette_from {
                 let survival = path.throughput.max_element().min(1.0);
@@ -388,7 +448,7 @@ impl Shader<'_, '_> {
                 path.throughput /= survival;
             }
             let ray = Ray { origin, direction, t_max: f32::INFINITY };
-            path.segment = Segment { ray, from: Some(itself(&met.hit)), pdf };
+            path.segment = Segment { ray, from: Some(itself(&met.hit)), pdf, left };
         }
     }
 
@@ -428,7 +488,12 @@ impl Shader<'_, '_> {
     /// Punctual lights with a size that a scattered ray meets before `end` metres.
     fn discs(&self, segment: &Segment, end: f32) -> Vec3 {
         let Ray { origin, direction, .. } = segment.ray;
-        self.world.lights.punctual.met(origin, direction, end, segment.pdf)
+        let (normal, chosen) = segment.left;
+        let beam = |light: usize| self.limits.beam.filter(|beam| beam.is_of(light));
+        let weight = |light: usize| {
+            beam(light).map_or(1.0, |beam| beam.weight(origin, normal, direction, chosen))
+        };
+        self.world.lights.punctual.met(origin, direction, end, segment.pdf, weight)
     }
 
     /// Environment seen along a ray that left the scene.

@@ -8,6 +8,7 @@
 use glam::Vec3;
 use lumencast_light::LightField;
 
+use super::beam::{Beam, Found, Lit};
 use super::group::{Group, Shader};
 use crate::accel::{Hit, Kernel, Ray, Stacks};
 use crate::sampling::Sampler;
@@ -25,6 +26,24 @@ pub(crate) struct Paths<'a> {
     /// The light that the last surface of a path scatters, beside that of punctual lights; without
     /// it, that surface only shines itself.
     pub(crate) previous: Option<&'a LightField>,
+    /// The rays of a light that paths are connected to.
+    pub(crate) beam: Option<&'a Beam>,
+    /// The punctual light of which to note where paths found it, by its number.
+    pub(crate) learn: Option<usize>,
+}
+
+impl Paths<'_> {
+    /// Paths of so many scattering events, nothing else to be seen to.
+    pub(crate) fn new(bounces: u32) -> Self {
+        Self {
+            bounces,
+            clamp: f32::INFINITY,
+            roulette_from: u32::MAX,
+            previous: None,
+            beam: None,
+            learn: None,
+        }
+    }
 }
 
 /// Where to look from, and where to.
@@ -103,6 +122,18 @@ pub(super) struct Segment {
     /// Density per steradian with which the BSDF chose it; infinite where nothing else could have
     /// found the same light.
     pub(super) pdf: f32,
+    /// Unit normal of the triangle that it starts at, and density per square metre with which the path
+    /// chose the point there, infinite at its beginning; of use only beside a [`Beam`].
+    pub(super) left: (Vec3, f32),
+}
+
+impl Segment {
+    /// Density per square metre with which it arrives at a point so many metres away, on a surface
+    /// with this unit normal.
+    #[inline]
+    pub(super) fn density_on(&self, distance: f32, normal: Vec3) -> f32 {
+        self.pdf * self.ray.direction.dot(normal).abs() / (distance * distance)
+    }
 }
 
 /// A path on its way.
@@ -145,6 +176,12 @@ pub(crate) struct Integrator<'a> {
     connections: Vec<Connection>,
     /// Whether something lies on them.
     occluded: Vec<bool>,
+    /// The points that a beam lights, one for each path.
+    lit: Vec<Option<Lit>>,
+    /// Connections to the light to learn of, and where from.
+    noted: Vec<(u32, Found)>,
+    /// Those that nothing lies on, since last taken.
+    pub(crate) found: Vec<Found>,
 }
 
 impl<'a> Integrator<'a> {
@@ -160,6 +197,9 @@ impl<'a> Integrator<'a> {
             group: Group::default(),
             connections: Vec::new(),
             occluded: Vec::new(),
+            lit: Vec::new(),
+            noted: Vec::new(),
+            found: Vec::new(),
         }
     }
 
@@ -175,6 +215,7 @@ impl<'a> Integrator<'a> {
         looks: impl IntoIterator<Item = Look>,
     ) -> impl ExactSizeIterator<Item = Seen> + '_ {
         self.begin(looks);
+        self.follow_beam();
         for depth in 0.. {
             self.find_surfaces(depth);
             self.shade(depth);
@@ -195,6 +236,7 @@ impl<'a> Integrator<'a> {
                 ray: Ray { origin: look.origin, direction: look.direction, t_max: f32::INFINITY },
                 from: None,
                 pdf: f32::INFINITY,
+                left: (Vec3::ZERO, f32::INFINITY),
             },
             throughput: Vec3::ONE,
             seen: Seen::NOTHING,
@@ -202,6 +244,24 @@ impl<'a> Integrator<'a> {
         self.hits.resize(self.paths.len(), None);
         self.alive.clear();
         self.alive.extend(0..self.paths.len() as u32);
+    }
+
+    /// Gives each path a point that the beam lights.
+    fn follow_beam(&mut self) {
+        let Self { world, limits, paths, lit, stacks, .. } = self;
+        lit.clear();
+        lit.resize(paths.len(), None);
+        let Some(beam) = limits.beam else { return };
+        self.rays += paths.len() as u64;
+        let sources: Vec<_> =
+            paths.iter().map(|path| beam.ray(world, path.sampler.aside())).collect();
+        let rays = sources.iter().zip(0..).map(|((ray, _), n)| (*ray, n));
+        let passing = |n: u32| Passing { ends: [None; 2], key: paths[n as usize].key(u32::MAX) };
+        world.closest(rays, stacks, passing, |n, hit| {
+            let (ray, source) = sources[n as usize];
+            let point = hit.and_then(|hit| Some((hit, world.point(&hit, ray.direction)?)));
+            lit[n as usize] = point.map(|(hit, point)| beam.lit(hit, &point.place, source));
+        });
     }
 
     /// Traces the rays in hand.
@@ -221,12 +281,13 @@ impl<'a> Integrator<'a> {
 
     /// Traces the shadow rays and adds the light of those that arrive.
     fn connect(&mut self) {
-        let Self { world, connections, occluded, paths, stacks, .. } = self;
+        let Self { world, connections, occluded, paths, stacks, noted, found, .. } = self;
         self.rays += connections.len() as u64;
         occluded.resize(connections.len(), false);
         let rays = connections.iter().zip(0..).map(|(c, n)| (c.ray, n));
         let passing = |n: u32| connections[n as usize].passing;
         world.occluded(rays, stacks, passing, |n, found| occluded[n as usize] = found);
+        found.extend(noted.drain(..).filter(|(n, _)| !occluded[*n as usize]).map(|(_, f)| f));
         // In order, so that sums do not depend on which ray was done first.
         for (c, occluded) in connections.drain(..).zip(occluded) {
             if !*occluded {
@@ -252,8 +313,8 @@ impl<'a> Integrator<'a> {
 
     #[inline(always)]
     fn shade_with(&mut self, depth: u32) {
-        let Self { world, limits, paths, hits, alive, connections, group, .. } = self;
-        let mut shader = Shader { world, limits, depth, paths, connections, group };
+        let Self { world, limits, paths, hits, alive, connections, group, lit, noted, .. } = self;
+        let mut shader = Shader { world, limits, depth, paths, lit, connections, noted, group };
         let mut kept = 0;
         for at in 0..alive.len() {
             let index = alive[at];
@@ -335,11 +396,16 @@ mod tests {
         for lights in [0, 1, 3, 20] {
             let (scene, cache) = (room(lights).snapshot(), &mut WorldCache::default());
             let world = World::new(scene, MaterialModel::Full, Kernel::detect(), cache);
-            let limits =
-                Paths { bounces: 3, clamp: f32::INFINITY, roulette_from: u32::MAX, previous: None };
+            let found = looks().map(|look| Found { at: look.direction, luminance: 1.0 });
+            let beam = Beam::light(&world)
+                .and_then(|light| Beam::new(&world, light, &found.collect::<Vec<_>>()));
+            assert_eq!(beam.is_some(), lights == 3, "{lights}");
+            let limits = Paths { beam: beam.as_ref(), ..Paths::new(3) };
             let [mut one, mut eight] = [0, 1].map(|_| Integrator::new(&world, limits));
-            one.begin(looks());
-            eight.begin(looks());
+            for integrator in [&mut one, &mut eight] {
+                integrator.begin(looks());
+                integrator.follow_beam();
+            }
             for depth in 0..=limits.bounces {
                 one.find_surfaces(depth);
                 eight.find_surfaces(depth);

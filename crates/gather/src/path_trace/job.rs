@@ -50,12 +50,8 @@ struct TileSums {
 /// Gathers; `None` when cancelled. Returns the sums and the number of rays.
 pub(super) fn gather(job: &Job, world: &World, watch: &Watch) -> Option<(Vec<Sums>, u64)> {
     let tiles = tiles(job);
-    let paths = Paths {
-        bounces: job.bounces,
-        clamp: job.clamp,
-        roulette_from: u32::MAX,
-        previous: job.previous.as_deref(),
-    };
+    let paths =
+        Paths { clamp: job.clamp, previous: job.previous.as_deref(), ..Paths::new(job.bounces) };
     let integrator = || Integrator::new(world, paths);
     let found: Option<Vec<(Vec<TileSums>, u64)>> = batches(&tiles)
         .into_par_iter()

@@ -1,6 +1,7 @@
 //! Gathering by path tracing.
 
 mod aim;
+pub(crate) mod beam;
 mod columns;
 mod group;
 pub(crate) mod integrator;

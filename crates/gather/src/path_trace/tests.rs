@@ -29,7 +29,7 @@ fn look(
         Kernel::detect(),
         &mut WorldCache::default(),
     );
-    let paths = Paths { bounces, clamp, roulette_from: u32::MAX, previous: None };
+    let paths = Paths { clamp, ..Paths::new(bounces) };
     let mut integrator = Integrator::new(&world, paths);
     let (groups, samples) = (32, 512);
     let means: Vec<Vec3> = (0..groups)
@@ -291,7 +291,7 @@ fn paths_do_not_depend_on_each_other() {
     let scene = lit_room();
     let world =
         World::new(scene, MaterialModel::Full, Kernel::detect(), &mut WorldCache::default());
-    let paths = Paths { bounces: 4, clamp: f32::INFINITY, roulette_from: 2, previous: None };
+    let paths = Paths { roulette_from: 2, ..Paths::new(4) };
     let look = |sample| {
         let mut sampler = Sampler::new(3, 0, sample);
         let direction = crate::sampling::sphere(sampler.square());
@@ -371,7 +371,7 @@ fn lambert_model_takes_only_base_colour() {
     stage.environment(Environment::Constant { radiance: Vec3::ONE });
     let model = MaterialModel::Lambert;
     let world = World::new(stage.snapshot(), model, Kernel::detect(), &mut WorldCache::default());
-    let paths = Paths { bounces: 1, clamp: f32::INFINITY, roulette_from: u32::MAX, previous: None };
+    let paths = Paths::new(1);
     let mut integrator = Integrator::new(&world, paths);
     for (origin, direction) in [(Vec3::Y, down()), (Vec3::NEG_Y, -down())] {
         let look = |s| Look { origin, direction, sampler: Sampler::new(1, 1, s) };

@@ -5,7 +5,7 @@ use glam::{Mat3, Vec3};
 use super::columns::{Columns, GROUP};
 use crate::bsdf::{Bsdf, Chosen, Scatter, frame};
 use crate::sampling::Draw;
-use crate::surface::{MaterialModel, Place};
+use crate::surface::{MaterialModel, Place, Point};
 
 /// A point where a path's light is scattered.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +49,13 @@ impl Scattered {
 }
 
 impl Vertex {
+    /// Where a point is seen from `view`, unit; `None` where it scatters nothing.
+    pub(super) fn at(point: &Point<'_>, view: Vec3, model: MaterialModel) -> Option<Self> {
+        let bsdf = point.spot.bsdf(point.place.is_front(), model)?;
+        let normal = point.shading_normal(model)?;
+        Some(Self { place: point.place, view, normal, bsdf })
+    }
+
     /// What is scattered of light from a direction.
     #[inline(always)]
     pub(super) fn eval(&self, direction: Vec3, model: MaterialModel) -> Scatter {

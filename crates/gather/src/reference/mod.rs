@@ -8,6 +8,7 @@ mod filter;
 mod frame;
 mod picture;
 mod probe;
+mod sun;
 
 pub use film::{Film, Noise};
 pub use filter::Filter;

@@ -1,8 +1,8 @@
 //! Pictures by path tracing.
 
 use std::num::NonZeroUsize;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use glam::{UVec2, Vec3};
 use lumencast_scene::{Snapshot, View};
@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::{Film, Filter};
 use crate::accel::Kernel;
+use crate::path_trace::beam::Beam;
 use crate::path_trace::integrator::{Integrator, Look, Paths, Seen};
 use crate::path_trace::{Levels, MaterialModel};
 use crate::sampling::Sampler;
@@ -46,6 +47,9 @@ pub struct PictureSettings {
     /// Scattering events from which on paths may end by chance, in favour of others (Russian
     /// roulette); none do before, and never where it is `u32::MAX`.
     pub roulette_from: u32,
+    /// Whether paths may be connected to what a directional light has been followed to, where that
+    /// finds indirect light sooner.
+    pub follow_sun: bool,
     /// Which light.
     pub parts: Parts,
     /// Which materials to believe.
@@ -65,6 +69,7 @@ impl Default for PictureSettings {
             bounces: 4,
             clamp: f32::INFINITY,
             roulette_from: 4,
+            follow_sun: true,
             parts: Parts::All,
             materials: MaterialModel::Full,
             filter: Filter::Box,
@@ -106,6 +111,8 @@ pub struct Renderer {
     pub(super) world: World,
     view: View,
     pub(super) settings: PictureSettings,
+    /// Found when the first paths are to be followed.
+    beam: OnceLock<Option<Beam>>,
     pool: rayon::ThreadPool,
 }
 
@@ -134,7 +141,13 @@ impl Renderer {
             )
         };
         let world = pool.install(build);
-        Ok(Self { world, view, settings, pool })
+        Ok(Self { world, view, settings, beam: OnceLock::new(), pool })
+    }
+
+    /// Whether paths are connected to what a directional light has been followed to: as
+    /// [`PictureSettings::follow_sun`] allows, and a trial has shown to be worth it.
+    pub fn follows_sun(&self) -> bool {
+        self.beam().is_some()
     }
 
     /// Adds up to [`PASS`] samples a pixel to a film, but none beyond `until` a pixel. `going` is told, from
@@ -202,37 +215,57 @@ impl Renderer {
         &self,
         of: impl Fn(&mut Integrator<'_>, UVec2) -> Vec<T> + Sync,
     ) -> Vec<Vec<T>> {
-        let s = &self.settings;
-        let across = s.size.x.div_ceil(TILE);
-        let paths = Paths {
-            bounces: s.bounces,
-            clamp: s.clamp,
-            roulette_from: s.roulette_from,
-            previous: None,
-        };
-        let integrator = || Integrator::new(&self.world, paths);
-        let tile = |integrator: &mut Integrator<'_>, tile: u32| {
+        let across = self.settings.size.x.div_ceil(TILE);
+        let paths = Paths { beam: self.beam(), ..self.paths() };
+        self.batches(paths, self.tile_count(), |integrator, tile| {
             of(integrator, TILE * UVec2::new(tile % across, tile / across))
-        };
-        let tiles = (0..self.tile_count()).into_par_iter();
-        self.pool.install(|| tiles.map_init(integrator, tile).collect())
+        })
+    }
+
+    fn beam(&self) -> Option<&Beam> {
+        self.beam.get_or_init(|| self.find_beam()).as_ref()
+    }
+
+    /// The paths to follow, without a beam.
+    pub(super) fn paths(&self) -> Paths<'_> {
+        let s = &self.settings;
+        Paths { clamp: s.clamp, roulette_from: s.roulette_from, ..Paths::new(s.bounces) }
+    }
+
+    /// Batches of camera rays on all threads, in order: what `of` makes of each.
+    pub(super) fn batches<T: Send>(
+        &self,
+        paths: Paths<'_>,
+        count: u32,
+        of: impl Fn(&mut Integrator<'_>, u32) -> T + Sync + Send,
+    ) -> Vec<T> {
+        let integrator = || Integrator::new(&self.world, paths);
+        let batches = (0..count).into_par_iter();
+        self.pool.install(|| batches.map_init(integrator, of).collect())
     }
 
     /// The camera rays of a tile, row by row: for each pixel those at some places of its sequence.
     pub(super) fn looks(&self, corner: UVec2, places: &[u32]) -> impl Iterator<Item = Look> {
         let s = &self.settings;
         let end = (corner + TILE).min(s.size);
-        let rays = self.view.rays(s.size.x as f32 / s.size.y as f32);
         let pixels =
             (corner.y..end.y).flat_map(move |y| (corner.x..end.x).map(move |x| UVec2::new(x, y)));
-        pixels.flat_map(move |pixel| places.iter().map(move |&sample| (pixel, sample))).map(
-            move |(pixel, sample)| {
-                let mut sampler = Sampler::new(s.seed, pixel.y * s.size.x + pixel.x, sample);
-                let place = pixel.as_vec2() + 0.5 + s.filter.place(sampler.square());
-                let (origin, direction) = rays.through(place / s.size.as_vec2());
-                Look { origin, direction, sampler }
-            },
-        )
+        let look = self.look(s.seed);
+        pixels
+            .flat_map(move |pixel| places.iter().map(move |&sample| (pixel, sample)))
+            .map(move |(pixel, sample)| look(pixel, sample))
+    }
+
+    /// The camera ray of a pixel's sample.
+    pub(super) fn look(&self, seed: u64) -> impl Fn(UVec2, u32) -> Look {
+        let s = &self.settings;
+        let rays = self.view.rays(s.size.x as f32 / s.size.y as f32);
+        move |pixel, sample| {
+            let mut sampler = Sampler::new(seed, pixel.y * s.size.x + pixel.x, sample);
+            let place = pixel.as_vec2() + 0.5 + s.filter.place(sampler.square());
+            let (origin, direction) = rays.through(place / s.size.as_vec2());
+            Look { origin, direction, sampler }
+        }
     }
 }
 

@@ -37,6 +37,12 @@ impl Sampler {
         self.draw().number()
     }
 
+    /// Other numbers of the same path and the same kind, so that its own stay what they are.
+    #[inline]
+    pub(crate) fn aside(&self) -> Self {
+        Self { sequence: mix(!self.sequence), reversed: self.reversed, drawn: 0 }
+    }
+
     /// A key of this path, for decisions by hash.
     #[inline]
     pub(crate) fn key(&self) -> u64 {

@@ -24,8 +24,13 @@ impl BenchQuality {
         size: UVec2,
         judge: &Judge,
     ) -> Result<Vec<Row>> {
-        let settings =
-            PictureSettings { size, clamp: self.clamp, seed: SEED, ..self.picture.settings() };
+        let settings = PictureSettings {
+            size,
+            clamp: self.clamp,
+            seed: SEED,
+            follow_sun: false,
+            ..self.picture.settings()
+        };
         let renderer = Renderer::new(&subject.snapshot, subject.view, settings)
             .context("cannot start the threads that trace")?;
         let mut denoiser = Bmfr::new(size, judge.exposure);

@@ -219,7 +219,7 @@ fn found_either_way_it_is_direct_light() {
     stage.light(bulb(20.0, 0.5), at + 2.0 * mirrored, Vec3::X);
     let model = MaterialModel::Full;
     let world = World::new(stage.snapshot(), model, Kernel::detect(), &mut WorldCache::default());
-    let paths = Paths { bounces: 3, clamp: f32::INFINITY, roulette_from: u32::MAX, previous: None };
+    let paths = Paths::new(3);
     let mut integrator = Integrator::new(&world, paths);
     let look = |i| Look { origin: Vec3::Y, direction: down(), sampler: Sampler::new(4, 0, i) };
     for seen in integrator.radiance((0..256).map(look)) {

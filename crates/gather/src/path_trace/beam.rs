@@ -1,0 +1,282 @@
+//! A directional light followed to what it lights, for paths to connect to.
+//!
+//! Where the sun comes in by a window, paths find its patches by chance only, and what they scatter
+//! once more is most of the room's light: most paths find none, few find much. So each path is given
+//! a point that a ray of the light has met, and every vertex of the path is connected to it: a
+//! bidirectional path tracer's strategy with two vertices on the light's side (Veach 1997, chapter 10).
+//! Such a point may also be found by the BSDF and then lit by next-event estimation; both are weighed
+//! by the power heuristic, at the density per area with which they choose the point. That of the
+//! light's rays is known everywhere: the density across the beam times the cosine there. Light that
+//! goes through a surface is left to the other way.
+//!
+//! A light's rays are spread by a grid of densities, learned from where the first paths of a picture
+//! were lit. Where it is wrong, results are noisier but not biased: what rays do not reach, paths still
+//! find by themselves.
+
+use glam::{Mat3, Vec2, Vec3};
+use lumencast_scene::{Aabb, LightKind};
+
+use super::vertex::Vertex;
+use crate::accel::{Hit, Ray};
+use crate::bsdf::{Scatter, frame};
+use crate::lights::punctual::{LightPoint, Source};
+use crate::sampling::{Grid2, Sampler, luminance, power_heuristic};
+use crate::surface::Place;
+use crate::world::{Itself, World, itself};
+
+/// Most cells along each side of the grid of densities.
+const CELLS: f32 = 64.0;
+/// Places that are to be known in a cell of it, if they lay evenly.
+const KNOWN: f32 = 4.0;
+/// Share of the rays that is spread evenly, over what the grid covers.
+const EVENLY: f32 = 0.05;
+/// How much wider than the places learned the grid is, of its width on each side.
+const MARGIN: f32 = 0.02;
+
+/// A place that a light has been seen to light, and how much of that was seen: luminance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Found {
+    pub(crate) at: Vec3,
+    pub(crate) luminance: f32,
+}
+
+/// The rays of a directional light.
+#[derive(Clone, Debug)]
+pub(crate) struct Beam {
+    /// The light, and its number.
+    source: Source,
+    light: usize,
+    /// World from the frame whose z is the direction along which the light shines.
+    frame: Mat3,
+    /// Where rays start, along z.
+    start: f32,
+    /// The rectangle that they cross: its lower corner and its size, along x and y.
+    low: Vec3,
+    size: Vec2,
+    /// Density over the rectangle as a unit square.
+    guide: Grid2,
+}
+
+/// A point that a ray of a beam has met.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lit {
+    hit: Hit,
+    pub(super) at: Vec3,
+    /// Unit normal of the triangle on the light's side.
+    normal: Vec3,
+    /// What arrives along the ray.
+    source: LightPoint,
+    /// Density of the point per square metre of its surface.
+    density: f32,
+}
+
+impl Beam {
+    /// The number of the light worth following: the brightest directional one, among lights few
+    /// enough for vertices to look at all.
+    pub(crate) fn light(world: &World) -> Option<usize> {
+        let lights = world.placed_lights().iter().enumerate();
+        let suns = lights.filter(|(_, l)| matches!(l.light.kind, LightKind::Directional { .. }));
+        let power = |intensity: f32, color: Vec3| intensity * luminance(color);
+        let (light, _) = suns.max_by(|(_, a), (_, b)| {
+            power(a.light.intensity, a.light.color)
+                .total_cmp(&power(b.light.intensity, b.light.color))
+        })?;
+        world.lights.punctual.shared_candidate(light).map(|_| light)
+    }
+
+    /// Follows a light to where it was found to count. `None` where it was found nowhere.
+    pub(crate) fn new(world: &World, light: usize, found: &[Found]) -> Option<Self> {
+        let source = *world.lights.punctual.shared_candidate(light)?;
+        let frame = frame(source.direction());
+        let local = |at: Vec3| frame.transpose() * at;
+        let (low, high) = found
+            .iter()
+            .map(|found| local(found.at))
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), at| {
+                (low.min(at), high.max(at))
+            });
+        let extent = high.truncate() - low.truncate();
+        if !extent.is_finite() {
+            return None;
+        }
+        let margin = MARGIN * extent + 1e-4 * world.extent();
+        // Among the places, so that it matters little how wide the light is.
+        let low = (low.truncate() - margin).extend(0.5 * (low.z + high.z));
+        let size = extent + 2.0 * margin;
+        let cells = (found.len() as f32 / KNOWN).sqrt().clamp(4.0, CELLS) as usize;
+        let mut weights = vec![0.0; cells * cells];
+        for Found { at, luminance } in found {
+            let [x, y] = ((local(*at) - low).truncate() / size * cells as f32).to_array();
+            let cell = |v: f32| (v as usize).min(cells - 1);
+            weights[cell(y) * cells + cell(x)] += luminance;
+        }
+        let guide = Grid2::new(&spread(&weights, cells), cells);
+        let bounds = world.accel().bounds();
+        let bounds = Aabb { min: bounds.min.into(), max: bounds.max.into() };
+        let corners = bounds.corners().map(|corner| local(corner).z);
+        let start = corners.fold(f32::INFINITY, f32::min) - 1e-3 * (1.0 + world.extent());
+        (!guide.is_empty()).then_some(Self { source, light, frame, start, low, size, guide })
+    }
+
+    /// Whether it is of this light.
+    pub(super) fn is_of(&self, light: usize) -> bool {
+        self.light == light
+    }
+
+    /// A ray of it, and what arrives along that.
+    pub(super) fn ray(&self, world: &World, mut sampler: Sampler) -> (Ray, LightPoint) {
+        let (at, _) = self.guide.sample(sampler.square());
+        let on_disc = if world.lights.punctual.have_size() { sampler.square() } else { Vec2::ZERO };
+        let source = self.source.point_for(Vec3::ZERO, 1.0, on_disc);
+        let crossed = self.frame * (self.low + (at * self.size).extend(0.0));
+        let direction = -source.direction;
+        let back = (self.start - self.low.z) / direction.dot(self.frame.z_axis);
+        (Ray { origin: crossed + back * direction, direction, t_max: f32::INFINITY }, source)
+    }
+
+    /// What a ray of it has met at a place, whose normal is on the light's side.
+    pub(super) fn lit(&self, hit: Hit, place: &Place, source: LightPoint) -> Lit {
+        let (at, normal) = (place.position, place.normal);
+        Lit { hit, at, normal, source, density: self.density(at, normal, source.direction) }
+    }
+
+    /// Density per square metre, on a surface with this unit normal, of its rays that come from
+    /// `to_light`: 0 for those on the other side.
+    fn density(&self, at: Vec3, normal: Vec3, to_light: Vec3) -> f32 {
+        let direction = -to_light;
+        let (cosine, facing) = (direction.dot(self.frame.z_axis), normal.dot(to_light));
+        if cosine <= 0.0 || facing <= 0.0 {
+            return 0.0;
+        }
+        let along = self.frame.transpose() * direction;
+        let from_low = self.frame.transpose() * at - self.low;
+        let place = (from_low - from_low.z / along.z * along).truncate() / self.size;
+        if place.cmplt(Vec2::ZERO).any() || place.cmpgt(Vec2::ONE).any() {
+            return 0.0;
+        }
+        self.guide.density(place) / (self.size.x * self.size.y) * (facing / cosine)
+    }
+
+    /// Weight of light that a path has found by itself, on a surface with this unit normal on the path's
+    /// side at `at`, coming from `to_light`: beside what connections bring of the same. `chosen` is the
+    /// density per square metre with which the path chose the point.
+    pub(super) fn weight(&self, at: Vec3, normal: Vec3, to_light: Vec3, chosen: f32) -> f32 {
+        power_heuristic(chosen, self.density(at, normal, to_light))
+    }
+}
+
+impl Lit {
+    /// The triangle that it lies on.
+    pub(super) fn itself(&self) -> Itself {
+        itself(&self.hit)
+    }
+
+    /// What it scatters towards a point `from` which it lies in a unit `direction`, weighed beside what
+    /// the BSDF would find of it, which chooses that direction with density `pdf`: times the square of
+    /// the distance, over the density with which it was chosen.
+    pub(super) fn toward(
+        &self,
+        world: &World,
+        from: Vec3,
+        direction: Vec3,
+        pdf: f32,
+    ) -> Option<Vec3> {
+        let facing = -direction.dot(self.normal);
+        if facing <= 0.0 || self.density <= 0.0 {
+            return None;
+        }
+        let per_area = facing / from.distance_squared(self.at);
+        let point = world.point(&self.hit, direction)?;
+        let vertex = Vertex::at(&point, -direction, world.model)?;
+        // Beside the disc that its own rays might meet, it is weighed already.
+        let scatter = Scatter { pdf: 0.0, ..vertex.eval(self.source.direction, world.model) };
+        let sent = self.source.scattered(scatter).light;
+        let weight = power_heuristic(self.density, pdf * per_area);
+        (sent != Vec3::ZERO).then(|| sent * (weight * per_area / self.density))
+    }
+}
+
+/// Weights of a grid so wide, blurred over neighbours, and a share of them spread evenly.
+fn spread(weights: &[f32], width: usize) -> Vec<f32> {
+    let even = EVENLY / (1.0 - EVENLY) * weights.iter().sum::<f32>() / weights.len() as f32;
+    let near = |cell: usize| {
+        let cells = cell.saturating_sub(1)..(cell + 2).min(width);
+        cells.map(move |other| (other, if other == cell { 2.0 } else { 1.0 }))
+    };
+    let blurred = |row: usize, column: usize| {
+        let all =
+            near(row).flat_map(|(y, a)| near(column).map(move |(x, b)| (y * width + x, a * b)));
+        let sum =
+            |of: &dyn Fn(usize) -> f32| all.clone().map(|(n, share)| share * of(n)).sum::<f32>();
+        sum(&|n| weights[n]) / sum(&|_| 1.0)
+    };
+    (0..weights.len()).map(|cell| blurred(cell / width, cell % width) + even).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::{Kernel, Stacks};
+    use crate::surface::MaterialModel;
+    use crate::world::{Passing, WorldCache};
+    use lumencast_scene::Light;
+    use lumencast_testkit::scenes::{Stage, lambert};
+
+    /// A slanted square under a sun of some width.
+    fn world(angle: f32) -> World {
+        let mut stage = Stage::default();
+        let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
+        stage.quad(Vec3::new(-1.0, -0.5, 1.0), 2.0 * Vec3::X, Vec3::new(0.0, 1.0, -2.0), grey);
+        let kind = LightKind::Directional { angle };
+        let light = Light { kind, color: Vec3::ONE, intensity: 2.0, range: None };
+        stage.light(light, Vec3::ZERO, Vec3::new(0.3, -1.0, 0.2));
+        let (kernel, cache) = (Kernel::detect(), &mut WorldCache::default());
+        World::new(stage.snapshot(), MaterialModel::Full, kernel, cache)
+    }
+
+    /// The inverse of the densities that points state has the lit surface's area as its mean, whatever
+    /// the beam was taught: parts that it knows nothing of left out.
+    #[test]
+    fn points_have_the_density_they_state() {
+        for angle in [0.0, 0.4] {
+            let world = world(angle);
+            let area = 2.0 * 5.0_f32.sqrt();
+            let places = (0..4000).map(|n| Sampler::new(3, 0, n).square() * 2.0 - 1.0);
+            // More of it in a corner.
+            let found: Vec<_> = places
+                .map(|p| Found { at: Vec3::new(p.x, -0.5 * p.y, p.y), luminance: 2.1 + p.x + p.y })
+                .collect();
+            let beam = Beam::new(&world, 0, &found).expect("it was found");
+            let (mut stacks, count) = (Stacks::default(), 1 << 14);
+            let rays: Vec<_> =
+                (0..count).map(|n| beam.ray(&world, Sampler::new(9, 0, n))).collect();
+            let (mut sum, mut met) = (0.0, 0);
+            let passing = |_| Passing { ends: [None; 2], key: 0 };
+            let indexed = rays.iter().zip(0..).map(|((ray, _), n)| (*ray, n));
+            world.closest(indexed, &mut stacks, passing, |n, hit| {
+                let (ray, source) = rays[n as usize];
+                assert!((ray.direction + source.direction).length() < 1e-6);
+                let Some(hit) = hit else { return };
+                let point = world.point(&hit, ray.direction).expect("an area");
+                sum += 1.0 / beam.lit(hit, &point.place, source).density;
+                met += 1;
+            });
+            let found = sum / count as f32;
+            // Rays of a wide sun find less where the beam ends.
+            let least = if angle == 0.0 { 0.99 * area } else { 0.9 * area };
+            assert!(found > least && found < 1.01 * area, "{angle}: {found} of {area} m²");
+            assert!(met > count / 2, "{met}");
+        }
+    }
+
+    #[test]
+    fn what_was_never_found_is_not_followed() {
+        let world = world(0.0);
+        assert_eq!(Beam::light(&world), Some(0));
+        assert!(Beam::new(&world, 0, &[]).is_none());
+        let dark = [Found { at: Vec3::ZERO, luminance: 0.0 }];
+        assert!(Beam::new(&world, 0, &dark).is_none());
+        let one = [Found { at: Vec3::ZERO, luminance: 1.0 }];
+        assert!(Beam::new(&world, 0, &one).is_some());
+    }
+}
