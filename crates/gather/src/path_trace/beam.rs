@@ -181,11 +181,10 @@ impl Lit {
         direction: Vec3,
         pdf: f32,
     ) -> Option<Vec3> {
-        let facing = -direction.dot(self.normal);
-        if facing <= 0.0 || self.density <= 0.0 {
+        if direction.dot(self.normal) >= 0.0 || self.density <= 0.0 {
             return None;
         }
-        let per_area = facing / from.distance_squared(self.at);
+        let per_area = solid_angle(direction, self.normal, from.distance_squared(self.at));
         let point = world.point(&self.hit, direction)?;
         let vertex = Vertex::at(&point, -direction, world.model)?;
         // Beside the disc that its own rays might meet, it is weighed already.
@@ -194,6 +193,12 @@ impl Lit {
         let weight = power_heuristic(self.density, pdf * per_area);
         (sent != Vec3::ZERO).then(|| sent * (weight * per_area / self.density))
     }
+}
+
+/// Solid angle of a square metre with this unit normal, seen along a unit direction.
+#[inline]
+pub(super) fn solid_angle(direction: Vec3, normal: Vec3, distance_squared: f32) -> f32 {
+    direction.dot(normal).abs() / distance_squared
 }
 
 /// Weights of a grid so wide, blurred over neighbours, and a share of them spread evenly.

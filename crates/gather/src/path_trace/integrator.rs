@@ -8,7 +8,7 @@
 use glam::Vec3;
 use lumencast_light::LightField;
 
-use super::beam::{Beam, Found, Lit};
+use super::beam::{Beam, Found, Lit, solid_angle};
 use super::group::{Group, Shader};
 use crate::accel::{Hit, Kernel, Ray, Stacks};
 use crate::sampling::Sampler;
@@ -132,7 +132,7 @@ impl Segment {
     /// with this unit normal.
     #[inline]
     pub(super) fn density_on(&self, distance: f32, normal: Vec3) -> f32 {
-        self.pdf * self.ray.direction.dot(normal).abs() / (distance * distance)
+        self.pdf * solid_angle(self.ray.direction, normal, distance * distance)
     }
 }
 
