@@ -282,6 +282,11 @@ mod tests {
         clip.truncate() / clip.w
     }
 
+    /// Whether a cascade is used for a point, unless one before it is.
+    fn is_reached(view: &layout::ShadowView, point: Vec3) -> bool {
+        in_clip(view, point).truncate().abs().cmplt(view.reach).all()
+    }
+
     /// Where a cascade is used, all that is looked up about a point lies on its map: the widest edge that
     /// its sun casts, and what the filter reaches beyond.
     #[test]
@@ -301,14 +306,12 @@ mod tests {
                     if point != point.clamp(BOUNDS.min, BOUNDS.max) {
                         continue;
                     }
-                    let clip = |view| in_clip(view, point).truncate().abs();
-                    let is_used =
-                        |n: &usize| clip(&plan.views[*n]).cmplt(plan.views[*n].reach).all();
-                    let used = (0..4).find(is_used).expect("a cascade for what is seen");
+                    let used = plan.views.iter().position(|view| is_reached(view, point));
+                    let used = used.expect("a cascade for what is seen");
                     let view = &plan.views[used];
+                    let clip = in_clip(view, point).abs();
                     let metres = |axis: usize| {
-                        (1.0 - clip(view)[axis])
-                            / view.clip_from_world.row(axis).truncate().length()
+                        (1.0 - clip[axis]) / view.clip_from_world.row(axis).truncate().length()
                     };
                     nearest[used] = nearest[used].min(metres(0)).min(metres(1));
                 }
@@ -341,10 +344,7 @@ mod tests {
         for distance in [0.05, 0.5, 2.0, 5.0, 9.0, 17.0] {
             for corner in &camera.slice(distance, distance)[..4] {
                 let point = corner.clamp(BOUNDS.min, BOUNDS.max);
-                let seen = |view: &layout::ShadowView| {
-                    in_clip(view, point).truncate().abs().cmplt(view.reach).all()
-                };
-                let first = plan.views.iter().position(seen);
+                let first = plan.views.iter().position(|view| is_reached(view, point));
                 let Some(first) = first else { panic!("{point} at {distance}") };
                 used[first] = true;
                 let depth = in_clip(&plan.views[first], point).z;

@@ -89,19 +89,15 @@ impl Beam {
         let source = *world.lights.punctual.shared_candidate(light)?;
         let frame = frame(source.direction());
         let local = |at: Vec3| frame.transpose() * at;
-        let (low, high) = found
-            .iter()
-            .map(|found| local(found.at))
-            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), at| {
-                (low.min(at), high.max(at))
-            });
-        let extent = high.truncate() - low.truncate();
-        if !extent.is_finite() {
+        let mut places = Aabb::EMPTY;
+        found.iter().for_each(|found| places.grow(local(found.at)));
+        if places.is_empty() {
             return None;
         }
+        let (low, extent) = (places.min, (places.max - places.min).truncate());
         let margin = MARGIN * extent + 1e-4 * world.extent();
         // Among the places, so that it matters little how wide the light is.
-        let low = (low.truncate() - margin).extend(0.5 * (low.z + high.z));
+        let low = (low.truncate() - margin).extend(0.5 * (low.z + places.max.z));
         let size = extent + 2.0 * margin;
         let cells = (found.len() as f32 / KNOWN).sqrt().clamp(4.0, CELLS) as usize;
         let mut weights = vec![0.0; cells * cells];
@@ -113,8 +109,7 @@ impl Beam {
         let guide = Grid2::new(&spread(&weights, cells), cells);
         let bounds = world.accel().bounds();
         let bounds = Aabb { min: bounds.min.into(), max: bounds.max.into() };
-        let corners = bounds.corners().map(|corner| local(corner).z);
-        let start = corners.fold(f32::INFINITY, f32::min) - 1e-3 * (1.0 + world.extent());
+        let start = bounds.transformed(local).min.z - 1e-3 * (1.0 + world.extent());
         (!guide.is_empty()).then_some(Self { source, light, frame, start, low, size, guide })
     }
 
@@ -124,10 +119,9 @@ impl Beam {
     }
 
     /// A ray of it, and what arrives along that.
-    pub(super) fn ray(&self, world: &World, mut sampler: Sampler) -> (Ray, LightPoint) {
+    pub(super) fn ray(&self, mut sampler: Sampler) -> (Ray, LightPoint) {
         let (at, _) = self.guide.sample(sampler.square());
-        let on_disc = if world.lights.punctual.have_size() { sampler.square() } else { Vec2::ZERO };
-        let source = self.source.point_for(Vec3::ZERO, 1.0, on_disc);
+        let source = self.source.point_for(Vec3::ZERO, 1.0, sampler.square());
         let crossed = self.frame * (self.low + (at * self.size).extend(0.0));
         let direction = -source.direction;
         let back = (self.start - self.low.z) / direction.dot(self.frame.z_axis);
@@ -253,8 +247,7 @@ mod tests {
                 .collect();
             let beam = Beam::new(&world, 0, &found).expect("it was found");
             let (mut stacks, count) = (Stacks::default(), 1 << 14);
-            let rays: Vec<_> =
-                (0..count).map(|n| beam.ray(&world, Sampler::new(9, 0, n))).collect();
+            let rays: Vec<_> = (0..count).map(|n| beam.ray(Sampler::new(9, 0, n))).collect();
             let (mut sum, mut met) = (0.0, 0);
             let passing = |_| Passing { ends: [None; 2], key: 0 };
             let indexed = rays.iter().zip(0..).map(|((ray, _), n)| (*ray, n));

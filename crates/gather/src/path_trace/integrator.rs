@@ -176,7 +176,7 @@ pub(crate) struct Integrator<'a> {
     connections: Vec<Connection>,
     /// Whether something lies on them.
     occluded: Vec<bool>,
-    /// The points that a beam lights, one for each path.
+    /// The points that the beam lights, one for each path; none without a beam.
     lit: Vec<Option<Lit>>,
     /// Connections to the light to learn of, and where from.
     noted: Vec<(u32, Found)>,
@@ -249,12 +249,11 @@ impl<'a> Integrator<'a> {
     /// Gives each path a point that the beam lights.
     fn follow_beam(&mut self) {
         let Self { world, limits, paths, lit, stacks, .. } = self;
+        let Some(beam) = limits.beam else { return };
         lit.clear();
         lit.resize(paths.len(), None);
-        let Some(beam) = limits.beam else { return };
         self.rays += paths.len() as u64;
-        let sources: Vec<_> =
-            paths.iter().map(|path| beam.ray(world, path.sampler.aside())).collect();
+        let sources: Vec<_> = paths.iter().map(|path| beam.ray(path.sampler.aside())).collect();
         let rays = sources.iter().zip(0..).map(|((ray, _), n)| (*ray, n));
         let passing = |n: u32| Passing { ends: [None; 2], key: paths[n as usize].key(u32::MAX) };
         world.closest(rays, stacks, passing, |n, hit| {

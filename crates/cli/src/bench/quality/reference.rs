@@ -58,7 +58,8 @@ impl BenchQuality {
         size: UVec2,
         exposure: Option<f32>,
     ) -> Result<Reference> {
-        let key = self.key(subject)?;
+        // Reads all of the scene's files.
+        let key = self.keep.is_some().then(|| self.key(subject)).transpose()?;
         let direct_film = self.trace(subject, size, key, Parts::Direct, "direct")?;
         let indirect_film = self.trace(subject, size, key, Parts::Indirect, "indirect")?;
         let picture = |film: &Film| Picture::new(size.x, size.y, film.picture());
@@ -76,15 +77,17 @@ impl BenchQuality {
         &self,
         subject: &Subject<'_>,
         size: UVec2,
-        key: u64,
+        key: Option<u64>,
         parts: Parts,
         name: &'static str,
     ) -> Result<Film> {
         let scene = subject.scene.name();
-        let file = format!("{scene}-{}x{}-{key:016x}.{name}.film", size.x, size.y);
-        let path = self.keep.as_ref().map(|folder| folder.join(file));
-        let mut film = match &path {
-            Some(path) => film_file::begun(path, key, size, self.reference_spp),
+        let kept = self.keep.as_ref().zip(key).map(|(folder, key)| {
+            let file = format!("{scene}-{}x{}-{key:016x}.{name}.film", size.x, size.y);
+            (folder.join(file), key)
+        });
+        let mut film = match &kept {
+            Some((path, key)) => film_file::begun(path, *key, size, self.reference_spp),
             None => Film::new(size, self.reference_spp),
         };
         if film.samples() >= self.reference_spp {
@@ -105,10 +108,10 @@ impl BenchQuality {
             renderer.pass(&mut film, self.reference_spp, &|_| true);
             bar.set_position(film.samples().into());
             let done = film.samples() >= self.reference_spp;
-            if let Some(path) = &path
+            if let Some((path, key)) = &kept
                 && (done || written.elapsed() > film_file::KEEP_EVERY)
             {
-                film_file::write(path, key, &film)?;
+                film_file::write(path, *key, &film)?;
                 written = Instant::now();
             }
         }
