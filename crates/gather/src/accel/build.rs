@@ -1,40 +1,142 @@
 //! Binary trees by the surface-area heuristic, binned (Wald 2007, "On fast construction of
 //! SAH-based bounding volume hierarchies").
 
-use glam::Vec3A;
-use rayon::prelude::*;
+mod bins;
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec3, Vec3A, Vec4};
 
 use super::Aabb;
+use super::pages::Pages;
+use bins::Plane;
 
-/// The most bins, a power of two.
-const BINS: usize = 16;
 /// Below this depth, splits halve the number of items, so that depth is bounded whatever the input.
 pub(super) const SAH_DEPTH: u32 = 40;
 /// Ranges smaller than this are built by one thread.
-const PARALLEL: usize = 4096;
+const PARALLEL: usize = 1024;
+/// Ranges not smaller than this are looked at by several.
+const LARGE: usize = 16 * PARALLEL;
 /// Cost of visiting a node, in units of testing one full leaf.
 const NODE_COST: f32 = 0.6;
 
-/// A thing to be put into a tree.
+/// A thing to be put into a tree, or several that stay together: a box, and between its corners, where
+/// vectors have room for it, whose.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item {
-    pub(super) bounds: Aabb,
-    pub(super) index: u32,
+    low: Vec4,
+    high: Vec4,
 }
 
-/// A binary tree over items; leaves own a range of the reordered items.
-#[derive(Debug)]
-pub(super) enum Tree<'a> {
-    Leaf(Aabb, &'a [Item]),
-    /// The last is for [`super::wide::collapse`].
-    Inner(Aabb, Box<[Tree<'a>; 2]>, [u8; 8]),
-}
+/// Makes ordinary numbers of small integers' bits, since arithmetic is slow with subnormal ones.
+const ORDINARY: u32 = 1 << 30;
 
-impl Tree<'_> {
+impl Item {
+    /// So many things, from an index on, within a box.
+    ///
+    /// # Panics
+    ///
+    /// If there are more than 2³⁰.
+    pub(super) fn new(bounds: Aabb, index: u32, count: u32) -> Self {
+        assert!(index < ORDINARY && count < ORDINARY, "more than 2³⁰ triangles");
+        let corner = |at: Vec3A, number: u32| at.extend(f32::from_bits(number | ORDINARY));
+        Self { low: corner(bounds.min, index), high: corner(bounds.max, count) }
+    }
+
     pub(super) fn bounds(&self) -> Aabb {
-        match self {
-            Self::Leaf(bounds, _) | Self::Inner(bounds, ..) => *bounds,
-        }
+        Aabb { min: Vec3A::from_vec4(self.low), max: Vec3A::from_vec4(self.high) }
+    }
+
+    /// The sum of its box's corners.
+    fn center_twice(&self) -> Vec3A {
+        Vec3A::from_vec4(self.low) + Vec3A::from_vec4(self.high)
+    }
+
+    fn count(&self) -> u32 {
+        self.high.w.to_bits() & !ORDINARY
+    }
+
+    /// The things that it stands for.
+    pub(super) fn indices(&self) -> Range<usize> {
+        let first = (self.low.w.to_bits() & !ORDINARY) as usize;
+        first..first + self.count() as usize
+    }
+}
+
+/// A binary tree over items. What lies on one side of a plane comes before what lies on the other, in
+/// both lists.
+#[derive(Debug)]
+pub(super) struct BinaryTree {
+    nodes: Pages<BinaryNode>,
+    items: Vec<Item>,
+}
+
+/// A leaf, or a node with two sides.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+struct BinaryNode {
+    min: [f32; 3],
+    /// Of a leaf the first of its items.
+    first: u32,
+    max: [f32; 3],
+    /// Of a leaf how many; else how far behind the node its right side begins, and [`INNER`]. The
+    /// left side begins right behind it.
+    rest: u32,
+}
+
+const INNER: u32 = 1 << 31;
+
+/// What lies below a node.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Subtree<'a> {
+    nodes: &'a [BinaryNode],
+    items: &'a [Item],
+}
+
+impl BinaryTree {
+    /// Builds a tree whose leaves hold at most `leaf` things, which no item may exceed.
+    pub(super) fn new(mut items: Vec<Item>, leaf: usize) -> Self {
+        let mut nodes = Pages::zeroed((2 * items.len()).max(1));
+        let extent = Extent::of(&items);
+        let builder = Builder { nodes: &mut nodes, items: &mut items, first: 0, extent, depth: 0 };
+        builder.build(leaf as f32);
+        Self { nodes, items }
+    }
+
+    pub(super) fn root(&self) -> Subtree<'_> {
+        Subtree { nodes: &self.nodes, items: &self.items }
+    }
+
+    /// How many places its nodes take, of which leaves leave some empty.
+    pub(super) fn len(&self) -> usize {
+        self.nodes.len()
+    }
+}
+
+impl<'a> Subtree<'a> {
+    pub(super) fn bounds(&self) -> Aabb {
+        let BinaryNode { min, max, .. } = self.nodes[0];
+        Aabb { min: min.into(), max: max.into() }
+    }
+
+    /// How many places behind this node its right side begins, of which its left side has all but one;
+    /// `None` for a leaf.
+    pub(super) fn right(&self) -> Option<usize> {
+        let rest = self.nodes[0].rest;
+        (rest & INNER != 0).then_some((rest & !INNER) as usize)
+    }
+
+    /// Both sides; `None` for a leaf.
+    pub(super) fn sides(&self) -> Option<[Self; 2]> {
+        let side = |from: usize| Self { nodes: &self.nodes[from..], ..*self };
+        self.right().map(|right| [side(1), side(right)])
+    }
+
+    /// Of a leaf.
+    pub(super) fn items(&self) -> &'a [Item] {
+        let BinaryNode { first, rest, .. } = self.nodes[0];
+        &self.items[first as usize..(first + rest) as usize]
     }
 }
 
@@ -43,220 +145,184 @@ impl Tree<'_> {
 struct Extent {
     /// Around the items.
     bounds: Aabb,
-    /// Around their centres.
+    /// Around their centres, twice.
     centers: Aabb,
+    /// How many things they stand for, as far as an `f32` can count.
+    count: f32,
 }
 
 impl Extent {
     fn of(items: &[Item]) -> Self {
-        let bounds = items.iter().fold(Aabb::EMPTY, |bounds, item| bounds.union(item.bounds));
-        Self { bounds, centers: centers(items) }
+        let bounds = items.iter().fold(Aabb::EMPTY, |bounds, item| bounds.union(item.bounds()));
+        let count = items.iter().map(|item| item.count() as f32).sum();
+        Self { bounds, centers: centers(items), count }
     }
 }
 
-/// Builds a tree whose leaves hold at most `leaf` items. Reorders the items.
-pub(super) fn tree(items: &mut [Item], leaf: usize) -> Tree<'_> {
-    let extent = Extent::of(items);
-    split(items, extent, leaf, 0)
-}
-
-fn split(items: &mut [Item], extent: Extent, leaf: usize, depth: u32) -> Tree<'_> {
-    let bounds = extent.bounds;
-    if items.len() <= 1 || leaf_cost(items.len(), leaf) <= NODE_COST {
-        return Tree::Leaf(bounds, items);
+/// Around the centres of items, twice.
+fn centers(items: &[Item]) -> Aabb {
+    if items.len() >= LARGE {
+        let (front, back) = items.split_at(items.len() / 2);
+        let (front, back) = rayon::join(|| centers(front), || centers(back));
+        return front.union(back);
     }
-    let (middle, extents) = match best_split(items, &extent, leaf, depth) {
-        Some(Split::Leaf) => return Tree::Leaf(bounds, items),
-        Some(Split::At(plane)) => partition(items, &plane),
-        None => halve(items, &extent.centers),
-    };
-    let (left, right) = items.split_at_mut(middle);
-    let children = if left.len() + right.len() > PARALLEL {
-        rayon::join(
-            || split(left, extents[0], leaf, depth + 1),
-            || split(right, extents[1], leaf, depth + 1),
-        )
-    } else {
-        (split(left, extents[0], leaf, depth + 1), split(right, extents[1], leaf, depth + 1))
-    };
-    Tree::Inner(bounds, Box::new([children.0, children.1]), [0; 8])
+    items.iter().fold(Aabb::EMPTY, |centers, item| centers.with(item.center_twice()))
 }
 
-/// Items whose centre lies in bins below `bin` go left.
-struct Plane {
-    axis: usize,
-    bin: usize,
-    binning: Binning,
-    /// Around the items of each side.
-    bounds: [Aabb; 2],
+/// A subtree to be built.
+struct Builder<'a> {
+    /// Twice as many as items.
+    nodes: &'a mut [BinaryNode],
+    items: &'a mut [Item],
+    /// Where they begin among all.
+    first: u32,
+    extent: Extent,
+    depth: u32,
 }
 
-enum Split {
-    Leaf,
-    At(Plane),
-}
-
-#[derive(Clone, Copy)]
-struct Binning {
-    origin: Vec3A,
-    scale: Vec3A,
-    /// Bins along each axis, at most [`BINS`].
-    count: usize,
-    /// The last of them, along each axis.
-    last: Vec3A,
-}
-
-impl Binning {
-    fn new(centers: &Aabb, items: usize) -> Self {
-        // Most ranges are small, and sweeping over bins takes time.
-        let count = (8 + items / 16).min(BINS);
-        let extent = (centers.max - centers.min).max(Vec3A::splat(f32::MIN_POSITIVE));
-        let scale = (count as f32 * 0.9999 / extent).min(Vec3A::splat(f32::MAX));
-        Self { origin: centers.min, scale, count, last: Vec3A::splat(count as f32 - 1.0) }
-    }
-
-    /// The bin along each axis.
-    fn bins(&self, item: &Item) -> [usize; 3] {
-        // Adding 2²³ leaves the number, rounded, in the last bits: conversions that saturate take
-        // several times as long.
-        let place = (item.bounds.center() - self.origin) * self.scale - 0.5;
-        let bits = place.clamp(Vec3A::ZERO, self.last) + 8_388_608.0;
-        bits.to_array().map(|bits| bits.to_bits() as usize & (BINS - 1))
-    }
-
-    /// Which items lie in the bins below `bin` of an axis.
-    fn is_below(&self, axis: usize, bin: usize) -> impl Fn(&Item) -> bool {
-        let (origin, scale, bin) = (self.origin[axis], self.scale[axis], bin as f32);
-        move |item| {
-            // As `bins` rounds: to the nearest, and halves to even.
-            let center = 0.5 * (item.bounds.min[axis] + item.bounds.max[axis]);
-            let place = (center - origin) * scale - 0.5;
-            (place.max(0.0) + 8_388_608.0) - 8_388_608.0 < bin
+impl Builder<'_> {
+    fn build(mut self, leaf: f32) {
+        let Extent { bounds, count, .. } = self.extent;
+        let is_small = self.items.len() <= 1 || leaf_cost(count, leaf) <= NODE_COST;
+        let split = if is_small { None } else { self.split(leaf) };
+        let Aabb { min, max } = bounds;
+        let (min, max) = (min.to_array(), max.to_array());
+        let Some((middle, extents)) = split else {
+            let rest = self.items.len() as u32;
+            self.nodes[0] = BinaryNode { min, max, first: self.first, rest };
+            return;
+        };
+        let right = 2 * middle;
+        self.nodes[0] = BinaryNode { min, max, first: self.first, rest: right as u32 | INNER };
+        let (nodes, items) = (self.nodes.split_at_mut(right), self.items.split_at_mut(middle));
+        let is_parallel = items.0.len() + items.1.len() > PARALLEL;
+        let side = |nodes, items, first, extent| {
+            let depth = self.depth + 1;
+            move || Builder { nodes, items, first, extent, depth }.build(leaf)
+        };
+        let left = side(&mut nodes.0[1..], items.0, self.first, extents[0]);
+        let right = side(nodes.1, items.1, self.first + middle as u32, extents[1]);
+        if is_parallel {
+            rayon::join(left, right);
+        } else {
+            left();
+            right();
         }
     }
-}
 
-/// Boxes and numbers of items by axis and bin.
-type Bins = [[(Aabb, u32); BINS]; 3];
-
-fn fill(items: &[Item], binning: &Binning) -> Bins {
-    let mut bins = [[(Aabb::EMPTY, 0); BINS]; 3];
-    for item in items {
-        for (axis, bin) in binning.bins(item).into_iter().enumerate() {
-            let bin = &mut bins[axis][bin];
-            bin.0 = bin.0.union(item.bounds);
-            bin.1 += 1;
+    /// Splits the items: how many lie on the left, and what is known of both sides. `None` where a leaf is
+    /// cheaper.
+    fn split(&mut self, leaf: f32) -> Option<(usize, [Extent; 2])> {
+        let Extent { bounds, centers, count } = self.extent;
+        let size = centers.max - centers.min;
+        if self.depth >= SAH_DEPTH || size.max_element() <= f32::MIN_POSITIVE {
+            return (count > leaf).then(|| self.halve());
         }
-    }
-    bins
-}
-
-fn fill_in_parallel(items: &[Item], binning: &Binning) -> Bins {
-    if items.len() < 8 * PARALLEL {
-        return fill(items, binning);
-    }
-    let merge = |mut a: Bins, b: Bins| {
-        for (a, b) in a.iter_mut().flatten().zip(b.into_iter().flatten()) {
-            *a = (a.0.union(b.0), a.1 + b.1);
+        let (cost, plane) = Plane::cheapest(self.items, &self.extent, leaf);
+        let area = bounds.half_area();
+        if count <= leaf && leaf_cost(count, leaf) * area <= NODE_COST * area + cost {
+            return None;
         }
-        a
-    };
-    let chunks = items.par_chunks(2 * PARALLEL).map(|chunk| fill(chunk, binning));
-    chunks.reduce(|| fill(&[], binning), merge)
+        Some(if cost.is_finite() { self.partition(&plane) } else { self.halve() })
+    }
+
+    /// Brings the left side to the front.
+    fn partition(&mut self, plane: &Plane) -> (usize, [Extent; 2]) {
+        let middle = bring_left(self.items, plane);
+        debug_assert!(0 < middle && middle < self.items.len(), "binning and partition agree");
+        let (left, right) = self.items.split_at(middle);
+        let [left, right] = [(left, plane.sides[0]), (right, plane.sides[1])]
+            .map(|(items, (bounds, count))| Extent { bounds, centers: centers(items), count });
+        (middle, [left, right])
+    }
+
+    /// Splits at the median of the widest axis.
+    fn halve(&mut self) -> (usize, [Extent; 2]) {
+        let Aabb { min, max } = self.extent.centers;
+        let axis = Vec3::from(max - min).max_position();
+        let middle = self.items.len() / 2;
+        self.items.select_nth_unstable_by(middle, |a, b| {
+            a.center_twice()[axis].total_cmp(&b.center_twice()[axis])
+        });
+        let (left, right) = self.items.split_at(middle);
+        (middle, [Extent::of(left), Extent::of(right)])
+    }
 }
 
-/// Cost of testing `n` items, in full leaves.
-fn leaf_cost(n: usize, leaf: usize) -> f32 {
-    (n as f32 / leaf as f32).max(0.5)
-}
-
-/// The cheapest of the binned planes, or that a leaf is cheaper; `None` where centres coincide or
-/// the tree is deep already.
-fn best_split(items: &[Item], extent: &Extent, leaf: usize, depth: u32) -> Option<Split> {
-    let size = extent.centers.max - extent.centers.min;
-    if depth >= SAH_DEPTH || size.max_element() <= f32::MIN_POSITIVE {
-        return (items.len() <= leaf).then_some(Split::Leaf);
+/// Brings items left of a plane to the front; how many they are.
+fn bring_left(items: &mut [Item], plane: &Plane) -> usize {
+    if items.len() >= LARGE {
+        let (front, back) = items.split_at_mut(items.len() / 2);
+        let (a, b) = rayon::join(|| bring_left(front, plane), || bring_left(back, plane));
+        // The front's right changes places with the back's left.
+        let moved = b.min(front.len() - a);
+        front[a..a + moved].swap_with_slice(&mut back[b - moved..b]);
+        return a + b;
     }
-    let binning = Binning::new(&extent.centers, items.len());
-    let (cost, plane) = cheapest(&fill_in_parallel(items, &binning), binning, leaf);
-    let area = extent.bounds.half_area();
-    if items.len() <= leaf && leaf_cost(items.len(), leaf) * area <= NODE_COST * area + cost {
-        return Some(Split::Leaf);
-    }
-    cost.is_finite().then_some(Split::At(plane))
-}
-
-/// The cheapest plane along any axis, and its cost (times area); infinite where there is none.
-fn cheapest(bins: &Bins, binning: Binning, leaf: usize) -> (f32, Plane) {
-    let mut best = (f32::INFINITY, 0, 0);
-    for (axis, bins) in bins.iter().enumerate() {
-        let (cost, bin) = sweep(&bins[..binning.count], leaf);
-        if cost < best.0 {
-            best = (cost, axis, bin);
-        }
-    }
-    let (cost, axis, bin) = best;
-    let around = |bins: &[(Aabb, u32)]| bins.iter().fold(Aabb::EMPTY, |b, bin| b.union(bin.0));
-    let (below, above) = bins[axis][..binning.count].split_at(bin);
-    (cost, Plane { axis, bin, binning, bounds: [around(below), around(above)] })
-}
-
-/// Cheapest plane along one axis: its cost (times area) and the first bin of its right side.
-fn sweep(bins: &[(Aabb, u32)], leaf: usize) -> (f32, usize) {
-    let mut right = [(0.0, 0); BINS];
-    let mut side = (Aabb::EMPTY, 0);
-    for b in (1..bins.len()).rev() {
-        side = (side.0.union(bins[b].0), side.1 + bins[b].1);
-        right[b] = (side.0.half_area() * leaf_cost(side.1 as usize, leaf), side.1);
-    }
-    let mut best = (f32::INFINITY, 0);
-    let mut side = (Aabb::EMPTY, 0);
-    for b in 1..bins.len() {
-        side = (side.0.union(bins[b - 1].0), side.1 + bins[b - 1].1);
-        let cost = side.0.half_area() * leaf_cost(side.1 as usize, leaf) + right[b].0;
-        if side.1 > 0 && right[b].1 > 0 && cost < best.0 {
-            best = (cost, b);
-        }
-    }
-    best
-}
-
-/// Brings the left side to the front; returns its length and what is known of both sides.
-fn partition(items: &mut [Item], plane: &Plane) -> (usize, [Extent; 2]) {
-    let is_below = plane.binning.is_below(plane.axis, plane.bin);
     let mut middle = 0;
-    for i in 0..items.len() {
-        let is_left = is_below(&items[i]);
+    for n in 0..items.len() {
+        let is_left = plane.is_left(&items[n]);
         // Also where it stays right, so that there is no branch to guess.
-        items.swap(i, middle);
+        items.swap(n, middle);
         middle += usize::from(is_left);
     }
-    debug_assert!(0 < middle && middle < items.len(), "binning and partition agree");
-    let (left, right) = items.split_at(middle);
-    let extent =
-        |side: usize, items| Extent { bounds: plane.bounds[side], centers: centers(items) };
-    (middle, [extent(0, left), extent(1, right)])
+    middle
 }
 
-/// Around the centres of items.
-fn centers(items: &[Item]) -> Aabb {
-    items.iter().fold(Aabb::EMPTY, |centers, item| centers.with(item.bounds.center()))
+/// Cost of testing `n` things, in full leaves.
+fn leaf_cost(n: f32, leaf: f32) -> f32 {
+    (n / leaf).max(0.5)
 }
 
-/// Splits at the median of the widest axis.
-fn halve(items: &mut [Item], centers: &Aabb) -> (usize, [Extent; 2]) {
-    let extent = centers.max - centers.min;
-    let axis = if extent.x >= extent.y.max(extent.z) {
-        0
-    } else if extent.y >= extent.z {
-        1
-    } else {
-        2
-    };
-    let middle = items.len() / 2;
-    items.select_nth_unstable_by(middle, |a, b| {
-        a.bounds.center()[axis].total_cmp(&b.bounds.center()[axis])
-    });
-    let (left, right) = items.split_at(middle);
-    (middle, [Extent::of(left), Extent::of(right)])
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::tests::random;
+
+    /// Boxes of many sizes, two things in every third, and a heap of equal ones.
+    fn items(count: u32) -> Vec<Item> {
+        let item = |n: u32| {
+            let at = if n.is_multiple_of(8) { Vec3A::ONE } else { Vec3A::from(random(50, n)) };
+            let size = 0.1 * Vec3A::from(random(51, n)).powf(4.0);
+            Item::new(
+                Aabb { min: at, max: at + size },
+                2 * n,
+                if n.is_multiple_of(3) { 2 } else { 1 },
+            )
+        };
+        (0..count).map(item).collect()
+    }
+
+    /// Indices by leaf, in order; boxes hold what is below them.
+    fn leaves(tree: Subtree<'_>, all: &mut Vec<Vec<usize>>) {
+        let holds = |inner: Aabb| assert_eq!(tree.bounds().union(inner), tree.bounds());
+        if let Some(sides) = tree.sides() {
+            for side in sides {
+                holds(side.bounds());
+                leaves(side, all);
+            }
+        } else {
+            tree.items().iter().for_each(|item| holds(item.bounds()));
+            all.push(tree.items().iter().flat_map(Item::indices).collect());
+        }
+    }
+
+    #[test]
+    fn every_thing_is_in_one_leaf_whatever_the_threads() {
+        for count in [0, 1, 2, 7, 100, 3 * LARGE as u32] {
+            let [one, three] = [1, 3].map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+                let tree = pool.expect("threads").install(|| BinaryTree::new(items(count), 4));
+                let mut all = Vec::new();
+                leaves(tree.root(), &mut all);
+                all
+            });
+            assert_eq!(one, three);
+            assert!(one.iter().all(|leaf| leaf.len() <= 4));
+            let mut found = one.concat();
+            found.sort_unstable();
+            let wanted: Vec<_> = items(count).iter().flat_map(Item::indices).collect();
+            assert_eq!(found, wanted);
+        }
+    }
 }

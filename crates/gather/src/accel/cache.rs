@@ -1,10 +1,12 @@
 //! Hierarchies kept from snapshot to snapshot.
 
 use std::collections::{HashMap, HashSet};
+use std::hash::Hash;
 use std::sync::Arc;
 
 use glam::Affine3A;
 use lumencast_scene::{Deformation, Instance, Mesh, NodeId, Snapshot};
+use rayon::prelude::*;
 
 use super::{Accel, Kernel, Levels, TriangleBvh};
 
@@ -26,7 +28,6 @@ pub(super) struct Kept<D> {
     /// What the hierarchy was last fitted to.
     deformation: D,
     bvh: Arc<TriangleBvh>,
-    used: bool,
 }
 
 /// Where a mesh lies; only compared, while [`Kept`] keeps the place from being used again.
@@ -47,20 +48,22 @@ impl AccelCache {
             let whole = (0, Affine3A::IDENTITY, self.whole(snapshot));
             return Accel::new([whole], kernel);
         }
-        self.rigid.values_mut().for_each(|k| k.used = false);
-        self.deforming.values_mut().for_each(|k| k.used = false);
-        let placed: Vec<_> = (0..)
-            .zip(&snapshot.instances)
-            .map(|(index, instance)| {
-                let bvh = match &instance.deformation {
-                    None => self.rigid(instance),
-                    Some(deformation) => self.deformed(instance, deformation),
-                };
-                (index, instance.world_from_object, bvh)
-            })
-            .collect();
-        self.rigid.retain(|_, k| k.used);
-        self.deforming.retain(|_, k| k.used);
+        let rigid = snapshot.instances.iter().filter(|i| i.deformation.is_none());
+        update_all(&mut self.rigid, rigid.map(|i| (address(&i.mesh), i)), Kept::rigid);
+        let deforming =
+            snapshot.instances.iter().filter_map(|i| Some((i, i.deformation.as_ref()?)));
+        update_all(
+            &mut self.deforming,
+            deforming.map(|of| (deforming_key(of.0), of)),
+            Kept::deformed,
+        );
+        let placed = (0..).zip(&snapshot.instances).map(|(index, instance)| {
+            let bvh = match &instance.deformation {
+                None => &self.rigid[&address(&instance.mesh)].bvh,
+                Some(_) => &self.deforming[&deforming_key(instance)].bvh,
+            };
+            (index, instance.world_from_object, bvh.clone())
+        });
         Accel::new(placed, kernel)
     }
 
@@ -74,37 +77,56 @@ impl AccelCache {
         self.whole = Some((snapshot.clone(), bvh.clone()));
         bvh
     }
+}
 
-    fn rigid(&mut self, instance: &Instance) -> Arc<TriangleBvh> {
-        let kept = self.rigid.entry(address(&instance.mesh)).or_insert_with(|| Kept {
+fn deforming_key(instance: &Instance) -> (NodeId, Address) {
+    (instance.node, address(&instance.mesh))
+}
+
+/// Brings what is kept to what there is now, several at once, and drops the rest.
+fn update_all<K, I, D>(
+    all: &mut HashMap<K, Kept<D>>,
+    now: impl Iterator<Item = (K, I)>,
+    update: impl Fn(Option<Kept<D>>, I) -> Kept<D> + Sync + Send,
+) where
+    K: Copy + Eq + Hash + Send,
+    I: Send,
+    D: Send,
+{
+    let mut seen = HashSet::new();
+    let distinct = now.filter(|(key, _)| seen.insert(*key));
+    let both: Vec<_> = distinct.map(|(key, of)| (key, all.remove(&key), of)).collect();
+    *all = both.into_par_iter().map(|(key, kept, of)| (key, update(kept, of))).collect();
+}
+
+impl Kept<()> {
+    fn rigid(kept: Option<Self>, instance: &Instance) -> Self {
+        kept.unwrap_or_else(|| Self {
             mesh: instance.mesh.clone(),
             deformation: (),
             bvh: Arc::new(TriangleBvh::build(&instance.mesh, None)),
-            used: true,
-        });
-        kept.used = true;
-        kept.bvh.clone()
+        })
     }
+}
 
+impl Kept<Arc<Deformation>> {
     fn deformed(
-        &mut self,
-        instance: &Instance,
-        deformation: &Arc<Deformation>,
-    ) -> Arc<TriangleBvh> {
-        let key = (instance.node, address(&instance.mesh));
-        let kept = self.deforming.entry(key).or_insert_with(|| Kept {
-            mesh: instance.mesh.clone(),
-            deformation: deformation.clone(),
-            bvh: Arc::new(TriangleBvh::build(&instance.mesh, Some(deformation.vertices()))),
-            used: true,
-        });
+        kept: Option<Self>,
+        (instance, deformation): (&Instance, &Arc<Deformation>),
+    ) -> Self {
+        let Some(mut kept) = kept else {
+            return Self {
+                mesh: instance.mesh.clone(),
+                deformation: deformation.clone(),
+                bvh: Arc::new(TriangleBvh::build(&instance.mesh, Some(deformation.vertices()))),
+            };
+        };
         if !Arc::ptr_eq(&kept.deformation, deformation) {
             kept.deformation = deformation.clone();
             // A job in flight may still trace the old one: `make_mut` then copies it.
             Arc::make_mut(&mut kept.bvh).refit(&kept.mesh, deformation.vertices());
         }
-        kept.used = true;
-        kept.bvh.clone()
+        kept
     }
 }
 

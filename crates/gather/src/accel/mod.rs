@@ -3,7 +3,7 @@
 //! Two levels: one bounding-volume hierarchy a mesh in object space ([`triangle_bvh`]), kept from
 //! snapshot to snapshot by [`cache`], and a small one over the placed instances, rebuilt whenever
 //! the scene has changed. Or one, over all triangles of a moment ([`Levels`]). All are built as binary
-//! trees by binned SAH ([`build`]), collapsed to eight children a node ([`wide`]) and walked by the
+//! trees by binned SAH ([`build`]), collapsed ([`mod@collapse`]) to eight children a node ([`wide`]) and walked by the
 //! code in [`kernel`], with AVX2 or NEON where the processor has it.
 //!
 //! What holds at edges: triangles of one mesh that share an edge (bit-equal positions) leave no gap,
@@ -12,6 +12,7 @@
 
 mod build;
 mod cache;
+mod collapse;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_avx2;
@@ -31,7 +32,9 @@ pub(crate) use cache::AccelCache;
 pub(crate) use kernel::{Kernel, Stacks, fetch_ahead};
 pub(crate) use triangle_bvh::TriangleBvh;
 
-use wide::Node;
+use build::{BinaryTree, Item};
+use pages::Pages;
+use wide::{LEAF, Node};
 
 /// How many hierarchies lie above each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -95,7 +98,7 @@ impl Hit {
 /// The acceleration structure of one snapshot.
 #[derive(Debug)]
 pub(crate) struct Accel {
-    nodes: Vec<Node>,
+    nodes: Pages<Node>,
     placed: Vec<Placed>,
     bounds: Aabb,
     kernel: Kernel,
@@ -119,7 +122,7 @@ impl Accel {
             let only_moves = object_from_world.matrix3 == Mat3A::IDENTITY;
             placed.push(Placed { instance, object_from_world, only_moves, bvh });
         }
-        let (nodes, bounds) = wide::over_boxes(&boxes);
+        let (nodes, bounds) = over_boxes(&boxes);
         Self { nodes, placed, bounds, kernel }
     }
 
@@ -136,7 +139,7 @@ impl Accel {
     pub(crate) fn bytes(&self) -> usize {
         let mut seen = std::collections::HashSet::new();
         let shared = self.placed.iter().filter(|p| seen.insert(Arc::as_ptr(&p.bvh)));
-        size_of_val(self.nodes.as_slice())
+        size_of_val::<[Node]>(&self.nodes)
             + size_of_val(self.placed.as_slice())
             + shared.map(|p| p.bvh.bytes()).sum::<usize>()
     }
@@ -168,6 +171,19 @@ impl Accel {
             found(with, hit.is_some())
         });
     }
+}
+
+/// A tree over boxes, one a leaf; leaf indices are those of the boxes.
+fn over_boxes(boxes: &[Aabb]) -> (Pages<Node>, Aabb) {
+    let items = (0..).zip(boxes).map(|(index, &bounds)| Item::new(bounds, index, 1)).collect();
+    let tree = BinaryTree::new(items, 1);
+    let (mut nodes, leaves) = collapse::collapse(&tree);
+    for child in nodes.iter_mut().flat_map(|node| &mut node.child) {
+        if let Some([item]) = leaves.get((*child ^ LEAF) as usize) {
+            *child = LEAF | item.indices().start as u32;
+        }
+    }
+    (nodes, tree.root().bounds())
 }
 
 /// An axis-aligned box.

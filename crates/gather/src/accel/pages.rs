@@ -10,8 +10,11 @@ use std::ops::{Deref, DerefMut};
 
 use bytemuck::Pod;
 use memmap2::MmapMut;
+use rayon::prelude::*;
 
 const HUGE: usize = 2 << 20;
+/// Values that a thread makes at least.
+const RUN: usize = 256;
 
 /// A slice whose length is fixed, in huge pages where it fills some and the system has them.
 pub(super) enum Pages<T> {
@@ -19,20 +22,35 @@ pub(super) enum Pages<T> {
     Mapped { memory: MmapMut, first: usize, bytes: usize, of: PhantomData<T> },
 }
 
-impl<T: Pod> Pages<T> {
-    pub(super) fn new(values: Vec<T>) -> Self {
-        let bytes = size_of_val(values.as_slice());
-        if bytes < HUGE {
-            return Self::Few(values);
-        }
-        match map(bytes) {
-            None => Self::Few(values),
-            Some(mut memory) => {
+impl<T: Pod + Send + Sync> Pages<T> {
+    /// So many values, all bytes 0.
+    pub(super) fn zeroed(count: usize) -> Self {
+        let bytes = count * size_of::<T>();
+        let mapped = if bytes < HUGE { None } else { map(bytes) };
+        match mapped {
+            None => Self::Few(vec![T::zeroed(); count]),
+            Some(memory) => {
                 let first = memory.as_ptr().align_offset(HUGE);
-                memory[first..first + bytes].copy_from_slice(bytemuck::cast_slice(&values));
                 Self::Mapped { memory, first, bytes, of: PhantomData }
             }
         }
+    }
+
+    /// So many values, each made where it is to lie, on several threads.
+    pub(super) fn filled(count: usize, value: impl Fn(usize) -> T + Send + Sync) -> Self {
+        let mut pages = Self::zeroed(count);
+        let places = pages.par_iter_mut().with_min_len(RUN).enumerate();
+        places.for_each(|(n, place)| *place = value(n));
+        pages
+    }
+
+    pub(super) fn new(values: Vec<T>) -> Self {
+        if size_of_val(values.as_slice()) < HUGE {
+            return Self::Few(values);
+        }
+        let mut pages = Self::zeroed(values.len());
+        pages.copy_from_slice(&values);
+        pages
     }
 }
 
@@ -72,7 +90,7 @@ impl<T: Pod> DerefMut for Pages<T> {
     }
 }
 
-impl<T: Pod> Clone for Pages<T> {
+impl<T: Pod + Send + Sync> Clone for Pages<T> {
     fn clone(&self) -> Self {
         Self::new(self.to_vec())
     }

@@ -16,7 +16,7 @@ fn kernels() -> Vec<Kernel> {
     kernels
 }
 
-fn random(seed: u64, i: u32) -> Vec3 {
+pub(super) fn random(seed: u64, i: u32) -> Vec3 {
     let mut s = Sampler::new(seed, 0, i);
     s.square().extend(s.number())
 }

@@ -1,10 +1,8 @@
 //! Nodes of eight children, laid out so that one instruction tests all eight.
 
 use bytemuck::{Pod, Zeroable};
-use rayon::prelude::*;
 
 use super::Aabb;
-use super::build::{Item, Tree, tree};
 
 /// Marks a child as a leaf; the other bits are its index.
 pub(super) const LEAF: u32 = 1 << 31;
@@ -41,7 +39,7 @@ impl Node {
     /// Sorts the children by the corners at which rays of an octant leave their boxes. So large boxes
     /// come after small ones in front of them: sorted by centres rays visit 5 % more leaves, by the
     /// corners at which they enter 27 %.
-    fn set_order(&mut self) {
+    pub(super) fn set_order(&mut self) {
         for (octant, far_first) in self.far_first.iter_mut().enumerate() {
             let mut left_at = [0.0; 8];
             for (axis, [least, greatest]) in self.planes.iter().enumerate() {
@@ -90,120 +88,6 @@ fn greatest_first(numbers: [f32; 8]) -> u32 {
         }
     }
     (0..).zip(places).map(|(lane, place): (u32, u32)| lane << (4 * place)).sum()
-}
-
-/// Collapses a binary tree; `leaf` stores a leaf's items and returns its index. Parents come before
-/// their children; the root is node 0.
-///
-/// Which inner nodes vanish is chosen so that the expected cost of a ray is least, by dynamic
-/// programming over the tree (Ylitie, Karras and Laine 2017, "Efficient incoherent ray traversal on
-/// GPUs through compressed wide BVHs", section 3.2).
-pub(super) fn collapse<'a>(
-    root: &mut Tree<'a>,
-    leaf: &mut impl FnMut(&'a [Item]) -> u32,
-) -> Vec<Node> {
-    plan(root, 0);
-    let mut nodes = Vec::new();
-    emit(root, &mut nodes, leaf);
-    nodes.par_iter_mut().with_min_len(512).for_each(Node::set_order);
-    nodes
-}
-
-/// Cost of visiting a node, of visiting a leaf: one.
-const NODE_COST: f32 = 1.0;
-
-/// Down to this depth, subtrees are planned on several threads.
-const PARALLEL_DEPTH: u32 = 6;
-
-/// Least cost of a subtree as a forest of at most 1, 2, … 8 children. Notes at every inner node how
-/// many of them go to its left side.
-fn plan(tree: &mut Tree<'_>, depth: u32) -> [f32; 8] {
-    let area = tree.bounds().half_area();
-    let Tree::Inner(_, pair, cut) = tree else { return [area; 8] };
-    let [left, right] = &mut **pair;
-    let (left, right) = if depth < PARALLEL_DEPTH {
-        rayon::join(|| plan(left, depth + 1), || plan(right, depth + 1))
-    } else {
-        (plan(left, depth + 1), plan(right, depth + 1))
-    };
-    let mut costs = [0.0; 8];
-    for roots in 2..=8 {
-        // The first that is cheapest.
-        let (mut best, mut least) = (1, f32::INFINITY);
-        for k in 1..roots {
-            let cost = left[k - 1] + right[roots - k - 1];
-            if cost < least {
-                (best, least) = (k, cost);
-            }
-        }
-        costs[roots - 1] = least;
-        cut[roots - 1] = best as u8;
-    }
-    // As one child: a node of its own, with eight.
-    costs[0] = NODE_COST * area + costs[7];
-    for roots in 2..=8 {
-        if costs[roots - 2] <= costs[roots - 1] {
-            costs[roots - 1] = costs[roots - 2];
-            if roots < 8 {
-                cut[roots - 1] = 0;
-            }
-        }
-    }
-    costs
-}
-
-fn emit<'a>(
-    tree: &Tree<'a>,
-    nodes: &mut Vec<Node>,
-    leaf: &mut impl FnMut(&'a [Item]) -> u32,
-) -> u32 {
-    let index = nodes.len();
-    nodes.push(Node::EMPTY);
-    let mut node = Node::EMPTY;
-    let mut children = Vec::with_capacity(8);
-    match tree {
-        Tree::Leaf(_, []) => {}
-        Tree::Leaf(..) => children.push(tree),
-        Tree::Inner(_, pair, cut) => {
-            let k = usize::from(cut[7]);
-            open(&pair[0], k, &mut children);
-            open(&pair[1], 8 - k, &mut children);
-        }
-    }
-    // Rays to any hit take the last first, and leaves may end them.
-    children.sort_by_key(|child| matches!(child, Tree::Leaf(..)));
-    for (lane, child) in children.into_iter().enumerate() {
-        node.set_bounds(lane, child.bounds());
-        node.child[lane] = match child {
-            Tree::Leaf(_, items) => LEAF | leaf(items),
-            Tree::Inner(..) => emit(child, nodes, leaf),
-        };
-    }
-    nodes[index] = node;
-    index as u32
-}
-
-/// The forest of at most `roots` children that [`plan`] chose.
-fn open<'t, 'a>(tree: &'t Tree<'a>, roots: usize, children: &mut Vec<&'t Tree<'a>>) {
-    match tree {
-        Tree::Inner(_, pair, cut) if roots > 1 => match usize::from(cut[roots - 1]) {
-            0 => open(tree, roots - 1, children),
-            k => {
-                open(&pair[0], k, children);
-                open(&pair[1], roots - k, children);
-            }
-        },
-        _ => children.push(tree),
-    }
-}
-
-/// A tree over boxes, one a leaf; leaf indices are those of the boxes.
-pub(super) fn over_boxes(boxes: &[Aabb]) -> (Vec<Node>, Aabb) {
-    let mut items: Vec<_> =
-        (0..).zip(boxes).map(|(index, &bounds)| Item { bounds, index }).collect();
-    let mut root = tree(&mut items, 1);
-    let nodes = collapse(&mut root, &mut |items| items[0].index);
-    (nodes, root.bounds())
 }
 
 #[cfg(test)]

@@ -1,0 +1,190 @@
+//! From a binary tree to nodes of eight children.
+//!
+//! Which inner nodes vanish is chosen so that the expected cost of a ray is least, by dynamic
+//! programming over the tree (Ylitie, Karras and Laine 2017, "Efficient incoherent ray traversal on
+//! GPUs through compressed wide BVHs", section 3.2).
+
+use rayon::prelude::*;
+
+use super::build::{BinaryTree, Item, Subtree};
+use super::pages::Pages;
+use super::wide::{LEAF, Node};
+
+/// Cost of visiting a node, of visiting a leaf: one.
+const NODE_COST: f32 = 1.0;
+
+/// Down to this depth, subtrees are planned on several threads.
+const PARALLEL_DEPTH: u32 = 6;
+
+/// Of an inner node's forest of at most 1, 2, … 8 children, how many go to its left side; 0 where one
+/// child fewer is as good.
+type Cut = [u8; 8];
+
+/// Least cost of a subtree as a forest of at most 1, 2, … 8 children. Notes each node's cut in its
+/// place.
+fn plan(tree: Subtree<'_>, cuts: &mut [Cut], depth: u32) -> [f32; 8] {
+    let area = tree.bounds().half_area();
+    let Some(([left, right], second)) = tree.sides().zip(tree.right()) else { return [area; 8] };
+    let (first, second) = cuts.split_at_mut(second);
+    let Some((cut, first)) = first.split_first_mut() else { unreachable!("a node has a place") };
+    let (left, right) = if depth < PARALLEL_DEPTH {
+        rayon::join(|| plan(left, first, depth + 1), || plan(right, second, depth + 1))
+    } else {
+        (plan(left, first, depth + 1), plan(right, second, depth + 1))
+    };
+    let mut costs = [0.0; 8];
+    for roots in 2..=8 {
+        // The first that is cheapest.
+        let (mut best, mut least) = (1, f32::INFINITY);
+        for k in 1..roots {
+            let cost = left[k - 1] + right[roots - k - 1];
+            if cost < least {
+                (best, least) = (k, cost);
+            }
+        }
+        costs[roots - 1] = least;
+        cut[roots - 1] = best as u8;
+    }
+    // As one child: a node of its own, with eight.
+    costs[0] = NODE_COST * area + costs[7];
+    for roots in 2..=8 {
+        if costs[roots - 2] <= costs[roots - 1] {
+            costs[roots - 1] = costs[roots - 2];
+            if roots < 8 {
+                cut[roots - 1] = 0;
+            }
+        }
+    }
+    costs
+}
+
+/// What lies below a node, and how it is to be cut.
+#[derive(Clone, Copy)]
+struct Planned<'p, 'a> {
+    tree: Subtree<'a>,
+    cuts: &'p [Cut],
+}
+
+impl Planned<'_, '_> {
+    fn sides(&self) -> Option<[Self; 2]> {
+        let [left, right] = self.tree.sides()?;
+        let second = self.tree.right()?;
+        let side = |tree, from: usize| Self { tree, cuts: &self.cuts[from..] };
+        Some([side(left, 1), side(right, second)])
+    }
+}
+
+/// The forest of at most `roots` children that [`plan`] chose.
+fn open<'p, 'a>(planned: Planned<'p, 'a>, roots: usize, children: &mut Vec<Planned<'p, 'a>>) {
+    match planned.sides() {
+        Some([left, right]) if roots > 1 => match usize::from(planned.cuts[0][roots - 1]) {
+            0 => open(planned, roots - 1, children),
+            k => {
+                open(left, k, children);
+                open(right, roots - k, children);
+            }
+        },
+        _ => children.push(planned),
+    }
+}
+
+/// Nodes of eight children, and what their leaves hold.
+#[derive(Debug, Default)]
+struct Part<'a> {
+    /// Parents come before their children; the root is the first.
+    nodes: Vec<Node>,
+    leaves: Vec<&'a [Item]>,
+}
+
+/// A child that a part leaves to another one.
+struct Left<'p, 'a> {
+    /// The node that it is a child of, and which.
+    node: usize,
+    lane: usize,
+    planned: Planned<'p, 'a>,
+}
+
+impl<'a> Part<'a> {
+    /// Adds a node, so many levels of nodes below it, and leaves what lies below those. Its index.
+    fn add<'p>(
+        &mut self,
+        planned: Planned<'p, 'a>,
+        levels: u32,
+        left: &mut Vec<Left<'p, 'a>>,
+    ) -> u32 {
+        let index = self.nodes.len();
+        self.nodes.push(Node::EMPTY);
+        let mut children = Vec::with_capacity(8);
+        match planned.sides() {
+            Some([low, high]) => {
+                let k = usize::from(planned.cuts[0][7]);
+                open(low, k, &mut children);
+                open(high, 8 - k, &mut children);
+            }
+            None if planned.tree.items().is_empty() => {}
+            None => children.push(planned),
+        }
+        // Rays to any hit take the last first, and leaves may end them.
+        children.sort_by_key(|child| child.tree.right().is_none());
+        for (lane, planned) in children.into_iter().enumerate() {
+            self.nodes[index].set_bounds(lane, planned.tree.bounds());
+            self.nodes[index].child[lane] = if planned.tree.right().is_none() {
+                self.leaves.push(planned.tree.items());
+                LEAF | (self.leaves.len() - 1) as u32
+            } else if levels > 0 {
+                self.add(planned, levels - 1, left)
+            } else {
+                left.push(Left { node: index, lane, planned });
+                0
+            };
+        }
+        index as u32
+    }
+
+    /// All that lies below a node.
+    fn of(planned: Planned<'_, 'a>) -> Self {
+        let mut part = Self::default();
+        part.add(planned, u32::MAX, &mut Vec::new());
+        part
+    }
+}
+
+/// Levels of nodes that one thread makes, before others make what is below, in trees not smaller than
+/// [`LARGE`].
+const UPPER: u32 = 2;
+const LARGE: usize = 1 << 13;
+
+/// Collapses a binary tree: nodes, parents before their children, the root first, and the items of
+/// their leaves.
+pub(super) fn collapse(tree: &BinaryTree) -> (Pages<Node>, Vec<&[Item]>) {
+    let mut cuts = vec![[0; 8]; tree.len()];
+    plan(tree.root(), &mut cuts, 0);
+    let (mut upper, mut left) = (Part::default(), Vec::new());
+    let levels = if tree.len() < LARGE { u32::MAX } else { UPPER };
+    upper.add(Planned { tree: tree.root(), cuts: &cuts }, levels, &mut left);
+    let lower: Vec<_> = left.par_iter().map(|left| Part::of(left.planned)).collect();
+
+    let mut counts = [upper.nodes.len(), upper.leaves.len()].map(|n| n as u32);
+    let mut offsets = vec![[0; 2]];
+    for (left, part) in left.iter().zip(&lower) {
+        upper.nodes[left.node].child[left.lane] = counts[0];
+        offsets.push(counts);
+        counts[0] += part.nodes.len() as u32;
+        counts[1] += part.leaves.len() as u32;
+    }
+    let parts = || std::iter::once(&upper).chain(&lower);
+    let mut nodes = Pages::zeroed(counts[0] as usize);
+    let mut rest: &mut [Node] = &mut nodes;
+    let places: Vec<_> = parts().map(|part| rest.split_off_mut(..part.nodes.len())).collect();
+    let all: Vec<_> = places.into_iter().flatten().zip(parts()).zip(offsets).collect();
+    all.into_par_iter().for_each(|((places, part), [node, leaf])| {
+        for (place, from) in places.iter_mut().zip(&part.nodes) {
+            *place = *from;
+            for child in &mut place.child {
+                *child += if *child & LEAF == 0 { node } else { leaf };
+            }
+            place.set_order();
+        }
+    });
+    (nodes, parts().flat_map(|part| part.leaves.iter().copied()).collect())
+}
