@@ -16,12 +16,12 @@
 use glam::{Mat3, Vec2, Vec3};
 use lumencast_scene::{Aabb, LightKind};
 
-use super::vertex::Vertex;
+use super::vertex::Scatterer;
 use crate::accel::{Hit, Ray};
 use crate::bsdf::{Scatter, frame};
 use crate::lights::punctual::{LightPoint, Source};
 use crate::sampling::{Grid2, Sampler, luminance, power_heuristic};
-use crate::surface::Place;
+use crate::surface::{MaterialModel, Place};
 use crate::world::{Itself, World, itself};
 
 /// Most cells along each side of the grid of densities.
@@ -60,10 +60,10 @@ pub(crate) struct Beam {
 /// A point that a ray of a beam has met.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lit {
-    hit: Hit,
-    pub(super) at: Vec3,
-    /// Unit normal of the triangle on the light's side.
-    normal: Vec3,
+    /// The triangle that it lies on.
+    pub(super) itself: Itself,
+    /// On the light's side.
+    surface: Scatterer,
     /// What arrives along the ray.
     source: LightPoint,
     /// Density of the point per square metre of its surface.
@@ -128,10 +128,12 @@ impl Beam {
         (Ray { origin: crossed + back * direction, direction, t_max: f32::INFINITY }, source)
     }
 
-    /// What a ray of it has met at a place, whose normal is on the light's side.
-    pub(super) fn lit(&self, hit: Hit, place: &Place, source: LightPoint) -> Lit {
-        let (at, normal) = (place.position, place.normal);
-        Lit { hit, at, normal, source, density: self.density(at, normal, source.direction) }
+    /// What a ray of it has met; `None` where that scatters nothing.
+    pub(super) fn lit(&self, world: &World, hit: &Hit, source: LightPoint) -> Option<Lit> {
+        let surface = Scatterer::at(&world.point(hit, -source.direction)?, world.model)?;
+        let Place { position, normal, .. } = surface.place;
+        let density = self.density(position, normal, source.direction);
+        (density > 0.0).then_some(Lit { itself: itself(hit), surface, source, density })
     }
 
     /// Density per square metre, on a surface with this unit normal, of its rays that come from
@@ -160,29 +162,31 @@ impl Beam {
 }
 
 impl Lit {
-    /// The triangle that it lies on.
-    pub(super) fn itself(&self) -> Itself {
-        itself(&self.hit)
+    /// World.
+    #[inline]
+    pub(super) fn position(&self) -> Vec3 {
+        self.surface.place.position
     }
 
     /// What it scatters towards a point `from` which it lies in a unit `direction`, weighed beside what
     /// the BSDF would find of it, which chooses that direction with density `pdf`: times the square of
     /// the distance, over the density with which it was chosen.
+    #[inline]
     pub(super) fn toward(
         &self,
-        world: &World,
         from: Vec3,
         direction: Vec3,
         pdf: f32,
+        model: MaterialModel,
     ) -> Option<Vec3> {
-        if direction.dot(self.normal) >= 0.0 || self.density <= 0.0 {
+        let Place { position, normal, .. } = self.surface.place;
+        if direction.dot(normal) >= 0.0 {
             return None;
         }
-        let per_area = solid_angle(direction, self.normal, from.distance_squared(self.at));
-        let point = world.point(&self.hit, direction)?;
-        let vertex = Vertex::at(&point, -direction, world.model)?;
+        let per_area = solid_angle(direction, normal, from.distance_squared(position));
+        let vertex = self.surface.seen_from(-direction);
         // Beside the disc that its own rays might meet, it is weighed already.
-        let scatter = Scatter { pdf: 0.0, ..vertex.eval(self.source.direction, world.model) };
+        let scatter = Scatter { pdf: 0.0, ..vertex.eval(self.source.direction, model) };
         let sent = self.source.scattered(scatter).light;
         let weight = power_heuristic(self.density, pdf * per_area);
         (sent != Vec3::ZERO).then(|| sent * (weight * per_area / self.density))
@@ -216,7 +220,6 @@ fn spread(weights: &[f32], width: usize) -> Vec<f32> {
 mod tests {
     use super::*;
     use crate::accel::{Kernel, Stacks};
-    use crate::surface::MaterialModel;
     use crate::world::{Passing, WorldCache};
     use lumencast_scene::Light;
     use lumencast_testkit::scenes::{Stage, lambert};
@@ -255,8 +258,7 @@ mod tests {
                 let (ray, source) = rays[n as usize];
                 assert!((ray.direction + source.direction).length() < 1e-6);
                 let Some(hit) = hit else { return };
-                let point = world.point(&hit, ray.direction).expect("an area");
-                sum += 1.0 / beam.lit(hit, &point.place, source).density;
+                sum += 1.0 / beam.lit(&world, &hit, source).expect("it was meant").density;
                 met += 1;
             });
             let found = sum / count as f32;

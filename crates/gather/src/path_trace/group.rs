@@ -376,13 +376,13 @@ impl Shader<'_, '_> {
     /// Connects each vertex to the point that the beam lights for its path.
     #[inline(always)]
     fn reach_for_lit(&mut self) {
-        let (world, depth, model) = (self.world, self.depth, self.world.model);
+        let (depth, model) = (self.depth, self.world.model);
         let Group { met, going, vertices, directions, .. } = &mut *self.group;
         let mut lit = [None; GROUP];
         for (vertex, met) in met.iter().enumerate().take(GROUP) {
             lit[vertex] = self.lit[met.index as usize].as_ref().filter(|_| going[vertex]);
             let Some(lit) = lit[vertex] else { continue };
-            let to = lit.at - vertices.place(vertex).position;
+            let to = lit.position() - vertices.place(vertex).position;
             directions.set(vertex, to.normalize_or_zero().to_array());
         }
         let scattered = vertices.eval(directions, model);
@@ -391,11 +391,11 @@ impl Shader<'_, '_> {
             let Met { index, hit, .. } = self.group.met[vertex];
             let [r, g, b, pdf] = scattered.get(vertex);
             let (value, place) = (Vec3::new(r, g, b), self.group.vertices.place(vertex));
-            if value == Vec3::ZERO || lit.itself() == itself(&hit) {
+            if value == Vec3::ZERO || lit.itself == itself(&hit) {
                 continue;
             }
             let direction = Vec3::from(self.group.directions.get(vertex));
-            let Some(sent) = lit.toward(world, place.position, direction, pdf) else { continue };
+            let Some(sent) = lit.toward(place.position, direction, pdf, model) else { continue };
             let path = &self.paths[index as usize];
             let light = self.limited(depth + 2, path.throughput * value * sent);
             let origin = place.leave(direction);
@@ -404,8 +404,8 @@ impl Shader<'_, '_> {
                 path: index,
                 part: Part::Indirect,
                 light,
-                ray: Ray { origin, direction, t_max: origin.distance(lit.at) },
-                passing: Passing { ends: [Some(itself(&hit)), Some(lit.itself())], key },
+                ray: Ray { origin, direction, t_max: origin.distance(lit.position()) },
+                passing: Passing { ends: [Some(itself(&hit)), Some(lit.itself)], key },
             });
         }
     }

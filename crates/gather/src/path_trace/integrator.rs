@@ -248,19 +248,19 @@ impl<'a> Integrator<'a> {
 
     /// Gives each path a point that the beam lights.
     fn follow_beam(&mut self) {
-        let Self { world, limits, paths, lit, stacks, .. } = self;
+        let Self { world, limits, paths, hits, lit, stacks, .. } = self;
         let Some(beam) = limits.beam else { return };
-        lit.clear();
-        lit.resize(paths.len(), None);
         self.rays += paths.len() as u64;
         let sources: Vec<_> = paths.iter().map(|path| beam.ray(path.sampler.aside())).collect();
         let rays = sources.iter().zip(0..).map(|((ray, _), n)| (*ray, n));
         let passing = |n: u32| Passing { ends: [None; 2], key: paths[n as usize].key(u32::MAX) };
         world.closest(rays, stacks, passing, |n, hit| {
-            let (ray, source) = sources[n as usize];
-            let point = hit.and_then(|hit| Some((hit, world.point(&hit, ray.direction)?)));
-            lit[n as usize] = point.map(|(hit, point)| beam.lit(hit, &point.place, source));
+            hit.iter().for_each(|hit| world.fetch_triangle(hit));
+            hits[n as usize] = hit;
         });
+        lit.clear();
+        let met = hits.iter().zip(sources);
+        lit.extend(met.map(|(hit, (_, source))| beam.lit(world, hit.as_ref()?, source)));
     }
 
     /// Traces the rays in hand.

@@ -18,6 +18,30 @@ pub(super) struct Vertex {
     pub(super) bsdf: Bsdf,
 }
 
+/// A point that scatters light, before it is known where to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scatterer {
+    pub(super) place: Place,
+    /// Unit; of shading, before it is bent to face anything.
+    unbent: Vec3,
+    bsdf: Bsdf,
+}
+
+impl Scatterer {
+    /// `None` where it scatters nothing.
+    pub(super) fn at(point: &Point<'_>, model: MaterialModel) -> Option<Self> {
+        let (bsdf, unbent) = point.scattering(model)?;
+        Some(Self { place: point.place, unbent, bsdf })
+    }
+
+    /// Seen from `view`, unit, on the side of its place.
+    #[inline(always)]
+    pub(super) fn seen_from(&self, view: Vec3) -> Vertex {
+        let Self { place, unbent, bsdf } = *self;
+        Vertex { place, view, normal: place.facing(unbent, view), bsdf }
+    }
+}
+
 /// The next ray of a path.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scattered {
@@ -49,13 +73,6 @@ impl Scattered {
 }
 
 impl Vertex {
-    /// Where a point is seen from `view`, unit; `None` where it scatters nothing.
-    pub(super) fn at(point: &Point<'_>, view: Vec3, model: MaterialModel) -> Option<Self> {
-        let bsdf = point.spot.bsdf(point.place.is_front(), model)?;
-        let normal = point.shading_normal(model)?;
-        Some(Self { place: point.place, view, normal, bsdf })
-    }
-
     /// What is scattered of light from a direction.
     #[inline(always)]
     pub(super) fn eval(&self, direction: Vec3, model: MaterialModel) -> Scatter {

@@ -9,6 +9,7 @@ use glam::Vec3;
 use lumencast_scene::Material;
 
 use crate::accel::Hit;
+use crate::bsdf::Bsdf;
 
 pub(crate) use frames::{Frames, gamma};
 pub(crate) use place::{Bump, Place, interpolate, scaled_cross};
@@ -59,10 +60,16 @@ impl<'a> Point<'a> {
         self.spot.emission_seen(self.place.is_front(), model)
     }
 
+    /// How it scatters, and the normal that it is shaded by, on the ray's side but not yet bent to face
+    /// it; `None` where it scatters nothing.
+    pub(crate) fn scattering(&self, model: MaterialModel) -> Option<(Bsdf, Vec3)> {
+        let bsdf = self.spot.bsdf(self.place.is_front(), model)?;
+        let bump = self.spot.bump(model);
+        Some((bsdf, self.place.unbent_normal(self.frames, self.vertex_normal, &bump)))
+    }
+
     /// The normal that it is shaded by, on the ray's side; `None` where it scatters nothing.
     pub(crate) fn shading_normal(&self, model: MaterialModel) -> Option<Vec3> {
-        self.spot.bsdf(self.place.is_front(), model)?;
-        let bump = self.spot.bump(model);
-        Some(self.place.shading_normal(self.frames, self.vertex_normal, &bump, self.view))
+        self.scattering(model).map(|(_, normal)| self.place.facing(normal, self.view))
     }
 }

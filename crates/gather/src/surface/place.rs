@@ -58,8 +58,7 @@ impl Place {
         self.position + side * self.offset * self.normal
     }
 
-    /// The shading normal (unit, world) on the ray's side, bent as little as makes it face the ray, which
-    /// came from `view` (unit): normal maps and coarse meshes would else show their back.
+    /// The shading normal (unit, world) on the ray's side, which came from `view` (unit).
     #[inline(always)]
     pub(crate) fn shading_normal(
         &self,
@@ -68,17 +67,27 @@ impl Place {
         bump: &Bump,
         view: Vec3,
     ) -> Vec3 {
-        const LEAST: f32 = 1e-3;
-        let shading = frames.normal(bump.bend(vertex_normal));
+        self.facing(self.unbent_normal(frames, vertex_normal, bump), view)
+    }
+
+    /// The shading normal before it is bent to face a ray.
+    #[inline(always)]
+    pub(crate) fn unbent_normal(&self, frames: &Frames, vertex: Vec3, bump: &Bump) -> Vec3 {
+        let shading = frames.normal(bump.bend(vertex));
         let n = if shading.dot(self.normal) < 0.0 { -shading } else { shading };
-        if n == Vec3::ZERO {
-            return self.normal;
-        }
-        let cos = n.dot(view);
+        if n == Vec3::ZERO { self.normal } else { n }
+    }
+
+    /// A shading normal bent as little as makes it face `view`: normal maps and coarse meshes would
+    /// else show their back.
+    #[inline(always)]
+    pub(crate) fn facing(&self, unbent: Vec3, view: Vec3) -> Vec3 {
+        const LEAST: f32 = 1e-3;
+        let cos = unbent.dot(view);
         if cos >= LEAST {
-            return n;
+            return unbent;
         }
-        (n + (2.0 * LEAST - cos) * view).normalize_or(self.normal)
+        (unbent + (2.0 * LEAST - cos) * view).normalize_or(self.normal)
     }
 }
 
