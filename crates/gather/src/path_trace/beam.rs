@@ -48,6 +48,8 @@ pub(crate) struct Beam {
     light: usize,
     /// World from the frame whose z is the direction along which the light shines.
     frame: Mat3,
+    /// That frame from the world.
+    to_frame: Mat3,
     /// Where rays start, along z.
     start: f32,
     /// The rectangle that they cross: its lower corner and its size, along x and y.
@@ -88,7 +90,8 @@ impl Beam {
     pub(crate) fn new(world: &World, light: usize, found: &[Found]) -> Option<Self> {
         let source = *world.lights.punctual.shared_candidate(light)?;
         let frame = frame(source.direction());
-        let local = |at: Vec3| frame.transpose() * at;
+        let to_frame = frame.transpose();
+        let local = |at: Vec3| to_frame * at;
         let mut places = Aabb::EMPTY;
         found.iter().for_each(|found| places.grow(local(found.at)));
         if places.is_empty() {
@@ -110,7 +113,16 @@ impl Beam {
         let bounds = world.accel().bounds();
         let bounds = Aabb { min: bounds.min.into(), max: bounds.max.into() };
         let start = bounds.transformed(local).min.z - 1e-3 * (1.0 + world.extent());
-        (!guide.is_empty()).then_some(Self { source, light, frame, start, low, size, guide })
+        (!guide.is_empty()).then_some(Self {
+            source,
+            light,
+            frame,
+            to_frame,
+            start,
+            low,
+            size,
+            guide,
+        })
     }
 
     /// Whether it is of this light.
@@ -138,14 +150,15 @@ impl Beam {
 
     /// Density per square metre, on a surface with this unit normal, of its rays that come from
     /// `to_light`: 0 for those on the other side.
+    #[inline]
     fn density(&self, at: Vec3, normal: Vec3, to_light: Vec3) -> f32 {
         let direction = -to_light;
         let (cosine, facing) = (direction.dot(self.frame.z_axis), normal.dot(to_light));
         if cosine <= 0.0 || facing <= 0.0 {
             return 0.0;
         }
-        let along = self.frame.transpose() * direction;
-        let from_low = self.frame.transpose() * at - self.low;
+        let along = self.to_frame * direction;
+        let from_low = self.to_frame * at - self.low;
         let place = (from_low - from_low.z / along.z * along).truncate() / self.size;
         if place.cmplt(Vec2::ZERO).any() || place.cmpgt(Vec2::ONE).any() {
             return 0.0;
