@@ -171,7 +171,7 @@ fn centers(items: &[Item]) -> Aabb {
 
 /// A subtree to be built.
 struct Builder<'a> {
-    /// Twice as many as items.
+    /// At least one fewer than twice the items.
     nodes: &'a mut [BinaryNode],
     items: &'a mut [Item],
     /// Where they begin among all.

@@ -96,8 +96,8 @@ struct Part<'a> {
     leaves: Vec<&'a [Item]>,
 }
 
-/// A child that a part leaves to another one.
-struct Left<'p, 'a> {
+/// A child whose subtree another part is to hold.
+struct Deferred<'p, 'a> {
     /// The node that it is a child of, and which.
     node: usize,
     lane: usize,
@@ -105,12 +105,12 @@ struct Left<'p, 'a> {
 }
 
 impl<'a> Part<'a> {
-    /// Adds a node, so many levels of nodes below it, and leaves what lies below those. Its index.
+    /// Adds a node and so many levels of nodes below it; what lies below those is deferred. Its index.
     fn add<'p>(
         &mut self,
         planned: Planned<'p, 'a>,
         levels: u32,
-        left: &mut Vec<Left<'p, 'a>>,
+        deferred: &mut Vec<Deferred<'p, 'a>>,
     ) -> u32 {
         let index = self.nodes.len();
         self.nodes.push(Node::EMPTY);
@@ -132,9 +132,9 @@ impl<'a> Part<'a> {
                 self.leaves.push(planned.tree.items());
                 LEAF | (self.leaves.len() - 1) as u32
             } else if levels > 0 {
-                self.add(planned, levels - 1, left)
+                self.add(planned, levels - 1, deferred)
             } else {
-                left.push(Left { node: index, lane, planned });
+                deferred.push(Deferred { node: index, lane, planned });
                 0
             };
         }
@@ -146,6 +146,17 @@ impl<'a> Part<'a> {
         let mut part = Self::default();
         part.add(planned, u32::MAX, &mut Vec::new());
         part
+    }
+
+    /// Puts the nodes where they are to lie, finished: nodes and leaves begin at these indices.
+    fn put(&self, places: &mut [Node], [node, leaf]: [u32; 2]) {
+        for (place, from) in places.iter_mut().zip(&self.nodes) {
+            *place = *from;
+            for child in &mut place.child {
+                *child += if *child & LEAF == 0 { node } else { leaf };
+            }
+            place.set_order();
+        }
     }
 }
 
@@ -159,32 +170,25 @@ const LARGE: usize = 1 << 13;
 pub(super) fn collapse(tree: &BinaryTree) -> (Pages<Node>, Vec<&[Item]>) {
     let mut cuts = vec![[0; 8]; tree.len()];
     plan(tree.root(), &mut cuts, 0);
-    let (mut upper, mut left) = (Part::default(), Vec::new());
+    let (mut upper, mut deferred) = (Part::default(), Vec::new());
     let levels = if tree.len() < LARGE { u32::MAX } else { UPPER };
-    upper.add(Planned { tree: tree.root(), cuts: &cuts }, levels, &mut left);
-    let lower: Vec<_> = left.par_iter().map(|left| Part::of(left.planned)).collect();
+    upper.add(Planned { tree: tree.root(), cuts: &cuts }, levels, &mut deferred);
+    let lower: Vec<_> = deferred.par_iter().map(|child| Part::of(child.planned)).collect();
 
-    let mut counts = [upper.nodes.len(), upper.leaves.len()].map(|n| n as u32);
-    let mut offsets = vec![[0; 2]];
-    for (left, part) in left.iter().zip(&lower) {
-        upper.nodes[left.node].child[left.lane] = counts[0];
-        offsets.push(counts);
-        counts[0] += part.nodes.len() as u32;
-        counts[1] += part.leaves.len() as u32;
+    // Where each part's nodes and leaves begin.
+    let mut count = [upper.nodes.len(), upper.leaves.len()].map(|n| n as u32);
+    let mut begins = vec![[0; 2]];
+    for (child, part) in deferred.iter().zip(&lower) {
+        upper.nodes[child.node].child[child.lane] = count[0];
+        begins.push(count);
+        count[0] += part.nodes.len() as u32;
+        count[1] += part.leaves.len() as u32;
     }
-    let parts = || std::iter::once(&upper).chain(&lower);
-    let mut nodes = Pages::zeroed(counts[0] as usize);
+    let parts: Vec<_> = std::iter::once(upper).chain(lower).collect();
+    let mut nodes = Pages::zeroed(count[0] as usize);
     let mut rest: &mut [Node] = &mut nodes;
-    let places: Vec<_> = parts().map(|part| rest.split_off_mut(..part.nodes.len())).collect();
-    let all: Vec<_> = places.into_iter().flatten().zip(parts()).zip(offsets).collect();
-    all.into_par_iter().for_each(|((places, part), [node, leaf])| {
-        for (place, from) in places.iter_mut().zip(&part.nodes) {
-            *place = *from;
-            for child in &mut place.child {
-                *child += if *child & LEAF == 0 { node } else { leaf };
-            }
-            place.set_order();
-        }
-    });
-    (nodes, parts().flat_map(|part| part.leaves.iter().copied()).collect())
+    let places = parts.iter().map_while(|part| rest.split_off_mut(..part.nodes.len()));
+    let places: Vec<_> = places.zip(&parts).zip(begins).collect();
+    places.into_par_iter().for_each(|((places, part), begin)| part.put(places, begin));
+    (nodes, parts.into_iter().flat_map(|part| part.leaves).collect())
 }
