@@ -21,11 +21,12 @@ const LARGE: usize = 16 * PARALLEL;
 /// Cost of visiting a node, in units of testing one full leaf.
 const NODE_COST: f32 = 0.6;
 
-/// A thing to be put into a tree, or several that stay together: a box, and between its corners, where
-/// vectors have room for it, whose.
+/// A thing to be put into a tree, or several that stay together.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item {
+    /// Its box's least coordinates; in the fourth number's bits the first thing, and [`ORDINARY`].
     low: Vec4,
+    /// Its greatest; in the fourth number's bits how many things, and [`ORDINARY`].
     high: Vec4,
 }
 

@@ -43,15 +43,6 @@ impl<T: Pod + Send + Sync> Pages<T> {
         places.for_each(|(n, place)| *place = value(n));
         pages
     }
-
-    pub(super) fn new(values: Vec<T>) -> Self {
-        if size_of_val(values.as_slice()) < HUGE {
-            return Self::Few(values);
-        }
-        let mut pages = Self::zeroed(values.len());
-        pages.copy_from_slice(&values);
-        pages
-    }
 }
 
 /// Room for so many bytes from the next multiple of a huge page on.
@@ -92,7 +83,7 @@ impl<T: Pod> DerefMut for Pages<T> {
 
 impl<T: Pod + Send + Sync> Clone for Pages<T> {
     fn clone(&self) -> Self {
-        Self::new(self.to_vec())
+        Self::filled(self.len(), |n| self[n])
     }
 }
 
@@ -110,7 +101,7 @@ mod tests {
     fn hold_what_was_put_in() {
         for count in [0, 3, HUGE / 4, HUGE + 5] {
             let values: Vec<u32> = (0..count as u32).collect();
-            let mut pages = Pages::new(values.clone());
+            let mut pages = Pages::filled(values.len(), |n| values[n]);
             assert_eq!(*pages, *values);
             if let Some(last) = pages.last_mut() {
                 *last = 7;
