@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use lumencast_scene::{AlphaMode, Instance, Material, PlacedLight, Snapshot};
 
-use crate::accel::{Accel, AccelCache, Hit, Kernel, Levels, Ray, Stacks};
+use crate::accel::{Accel, AccelCache, Hit, Kernel, Levels, LightBuffer, Ray, Stacks};
 use crate::bsdf::Scatter;
 use crate::lights::emission::EmissionCache;
 use crate::lights::environment::{Sky, SkyCache};
@@ -20,6 +20,7 @@ pub(crate) struct WorldCache {
     accel: AccelCache,
     sky: SkyCache,
     emission: EmissionCache,
+    light_buffers: LightBufferCache,
 }
 
 impl WorldCache {
@@ -28,11 +29,33 @@ impl WorldCache {
     }
 }
 
+/// Light buffers, kept while the snapshot stays.
+#[derive(Debug, Default)]
+struct LightBufferCache(Option<(Arc<Snapshot>, MaterialModel, Arc<[LightBuffer]>)>);
+
+impl LightBufferCache {
+    fn of(&mut self, world: &World) -> Arc<[LightBuffer]> {
+        if let Some((snapshot, model, buffers)) = &self.0
+            && Arc::ptr_eq(snapshot, &world.snapshot)
+            && *model == world.model
+        {
+            return buffers.clone();
+        }
+        let buffers = world.make_light_buffers();
+        self.0 = Some((world.snapshot.clone(), world.model, buffers.clone()));
+        buffers
+    }
+}
+
+/// Directional lights that have a light buffer at most; rays towards others are traced like any.
+const LIGHT_BUFFERS: usize = 4;
+
 /// A snapshot with its acceleration structure and tables of lights.
 #[derive(Debug)]
 pub(crate) struct World {
     snapshot: Arc<Snapshot>,
     accel: Accel,
+    light_buffers: Arc<[LightBuffer]>,
     pub(crate) lights: Lights,
     pub(crate) model: MaterialModel,
     frames: Vec<Frames>,
@@ -83,6 +106,7 @@ impl World {
         let mut world = Self {
             snapshot,
             accel,
+            light_buffers: Arc::default(),
             lights,
             model,
             frames,
@@ -91,7 +115,18 @@ impl World {
             fallback,
         };
         world.find_emitters(&mut cache.emission);
+        if cache.accel.levels() == Levels::One {
+            world.light_buffers = cache.light_buffers.of(&world);
+        }
         world
+    }
+
+    fn make_light_buffers(&self) -> Arc<[LightBuffer]> {
+        let extent = self.extent();
+        let slack = self.frames.iter().map(|f| f.error_within(extent)).fold(0.0, f32::max);
+        let is_opaque = |instance, primitive| self.part(instance, primitive).opaque;
+        let towards = self.lights.punctual.directions().take(LIGHT_BUFFERS);
+        towards.filter_map(|to| LightBuffer::new(&self.accel, to, slack, is_opaque)).collect()
     }
 
     /// The largest coordinate of any surface, metres; 0 without any.
@@ -209,12 +244,20 @@ impl World {
     /// Whether something lies on each of the rays; otherwise like [`Self::closest`].
     pub(crate) fn occluded(
         &self,
-        rays: impl Iterator<Item = (Ray, u32)>,
+        rays: impl Iterator<Item = (Ray, u32)> + Clone,
         stacks: &mut Stacks,
         passing: impl Fn(u32) -> Passing,
-        found: impl FnMut(u32, bool),
+        mut found: impl FnMut(u32, bool),
     ) {
-        self.accel.occluded(rays, stacks, |&n, hit| self.stops(hit, &passing(n)), found);
+        let stops = |&n: &u32, hit: &Hit| self.stops(hit, &passing(n));
+        let mut left = Vec::new();
+        for buffer in self.light_buffers.iter() {
+            let its_own = rays.clone().filter(|(ray, _)| buffer.answers(ray));
+            buffer.occluded(its_own, stops, &mut found, |ray, n| left.push((ray, n)));
+        }
+        let is_anyones = |ray: &Ray| self.light_buffers.iter().any(|buffer| buffer.answers(ray));
+        let others = rays.filter(|(ray, _)| !is_anyones(ray));
+        self.accel.occluded(others.chain(left), stacks, stops, found);
     }
 
     /// Whether a ray that passes some surfaces by ends at this one.
@@ -281,4 +324,77 @@ impl World {
 /// Names a hit's triangle.
 pub(crate) fn itself(hit: &Hit) -> Itself {
     (hit.instance, hit.primitive, hit.triangle)
+}
+
+#[cfg(test)]
+mod tests {
+    use lumencast_scene::{Light, LightKind};
+    use lumencast_testkit::scenes::{Stage, lambert};
+
+    use super::*;
+
+    /// A sheet that is half there over a floor, under suns that span so much.
+    fn sheet_over_floor(angles: &[f32]) -> Arc<Snapshot> {
+        let mut stage = Stage::default();
+        let grey = lambert(Vec3::splat(0.5), Vec3::ZERO);
+        let half = Material {
+            alpha_mode: AlphaMode::Blend,
+            base_color: Vec3::splat(0.5).extend(0.5),
+            ..grey.clone()
+        };
+        let [grey, half] = [grey, half].map(|material| stage.material(material));
+        stage.quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0, grey);
+        stage.quad(Vec3::new(-1.0, 1.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0, half);
+        for &angle in angles {
+            let kind = LightKind::Directional { angle };
+            let light = Light { kind, color: Vec3::ONE, intensity: 1.0, range: None };
+            stage.light(light, Vec3::ZERO, Vec3::new(0.1, -1.0, 0.2));
+        }
+        stage.snapshot()
+    }
+
+    fn world(snapshot: &Arc<Snapshot>, model: MaterialModel, cache: &mut WorldCache) -> World {
+        World::new(snapshot.clone(), model, Kernel::detect(), cache)
+    }
+
+    #[test]
+    fn suns_without_a_size_have_light_buffers_in_one_hierarchy() {
+        let snapshot = sheet_over_floor(&[0.0, 0.1, 0.0]);
+        let [one, two] = [Levels::One, Levels::Two].map(WorldCache::new);
+        let (mut one, mut two) = (one, two);
+        assert!(world(&snapshot, MaterialModel::Full, &mut two).light_buffers.is_empty());
+        let found = world(&snapshot, MaterialModel::Full, &mut one).light_buffers;
+        assert_eq!(found.len(), 2);
+        let again = world(&snapshot, MaterialModel::Full, &mut one).light_buffers;
+        assert!(Arc::ptr_eq(&found, &again));
+        // Under others, other surfaces are whole.
+        let lambert = world(&snapshot, MaterialModel::Lambert, &mut one).light_buffers;
+        assert!(!Arc::ptr_eq(&found, &lambert));
+        let many = sheet_over_floor(&[0.0; 2 * LIGHT_BUFFERS]);
+        let many = world(&many, MaterialModel::Full, &mut one).light_buffers;
+        assert_eq!(many.len(), LIGHT_BUFFERS);
+    }
+
+    /// What is there in part is there for the same rays, whatever answers.
+    #[test]
+    fn rays_pass_sheets_by_their_keys() {
+        let world = &world(
+            &sheet_over_floor(&[0.0]),
+            MaterialModel::Full,
+            &mut WorldCache::new(Levels::One),
+        );
+        let direction = world.lights.punctual.directions().next().expect("a sun");
+        let origin = |n: u32| Vec3::new(0.04 * (n % 100) as f32 - 1.98, 1e-4, 0.3);
+        let ray = |n: u32| Ray { origin: origin(n), direction, t_max: f32::INFINITY };
+        let passing = |n: u32| Passing { ends: [None; 2], key: mix2(3, n.into()) };
+        let rays = (0..1000).map(|n| (ray(n), n));
+        let stops = |&n: &u32, hit: &Hit| world.stops(hit, &passing(n));
+        let [mut found, mut by_tree] = [0, 1].map(|_| vec![None; 1000]);
+        let mut stacks = Stacks::default();
+        world.occluded(rays.clone(), &mut stacks, passing, |n, hit| found[n as usize] = Some(hit));
+        world.accel.occluded(rays, &mut stacks, stops, |n, hit| by_tree[n as usize] = Some(hit));
+        assert_eq!(found, by_tree);
+        let occluded = found.iter().filter(|hit| **hit == Some(true)).count();
+        assert!((150..350).contains(&occluded), "about half of half: {occluded}");
+    }
 }

@@ -42,6 +42,10 @@ impl AccelCache {
         Self { levels, ..Self::default() }
     }
 
+    pub(crate) fn levels(&self) -> Levels {
+        self.levels
+    }
+
     /// The structure of a snapshot; what has not changed since the last one is taken from there.
     pub(crate) fn update(&mut self, snapshot: &Arc<Snapshot>, kernel: Kernel) -> Accel {
         if self.levels == Levels::One && copies_are_few(&snapshot.instances) {

@@ -452,7 +452,7 @@ pub(crate) fn fetch_ahead<T>(value: &T) {
 
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-fn fetch_line(at: *const i8) {
+pub(super) fn fetch_line(at: *const i8) {
     use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
     #[expect(unsafe_code, reason = "there is no safe prefetch")]
     // SAFETY: a prefetch reads nothing and cannot fault; SSE is part of x86-64.
@@ -464,7 +464,7 @@ fn fetch_line(at: *const i8) {
 /// `std` has no stable prefetch here.
 #[cfg(target_arch = "aarch64")]
 #[inline(always)]
-fn fetch_line(at: *const i8) {
+pub(super) fn fetch_line(at: *const i8) {
     #[expect(unsafe_code, reason = "there is no safe prefetch")]
     // SAFETY: a prefetch reads nothing and cannot fault.
     unsafe {
@@ -477,11 +477,11 @@ fn fetch_line(at: *const i8) {
 }
 
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-fn fetch_line(_: *const i8) {}
+pub(super) fn fetch_line(_: *const i8) {}
 
 /// The nearest of the triangles found that is accepted.
 #[inline(always)]
-fn nearest(
+pub(super) fn nearest(
     block: &Block,
     instance: u32,
     mut hits: TriangleHits,

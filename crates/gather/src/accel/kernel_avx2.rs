@@ -13,6 +13,7 @@ use std::arch::x86_64::{
 #[cfg(test)]
 use super::kernel::BoxHits;
 use super::kernel::{Setup, Stacks, TriangleHits, WIDEN, trace_with};
+use super::light_buffer::LightBuffer;
 use super::triangle_bvh::{Block, LANES};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
@@ -53,6 +54,19 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
         },
         |block, ray, t_max| triangles(block, ray, t_max),
     );
+}
+
+/// [`LightBuffer::occluded`] compiled for AVX2.
+#[target_feature(enable = "avx2,fma,popcnt")]
+pub(super) fn occluded<T: Copy>(
+    buffer: &LightBuffer,
+    rays: impl Iterator<Item = (Ray, T)>,
+    accept: impl Fn(&T, &Hit) -> bool,
+    found: impl FnMut(T, bool),
+    left: impl FnMut(Ray, T),
+) {
+    let triangles = |block: &Block, ray: &Setup, t_max| triangles(block, ray, t_max);
+    buffer.occluded_with(rays, accept, found, left, triangles);
 }
 
 /// [`slabs`] as tests want it.

@@ -7,6 +7,7 @@ use std::arch::aarch64::{
 };
 
 use super::kernel::{BoxHits, Setup, Stacks, TriangleHits, WIDEN, put, trace_with};
+use super::light_buffer::LightBuffer;
 use super::triangle_bvh::{Block, LANES};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
@@ -32,6 +33,19 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
         |node, ray, t_max, stack| put::<ANY>(node, ray, &boxes(node, ray, t_max), stack),
         |block, ray, t_max| triangles(block, ray, t_max),
     );
+}
+
+/// [`LightBuffer::occluded`] compiled for NEON.
+#[target_feature(enable = "neon")]
+pub(super) fn occluded<T: Copy>(
+    buffer: &LightBuffer,
+    rays: impl Iterator<Item = (Ray, T)>,
+    accept: impl Fn(&T, &Hit) -> bool,
+    found: impl FnMut(T, bool),
+    left: impl FnMut(Ray, T),
+) {
+    let triangles = |block: &Block, ray: &Setup, t_max| triangles(block, ray, t_max);
+    buffer.occluded_with(rays, accept, found, left, triangles);
 }
 
 /// Minima and maxima are those that pass over a NaN, as `f32::min` and `f32::max` do: of a ray that

@@ -18,6 +18,7 @@ mod kernel;
 mod kernel_avx2;
 #[cfg(target_arch = "aarch64")]
 mod kernel_neon;
+mod light_buffer;
 mod pages;
 #[cfg(test)]
 mod tests;
@@ -30,6 +31,7 @@ use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
 pub(crate) use cache::AccelCache;
 pub(crate) use kernel::{Kernel, Stacks, fetch_ahead};
+pub(crate) use light_buffer::LightBuffer;
 pub(crate) use triangle_bvh::TriangleBvh;
 
 use build::{BinaryTree, Item};
@@ -133,6 +135,16 @@ impl Accel {
     /// World bounds of everything; empty for an empty scene.
     pub(crate) fn bounds(&self) -> Aabb {
         self.bounds
+    }
+
+    /// The only hierarchy there is, if it lies in the world, and the instance that it counts from.
+    fn whole(&self) -> Option<(u32, &Arc<TriangleBvh>)> {
+        match self.placed.as_slice() {
+            [only] if only.object_from_world == Affine3A::IDENTITY => {
+                Some((only.instance, &only.bvh))
+            }
+            _ => None,
+        }
     }
 
     /// Bytes that it takes, hierarchies that instances share counted once.

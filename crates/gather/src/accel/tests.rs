@@ -1,4 +1,5 @@
 mod lanes;
+mod light_buffer;
 
 use std::iter::once;
 use std::sync::Arc;

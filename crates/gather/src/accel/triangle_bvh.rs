@@ -38,6 +38,11 @@ impl Block {
         instance: [0; LANES],
     };
 
+    /// Which lanes hold a triangle.
+    pub(super) fn is_used(&self) -> [bool; LANES] {
+        self.triangle.map(|triangle| triangle != UNUSED)
+    }
+
     pub(super) fn set(&mut self, lane: usize, corners: [Vec3A; 3]) {
         for (vertex, corner) in corners.iter().enumerate() {
             for axis in 0..3 {
@@ -133,7 +138,7 @@ impl TriangleBvh {
         for block in self.blocks.iter_mut() {
             let mut bounds = Aabb::EMPTY;
             for lane in 0..LANES {
-                if block.triangle[lane] == UNUSED {
+                if !block.is_used()[lane] {
                     continue;
                 }
                 let corners = source.corners(block.primitive[lane], block.triangle[lane]);

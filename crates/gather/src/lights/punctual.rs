@@ -284,6 +284,13 @@ pub(crate) struct Punctual {
 }
 
 impl Punctual {
+    /// Directions towards the directional lights without a size, unit: rays that reach for them all go
+    /// the same way.
+    pub(crate) fn directions(&self) -> impl Iterator<Item = Vec3> + '_ {
+        let far = self.sources.iter().filter(|source| source.is_directional && source.size == 0.0);
+        far.map(|source| -source.direction)
+    }
+
     /// `scene_radius` (metres) turns directional lights' lux into a power.
     pub(crate) fn new(lights: &[PlacedLight], scene_radius: f32) -> Self {
         let by_power = Table::new(lights.iter().map(|placed| {

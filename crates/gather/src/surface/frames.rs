@@ -10,6 +10,10 @@ pub(crate) const fn gamma(n: f32) -> f32 {
     e / (1.0 - e)
 }
 
+/// Relative errors of a point between three corners, and of one that is transformed, each twice.
+const OF_CORNERS: f32 = 2.0 * (gamma(16.0) + gamma(4.0));
+const OF_TRANSFORMS: f32 = 2.0 * gamma(4.0);
+
 /// What tracing needs to know of an instance beside its triangles.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frames {
@@ -35,8 +39,8 @@ impl Frames {
             world_from_object: world_from_object.matrix3.into(),
             translation: world_from_object.translation.into(),
             normal_from_object: Mat3::from(object_from_world.matrix3).transpose(),
-            rounding_by_place: (2.0 * gamma(4.0) * (to_world * (to_object * Vec3A::ONE))).into(),
-            rounding: (2.0 * gamma(4.0) * (moved + world_from_object.translation.abs())).into(),
+            rounding_by_place: (OF_TRANSFORMS * (to_world * (to_object * Vec3A::ONE))).into(),
+            rounding: (OF_TRANSFORMS * (moved + world_from_object.translation.abs())).into(),
         }
     }
 
@@ -79,12 +83,18 @@ impl Frames {
         self.world_from_object * object + self.translation
     }
 
+    /// Bound of [`Self::error`] wherever no coordinate is beyond `extent`, metres.
+    pub(crate) fn error_within(&self, extent: f32) -> f32 {
+        // What bounds the transform's errors bounds the size of corners as well.
+        let of_transforms = extent * self.rounding_by_place + self.rounding;
+        (1.0 + OF_CORNERS / OF_TRANSFORMS) * of_transforms.max_element()
+    }
+
     /// How far from the true surface a computed point of a triangle may lie, a component each:
     /// errors of interpolating, of transforming to the world, and of transforming the next ray's
     /// origin back (Pharr, Jakob and Humphreys 2023, section 6.8).
     #[inline(always)]
     pub(crate) fn error(&self, corners: [Vec3; 3], world: Vec3) -> Vec3 {
-        const OF_CORNERS: f32 = 2.0 * (gamma(16.0) + gamma(4.0));
         let [a, b, c] = corners.map(Vec3::abs);
         let largest = a.max(b).max(c);
         let m = &self.world_from_object;
