@@ -12,6 +12,7 @@
 
 mod build;
 mod cache;
+mod cells;
 mod collapse;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
@@ -230,6 +231,12 @@ impl Aabb {
 
     pub(crate) fn center(&self) -> Vec3A {
         0.5 * (self.min + self.max)
+    }
+
+    fn corners(&self) -> impl Iterator<Item = [f64; 3]> + use<> {
+        let ends = [self.min, self.max].map(|end| end.to_array());
+        let corner = move |n: usize| [0, 1, 2].map(|axis| f64::from(ends[n >> axis & 1][axis]));
+        (0..8).map(corner)
     }
 
     /// The box around the transformed box, widened by the rounding of the transform.

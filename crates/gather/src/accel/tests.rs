@@ -1,3 +1,4 @@
+mod crowd;
 mod lanes;
 mod light_buffer;
 
