@@ -5,7 +5,9 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use lumencast_scene::{AlphaMode, Instance, Material, PlacedLight, Snapshot};
 
-use crate::accel::{Accel, AccelCache, Hit, Kernel, Levels, LightBuffer, Ray, Stacks};
+use crate::accel::{
+    Accel, AccelCache, Hit, ItemBuffer, Kernel, Levels, LightBuffer, Pyramid, Ray, Stacks,
+};
 use crate::bsdf::Scatter;
 use crate::lights::emission::EmissionCache;
 use crate::lights::environment::{Sky, SkyCache};
@@ -129,6 +131,14 @@ impl World {
         towards.filter_map(|to| LightBuffer::new(&self.accel, to, slack, is_opaque)).collect()
     }
 
+    /// What rays through a picture meet first, for those who follow many. `None` where it would not
+    /// help: in several hierarchies, or without surfaces.
+    pub(crate) fn item_buffer(&self, pyramid: &Pyramid) -> Option<ItemBuffer> {
+        ItemBuffer::new(&self.accel, pyramid, |instance, primitive| {
+            self.part(instance, primitive).opaque
+        })
+    }
+
     /// The largest coordinate of any surface, metres; 0 without any.
     pub(crate) fn extent(&self) -> f32 {
         let bounds = self.accel.bounds();
@@ -239,6 +249,21 @@ impl World {
         found: impl FnMut(u32, Option<Hit>),
     ) {
         self.accel.closest(rays, stacks, |&n, hit| self.stops(hit, &passing(n)), found);
+    }
+
+    /// Like [`Self::closest`], for rays most of which are those of an item buffer.
+    pub(crate) fn closest_seen(
+        &self,
+        items: &ItemBuffer,
+        rays: impl Iterator<Item = (Ray, u32)>,
+        stacks: &mut Stacks,
+        passing: impl Fn(u32) -> Passing,
+        mut found: impl FnMut(u32, Option<Hit>),
+    ) {
+        let stops = |&n: &u32, hit: &Hit| self.stops(hit, &passing(n));
+        let mut left = Vec::new();
+        items.closest(rays, stops, &mut found, |ray, n| left.push((ray, n)));
+        self.accel.closest(left.into_iter(), stacks, stops, found);
     }
 
     /// Whether something lies on each of the rays; otherwise like [`Self::closest`].

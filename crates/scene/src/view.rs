@@ -95,12 +95,16 @@ impl View {
 /// The rays of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays {
-    eye: Vec3,
-    forward: Vec3,
+    /// Where the camera is, metres.
+    pub eye: Vec3,
+    /// Unit.
+    pub forward: Vec3,
     /// From the middle of the picture to its edge; of a perspective view at a distance of 1.
-    right: Vec3,
-    up: Vec3,
-    is_perspective: bool,
+    pub right: Vec3,
+    /// Likewise.
+    pub up: Vec3,
+    /// Rays start at the eye and part, else they are parallel.
+    pub is_perspective: bool,
 }
 
 impl Rays {

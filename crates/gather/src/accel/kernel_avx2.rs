@@ -10,6 +10,7 @@ use std::arch::x86_64::{
     _mm256_setr_epi32, _mm256_setzero_ps, _mm256_srlv_epi32, _mm256_sub_ps,
 };
 
+use super::item_buffer::ItemBuffer;
 #[cfg(test)]
 use super::kernel::BoxHits;
 use super::kernel::{Setup, Stacks, TriangleHits, WIDEN, trace_with};
@@ -67,6 +68,19 @@ pub(super) fn occluded<T: Copy>(
 ) {
     let triangles = |block: &Block, ray: &Setup, t_max| triangles(block, ray, t_max);
     buffer.occluded_with(rays, accept, found, left, triangles);
+}
+
+/// [`ItemBuffer::closest`] compiled for AVX2.
+#[target_feature(enable = "avx2,fma,popcnt")]
+pub(super) fn closest_seen<T: Copy>(
+    buffer: &ItemBuffer,
+    rays: impl Iterator<Item = (Ray, T)>,
+    accept: impl Fn(&T, &Hit) -> bool,
+    found: impl FnMut(T, Option<Hit>),
+    left: impl FnMut(Ray, T),
+) {
+    let triangles = |block: &Block, ray: &Setup, t_max| triangles(block, ray, t_max);
+    buffer.closest_with(rays, accept, found, left, triangles);
 }
 
 /// [`slabs`] as tests want it.

@@ -6,6 +6,7 @@ use std::arch::aarch64::{
     vmvnq_u32, vorrq_u32, vsubq_f32,
 };
 
+use super::item_buffer::ItemBuffer;
 use super::kernel::{BoxHits, Setup, Stacks, TriangleHits, WIDEN, put, trace_with};
 use super::light_buffer::LightBuffer;
 use super::triangle_bvh::{Block, LANES};
@@ -46,6 +47,19 @@ pub(super) fn occluded<T: Copy>(
 ) {
     let triangles = |block: &Block, ray: &Setup, t_max| triangles(block, ray, t_max);
     buffer.occluded_with(rays, accept, found, left, triangles);
+}
+
+/// [`ItemBuffer::closest`] compiled for NEON.
+#[target_feature(enable = "neon")]
+pub(super) fn closest_seen<T: Copy>(
+    buffer: &ItemBuffer,
+    rays: impl Iterator<Item = (Ray, T)>,
+    accept: impl Fn(&T, &Hit) -> bool,
+    found: impl FnMut(T, Option<Hit>),
+    left: impl FnMut(Ray, T),
+) {
+    let triangles = |block: &Block, ray: &Setup, t_max| triangles(block, ray, t_max);
+    buffer.closest_with(rays, accept, found, left, triangles);
 }
 
 /// Minima and maxima are those that pass over a NaN, as `f32::min` and `f32::max` do: of a ray that

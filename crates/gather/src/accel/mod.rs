@@ -14,6 +14,7 @@ mod build;
 mod cache;
 mod cells;
 mod collapse;
+mod item_buffer;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_avx2;
@@ -31,6 +32,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
 pub(crate) use cache::AccelCache;
+pub(crate) use item_buffer::{ItemBuffer, Pyramid};
 pub(crate) use kernel::{Kernel, Stacks, fetch_ahead};
 pub(crate) use light_buffer::LightBuffer;
 pub(crate) use triangle_bvh::TriangleBvh;

@@ -1,4 +1,5 @@
 mod crowd;
+mod item_buffer;
 mod lanes;
 mod light_buffer;
 

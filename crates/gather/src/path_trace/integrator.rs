@@ -10,7 +10,7 @@ use lumencast_light::LightField;
 
 use super::beam::{Beam, Found, Lit, solid_angle};
 use super::group::{Group, Shader};
-use crate::accel::{Hit, Kernel, Ray, Stacks};
+use crate::accel::{Hit, ItemBuffer, Kernel, Ray, Stacks};
 use crate::sampling::Sampler;
 use crate::world::{Itself, Passing, World};
 
@@ -28,6 +28,8 @@ pub(crate) struct Paths<'a> {
     pub(crate) previous: Option<&'a LightField>,
     /// The rays of a light that paths are connected to.
     pub(crate) beam: Option<&'a Beam>,
+    /// What most paths' first rays meet.
+    pub(crate) items: Option<&'a ItemBuffer>,
     /// The punctual light of which to note where paths found it, by its number.
     pub(crate) learn: Option<usize>,
 }
@@ -41,6 +43,7 @@ impl Paths<'_> {
             roulette_from: u32::MAX,
             previous: None,
             beam: None,
+            items: None,
             learn: None,
         }
     }
@@ -265,17 +268,21 @@ impl<'a> Integrator<'a> {
 
     /// Traces the rays in hand.
     fn find_surfaces(&mut self, depth: u32) {
-        let Self { world, alive, paths, hits, stacks, .. } = self;
+        let Self { world, limits, alive, paths, hits, stacks, .. } = self;
         self.rays += alive.len() as u64;
         let rays = alive.iter().map(|&index| (paths[index as usize].segment.ray, index));
         let passing = |index: u32| {
             let path = &paths[index as usize];
             Passing { ends: [path.segment.from, None], key: path.key(depth) }
         };
-        world.closest(rays, stacks, passing, |index, hit| {
+        let found = |index: u32, hit: Option<Hit>| {
             hit.iter().for_each(|hit| world.fetch_triangle(hit));
             hits[index as usize] = hit;
-        });
+        };
+        match limits.items.filter(|_| depth == 0) {
+            Some(items) => world.closest_seen(items, rays, stacks, passing, found),
+            None => world.closest(rays, stacks, passing, found),
+        }
     }
 
     /// Traces the shadow rays and adds the light of those that arrive.

@@ -47,7 +47,8 @@ impl Renderer {
     /// judge one by the other, give them different seeds.
     #[must_use]
     pub fn frame(&self, number: u32) -> Frame {
-        let tiles = self.tiles(|integrator, corner| self.samples(integrator, corner, number));
+        let tiles =
+            self.tiles(self.paths(), |integrator, corner| self.samples(integrator, corner, number));
         let size = self.settings.size;
         Frame { size, samples: assemble(size, &tiles) }
     }

@@ -9,7 +9,7 @@ use lumencast_scene::{Snapshot, View};
 use rayon::prelude::*;
 
 use super::{Film, Filter};
-use crate::accel::Kernel;
+use crate::accel::{ItemBuffer, Kernel, Pyramid};
 use crate::path_trace::beam::Beam;
 use crate::path_trace::integrator::{Integrator, Look, Paths, Seen};
 use crate::path_trace::{Levels, MaterialModel};
@@ -113,6 +113,8 @@ pub struct Renderer {
     pub(super) settings: PictureSettings,
     /// Found when the first paths are to be followed.
     beam: OnceLock<Option<Beam>>,
+    /// Found when the first pass begins.
+    items: OnceLock<Option<ItemBuffer>>,
     pool: rayon::ThreadPool,
 }
 
@@ -141,7 +143,7 @@ impl Renderer {
             )
         };
         let world = pool.install(build);
-        Ok(Self { world, view, settings, beam: OnceLock::new(), pool })
+        Ok(Self { world, view, settings, beam: OnceLock::new(), items: OnceLock::new(), pool })
     }
 
     /// Whether paths are connected to what a directional light has been followed to: as
@@ -168,8 +170,9 @@ impl Renderer {
         let samples = share.saturating_sub(first).min(PASS);
         let places: Vec<u32> = (first..first + samples).map(|n| film.place(half, n)).collect();
         let tiles = self.tile_count();
+        let paths = Paths { items: self.items(), ..self.paths() };
         let (done, stopped, rays) = (AtomicU64::new(0), AtomicBool::new(false), AtomicU64::new(0));
-        let found = self.tiles(|integrator, corner| {
+        let found = self.tiles(paths, |integrator, corner| {
             if stopped.load(Ordering::Relaxed) {
                 return Vec::new();
             }
@@ -213,10 +216,11 @@ impl Renderer {
     /// What `of` makes of each tile, given its upper left pixel, on all threads.
     pub(super) fn tiles<T: Send>(
         &self,
+        paths: Paths<'_>,
         of: impl Fn(&mut Integrator<'_>, UVec2) -> Vec<T> + Sync,
     ) -> Vec<Vec<T>> {
         let across = self.settings.size.x.div_ceil(TILE);
-        let paths = Paths { beam: self.beam(), ..self.paths() };
+        let paths = Paths { beam: self.beam(), ..paths };
         self.batches(paths, self.tile_count(), |integrator, tile| {
             of(integrator, TILE * UVec2::new(tile % across, tile / across))
         })
@@ -224,6 +228,14 @@ impl Renderer {
 
     fn beam(&self) -> Option<&Beam> {
         self.beam.get_or_init(|| self.find_beam()).as_ref()
+    }
+
+    fn items(&self) -> Option<&ItemBuffer> {
+        let find = || {
+            let pyramid = pyramid(&self.view, self.settings.size)?;
+            self.pool.install(|| self.world.item_buffer(&pyramid))
+        };
+        self.items.get_or_init(find).as_ref()
     }
 
     /// The paths to follow, without a beam.
@@ -267,6 +279,20 @@ impl Renderer {
             Look { origin, direction, sampler }
         }
     }
+}
+
+/// The camera rays of a perspective view.
+fn pyramid(view: &View, size: UVec2) -> Option<Pyramid> {
+    let rays = view.rays(size.x as f32 / size.y as f32);
+    let half = [rays.right.length(), rays.up.length()];
+    let pixel = 2.0 * half[1] / size.y as f32;
+    rays.is_perspective.then(|| Pyramid {
+        eye: rays.eye,
+        axes: [rays.right / half[0], rays.up / half[1], rays.forward],
+        // Filters reach beyond the picture.
+        half: half.map(|half| half + 2.0 * pixel),
+        pixel,
+    })
 }
 
 fn part(seen: &Seen, parts: Parts) -> Vec3 {

@@ -1,0 +1,286 @@
+//! What camera rays meet first, found without a walk through a tree.
+//!
+//! They all start at one point, so that two coordinates tell what a ray may meet ([`super::cells`];
+//! Weghorst, Hooper and Greenberg 1984, "Improved Computational Methods for Ray Tracing", there called
+//! an item buffer). A cell is about a pixel; most list the one or two blocks that are seen there.
+//!
+//! Coordinates are the camera's, divided by the depth; a height is 1 over the depth. So planes stay
+//! planes, the nearest are the highest, and what is true of parallel rays is true of these.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::cells::{AHEAD, Cells, Flat, Listed, Margins, Shape, corners};
+use super::kernel::{Kernel, Setup, TriangleHits, nearest, triangles_portable};
+use super::triangle_bvh::Block;
+use super::{Accel, Hit, Ray, TriangleBvh, fetch_ahead};
+
+/// What is nearer to the eye than this share of the scene's size is listed for all cells.
+const NEAR: f64 = 1e-4;
+/// Most cells; where pixels are more, some share a cell.
+const CELLS: f64 = (1 << 21) as f64;
+/// How much farther than what a ray has met a block may seem to be and still be tested.
+const FARTHER: f32 = 1.0 + 1e-5;
+
+/// The rays through a picture, from one point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pyramid {
+    /// Where they all start, metres.
+    pub(crate) eye: Vec3,
+    /// To the right, up and ahead; unit, in any angles that span space.
+    pub(crate) axes: [Vec3; 3],
+    /// How far they go to the right and up, at most, for one step ahead.
+    pub(crate) half: [f32; 2],
+    /// Rays that differ by less, a step ahead, may as well be looked up together.
+    pub(crate) pixel: f32,
+}
+
+/// What is seen from a point.
+#[derive(Debug)]
+pub(crate) struct ItemBuffer {
+    kernel: Kernel,
+    eye: Vec3,
+    axes: [Vec3; 3],
+    cells: Cells,
+    /// Whose blocks are listed.
+    bvh: Arc<TriangleBvh>,
+    /// The instance that the blocks count from.
+    instance: u32,
+}
+
+impl ItemBuffer {
+    /// For rays of a pyramid. `is_opaque` tells of the primitives (instance, primitive) whose triangles
+    /// stop every ray. `None` where the structure is not a single hierarchy in the world, or is empty.
+    pub(crate) fn new(
+        accel: &Accel,
+        pyramid: &Pyramid,
+        is_opaque: impl Fn(u32, u32) -> bool + Sync,
+    ) -> Option<Self> {
+        let (instance, bvh) = accel.whole()?;
+        let is_opaque = |block: &Block, lane: usize| {
+            is_opaque(instance + block.instance[lane], block.primitive[lane])
+        };
+        let half = pyramid.half.map(f64::from);
+        let pixel = f64::from(pyramid.pixel);
+        // Of a few roundings of a unit direction, divided by how far it goes ahead.
+        let share = 32.0 * f64::from(f32::EPSILON);
+        let aside = share * (1.0 + half[0] + half[1]).powi(2);
+        let margins = Margins { aside, beside: 0.0, above: 0.0, share };
+        let rectangle = Flat { low: half.map(|v| -v), high: half }.grown(4.0 * aside);
+        let count = (4.0 * half[0] * half[1] / (pixel * pixel)).min(CELLS);
+        let bounds = accel.bounds();
+        let camera = Camera {
+            eye: pyramid.eye.to_array().map(f64::from),
+            axes: pyramid.axes.map(|axis| axis.to_array().map(f64::from)),
+            near: NEAR * f64::from((bounds.max - bounds.min).length()),
+            rectangle,
+        };
+        let shape = |block: &Block, lane: usize| camera.shape(corners(block, lane));
+        let cells = Cells::over(&bvh.blocks, &rectangle, count, margins, shape, is_opaque)?;
+        let Pyramid { eye, axes, .. } = *pyramid;
+        Some(Self { kernel: accel.kernel(), eye, axes, cells, bvh: bvh.clone(), instance })
+    }
+
+    /// Finds the nearest surface that `accept` lets count on each of the rays, like [`Accel::closest`].
+    /// Rays that it cannot tell of are passed to `left`.
+    #[inline]
+    pub(crate) fn closest<T: Copy>(
+        &self,
+        rays: impl Iterator<Item = (Ray, T)>,
+        accept: impl Fn(&T, &Hit) -> bool,
+        found: impl FnMut(T, Option<Hit>),
+        left: impl FnMut(Ray, T),
+    ) {
+        match self.kernel {
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Avx2(_) => {
+                #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
+                // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for what it needs.
+                unsafe {
+                    super::kernel_avx2::closest_seen(self, rays, accept, found, left);
+                }
+            }
+            #[cfg(target_arch = "aarch64")]
+            Kernel::Neon => {
+                #[expect(unsafe_code, reason = "calls code compiled for NEON")]
+                // SAFETY: `kernel_neon` refuses to compile for a target without NEON.
+                unsafe {
+                    super::kernel_neon::closest_seen(self, rays, accept, found, left);
+                }
+            }
+            Kernel::Portable => {
+                self.closest_with(rays, accept, found, left, triangles_portable);
+            }
+        }
+    }
+
+    /// [`Self::closest`], by what tests a block. Each step is taken for several rays before the next,
+    /// while what they ask for is on its way.
+    #[inline(always)]
+    pub(super) fn closest_with<T: Copy>(
+        &self,
+        mut rays: impl Iterator<Item = (Ray, T)>,
+        accept: impl Fn(&T, &Hit) -> bool,
+        mut found: impl FnMut(T, Option<Hit>),
+        mut left: impl FnMut(Ray, T),
+        triangles: impl Fn(&Block, &Setup, f32) -> TriangleHits,
+    ) {
+        let mut queries: Vec<Query<T>> = Vec::with_capacity(AHEAD);
+        loop {
+            queries.extend(rays.by_ref().take(AHEAD).map(|(ray, with)| self.query(ray, with)));
+            if queries.is_empty() {
+                return;
+            }
+            for query in &mut queries {
+                self.look_up(query);
+            }
+            for query in queries.drain(..) {
+                match self.nearest(&query, &accept, &triangles) {
+                    Some(hit) => found(query.with, hit),
+                    None => left(query.ray, query.with),
+                }
+            }
+        }
+    }
+
+    /// Asks for the cell that a ray goes through.
+    #[inline(always)]
+    fn query<T>(&self, ray: Ray, with: T) -> Query<'_, T> {
+        let [x, y, z] = self.axes.map(|axis| axis.dot(ray.direction));
+        // Rays from elsewhere go through none, nor do those that go back or end.
+        let is_seen = ray.origin == self.eye && z > 0.0 && ray.t_max == f32::INFINITY;
+        let at = if is_seen { [x / z, y / z] } else { [f32::NAN; 2] };
+        Query { with, ray, depth: z, cell: self.cells.find(at), covered: false, listed: &[] }
+    }
+
+    /// Asks for what is seen through the cell.
+    #[inline(always)]
+    fn look_up<'a, T>(&'a self, query: &mut Query<'a, T>) {
+        let over = self.cells.look_up(query.cell);
+        query.listed = over.as_ref().map_or(&[Listed::TOO_MANY], |over| over.listed);
+        query.covered = over.is_some_and(|over| over.covered_below > f32::NEG_INFINITY);
+        if let Some(block) =
+            query.listed.first().and_then(|l| self.bvh.blocks.get(l.block as usize))
+        {
+            fetch_ahead(block);
+        }
+    }
+
+    /// What the ray meets first; `None` where the hierarchy has to tell.
+    #[inline(always)]
+    fn nearest<T>(
+        &self,
+        query: &Query<'_, T>,
+        accept: &impl Fn(&T, &Hit) -> bool,
+        triangles: &impl Fn(&Block, &Setup, f32) -> TriangleHits,
+    ) -> Option<Option<Hit>> {
+        let Query { ray, listed, .. } = query;
+        if listed.first().is_some_and(Listed::is_too_many) {
+            return None;
+        }
+        let setup = Setup::new(ray.origin.into(), ray.direction.into());
+        let mut t_max = f32::INFINITY;
+        let mut best = None;
+        for listed in *listed {
+            // All that is left is farther away.
+            if best.is_some() && listed.height * query.depth * t_max * FARTHER < 1.0 {
+                break;
+            }
+            let block = &self.bvh.blocks[listed.block as usize];
+            let hits = triangles(block, &setup, t_max);
+            if hits.mask == 0 {
+                continue;
+            }
+            if let Some(hit) = nearest(block, self.instance, hits, |hit| accept(&query.with, hit)) {
+                t_max = hit.t;
+                best = Some(hit);
+            }
+        }
+        // To have passed what covers the cell would be a surprise.
+        (best.is_some() || !query.covered).then_some(best)
+    }
+}
+
+/// A ray on its way through the steps.
+struct Query<'a, T> {
+    with: T,
+    ray: Ray,
+    /// How far ahead it is at its end, of which t counts the lengths.
+    depth: f32,
+    cell: usize,
+    /// Something covers the cell.
+    covered: bool,
+    /// What is seen through it.
+    listed: &'a [Listed],
+}
+
+/// How triangles are seen.
+struct Camera {
+    eye: [f64; 3],
+    axes: [[f64; 3]; 3],
+    /// What is nearer is not divided by its depth.
+    near: f64,
+    rectangle: Flat,
+}
+
+impl Camera {
+    /// Right, up and ahead.
+    fn from_world(&self, point: [f64; 3]) -> [f64; 3] {
+        let [x, y, z] = [0, 1, 2].map(|axis| point[axis] - self.eye[axis]);
+        self.axes.map(|axis| axis[0] * x + axis[1] * y + axis[2] * z)
+    }
+
+    fn projected([x, y, z]: [f64; 3]) -> [f64; 3] {
+        let height = 1.0 / z;
+        [x * height, y * height, height]
+    }
+
+    /// `None` behind the eye.
+    fn shape(&self, corners: [[f64; 3]; 3]) -> Option<Shape> {
+        let corners = corners.map(|corner| self.from_world(corner));
+        let nearest = corners.iter().fold(f64::INFINITY, |nearest, p| nearest.min(p[2]));
+        if nearest >= self.near {
+            return Some(Shape::new(corners.map(Self::projected)));
+        }
+        let behind = clipped(&clipped(&corners, 0.0, 1.0), self.near, -1.0);
+        let rays = Flat {
+            low: self.rectangle.low.map(|v| v * self.near),
+            high: self.rectangle.high.map(|v| v * self.near),
+        };
+        if Flat::around(behind.iter().copied()).meets(&rays) {
+            return Some(Shape::anywhere(&self.rectangle));
+        }
+        let ahead = clipped(&corners, self.near, 1.0);
+        let points: Vec<_> = ahead.into_iter().map(Self::projected).collect();
+        let (&[a, b, c], rest) = points.split_first_chunk()?;
+        Some(Shape::rest([a, b, c, *rest.first().unwrap_or(&c)], plane(corners)))
+    }
+}
+
+/// How 1 over the depth grows across the plane through three points.
+fn plane([a, b, c]: [[f64; 3]; 3]) -> [f64; 2] {
+    let from_first = |p: [f64; 3]| [0, 1, 2].map(|k| p[k] - a[k]);
+    let ([bx, by, bz], [cx, cy, cz]) = (from_first(b), from_first(c));
+    let normal = [by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx];
+    let distance: f64 = (0..3).map(|k| normal[k] * a[k]).sum();
+    [normal[0] / distance, normal[1] / distance]
+}
+
+/// The part of a convex polygon whose depth is at least `depth`; at most, where `sign` is −1.
+fn clipped(polygon: &[[f64; 3]], depth: f64, sign: f64) -> Vec<[f64; 3]> {
+    let above = |point: &[f64; 3]| sign * (point[2] - depth);
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (n, point) in polygon.iter().enumerate() {
+        let next = &polygon[(n + 1) % polygon.len()];
+        if above(point) >= 0.0 {
+            kept.push(*point);
+        }
+        if (above(point) < 0.0) != (above(next) < 0.0) {
+            let share = above(point) / (above(point) - above(next));
+            let [x, y] = [0, 1].map(|k| point[k] + share * (next[k] - point[k]));
+            kept.push([x, y, depth]);
+        }
+    }
+    kept
+}
