@@ -15,7 +15,7 @@ use std::time::Instant;
 
 use glam::{Affine3A, Vec3};
 use lumencast_gather::measure::{RayBench, TestRay, build_seconds, scattered, top_level_seconds};
-use lumencast_gather::path_trace::Levels;
+use lumencast_gather::path_trace::{Levels, Trees};
 use lumencast_scene::{Scene, Snapshot};
 use lumencast_testkit::embree::{Embree, EmbreeInstances, Quality};
 use rayon::prelude::*;
@@ -45,15 +45,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{name}: {} triangles, {} rays, {pool} threads", triangles.len(), bench.closest.len());
 
     let build = |robust| Embree::new(library.as_ref(), &triangles, Quality::Medium, robust, pool);
-    let mut builds = [Vec::new(), Vec::new()];
+    let kinds = [
+        (Levels::One, Trees::AsBuilt),
+        (Levels::Two, Trees::AsBuilt),
+        (Levels::One, Trees::Improved),
+    ];
+    let mut builds = kinds.map(|_| Vec::new());
     for _ in 0..ROUNDS {
         let theirs = seconds(|| build(true).map(drop));
-        for (ratios, levels) in builds.iter_mut().zip([Levels::One, Levels::Two]) {
-            ratios.push(theirs / bench.install(|| build_seconds(&snapshot, levels)));
+        for (ratios, (levels, trees)) in builds.iter_mut().zip(kinds) {
+            ratios.push(theirs / bench.install(|| build_seconds(&snapshot, levels, trees)));
         }
     }
-    let [one, two] = builds.map(median);
-    println!("build: {one:.2} of Embree's speed, in two levels {two:.2}");
+    let [one, two, improved] = builds.map(median);
+    println!("build: {one:.2} of Embree's speed, in two levels {two:.2}; improved {improved:.2}");
 
     let first = &snapshot.instances[0];
     let mesh = triangles[..first.mesh.triangle_count()].to_vec();

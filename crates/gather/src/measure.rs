@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::accel::{AccelCache, Hit, Kernel, Ray, Stacks};
 use crate::bsdf::frame;
-use crate::path_trace::{Levels, MaterialModel};
+use crate::path_trace::{Levels, MaterialModel, Trees};
 use crate::sampling::{Sampler, cosine_hemisphere, mix2};
 use crate::world::{Passing, World, WorldCache, itself};
 
@@ -233,8 +233,8 @@ fn world(scene: &Arc<Snapshot>, levels: Levels) -> World {
 
 /// Seconds of building every hierarchy of a scene from nothing, on the calling thread's pool.
 #[must_use]
-pub fn build_seconds(scene: &Arc<Snapshot>, levels: Levels) -> f64 {
-    update_seconds(&mut AccelCache::new(levels), scene)
+pub fn build_seconds(scene: &Arc<Snapshot>, levels: Levels, trees: Trees) -> f64 {
+    update_seconds(&mut AccelCache::new(levels).with_trees(trees), scene)
 }
 
 /// The most memory, bytes, that building every hierarchy of a scene takes at once, what is kept of it

@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use lumencast_gather::measure::{RayBench, build_peak_bytes, build_seconds, top_level_seconds};
-use lumencast_gather::path_trace::Levels;
+use lumencast_gather::path_trace::{Levels, Trees};
 use serde_json::json;
 
 use super::Spread;
@@ -68,7 +68,7 @@ impl BenchRays {
             "no path from this camera meets two surfaces: choose another with --camera"
         );
         let bar = output::bar(self.rounds.into(), "Tracing");
-        let [mut closest, mut any, mut build, mut top] = [const { Vec::new() }; 4];
+        let [mut closest, mut any, mut build, mut improved, mut top] = [const { Vec::new() }; 5];
         let mut hits = (0, 0);
         for _ in 0..self.rounds {
             let start = Instant::now();
@@ -78,7 +78,9 @@ impl BenchRays {
             let occluded = bench.trace_any(&bench.any);
             any.push(bench.any.len() as f64 / start.elapsed().as_secs_f64());
             hits = (found.iter().flatten().count(), occluded.iter().filter(|o| **o).count());
-            build.push(1e3 * bench.install(|| build_seconds(&snapshot, levels)));
+            let seconds = |trees| bench.install(|| build_seconds(&snapshot, levels, trees));
+            build.push(1e3 * seconds(Trees::AsBuilt));
+            improved.push(1e3 * seconds(Trees::Improved));
             top.push(1e3 * bench.install(|| top_level_seconds(&snapshot, INSTANCES)));
             bar.inc(1);
         }
@@ -89,7 +91,8 @@ impl BenchRays {
         let a_triangle = |bytes: f64| bytes / triangles as f64;
         let bytes = a_triangle(bench.bytes() as f64);
         let peak = peak.map(|peak| a_triangle(peak as f64));
-        let [closest, any, build, top] = [closest, any, build, top].map(Spread::of);
+        let [closest, any, build, improved, top] =
+            [closest, any, build, improved, top].map(Spread::of);
         if self.json {
             return output::json(&json!({
                 "scene": scene.name(),
@@ -101,6 +104,7 @@ impl BenchRays {
                 "closest_a_second": closest,
                 "any_a_second": any,
                 "build_ms": build,
+                "build_improved_ms": improved,
                 "top_level_ms": top,
                 "top_level_instances": INSTANCES,
                 "bytes_a_triangle": bytes,
@@ -122,6 +126,7 @@ impl BenchRays {
             println!("{name:<12} {:.2} ms ({:.2} to {:.2})", times.median, times.min, times.max);
         };
         time("build", &build);
+        time("improved", &improved);
         time("top level", &top);
         println!("memory       {bytes:.1} bytes a triangle");
         if let Some(peak) = peak {

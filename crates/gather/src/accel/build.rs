@@ -2,6 +2,7 @@
 //! SAH-based bounding volume hierarchies").
 
 mod bins;
+mod reinsert;
 
 use std::ops::Range;
 
@@ -13,7 +14,9 @@ use super::pages::Pages;
 use bins::Plane;
 
 /// Below this depth, splits halve the number of items, so that depth is bounded whatever the input.
-pub(super) const SAH_DEPTH: u32 = 40;
+const SAH_DEPTH: u32 = 40;
+/// No tree has more levels: what is left below [`SAH_DEPTH`] is at most 2³⁰ items, halved.
+pub(super) const DEEPEST: u32 = SAH_DEPTH + 31;
 /// Ranges smaller than this are built by one thread.
 const PARALLEL: usize = 1024;
 /// Ranges not smaller than this are looked at by several.
@@ -65,8 +68,7 @@ impl Item {
     }
 }
 
-/// A binary tree over items. What lies on one side of a plane comes before what lies on the other, in
-/// both lists.
+/// A binary tree over items.
 #[derive(Debug)]
 pub(super) struct BinaryTree {
     nodes: Pages<BinaryNode>,
@@ -281,7 +283,7 @@ mod tests {
     use crate::accel::tests::random;
 
     /// Boxes of many sizes, two things in every third, and a heap of equal ones.
-    fn items(count: u32) -> Vec<Item> {
+    pub(super) fn items(count: u32) -> Vec<Item> {
         let item = |n: u32| {
             let at = if n.is_multiple_of(8) { Vec3A::ONE } else { Vec3A::from(random(50, n)) };
             let size = 0.1 * Vec3A::from(random(51, n)).powf(4.0);
@@ -295,7 +297,7 @@ mod tests {
     }
 
     /// Indices by leaf, in order; boxes hold what is below them.
-    fn leaves(tree: Subtree<'_>, all: &mut Vec<Vec<usize>>) {
+    pub(super) fn leaves(tree: Subtree<'_>, all: &mut Vec<Vec<usize>>) {
         let holds = |inner: Aabb| assert_eq!(tree.bounds().union(inner), tree.bounds());
         if let Some(sides) = tree.sides() {
             for side in sides {

@@ -8,7 +8,7 @@ use glam::Affine3A;
 use lumencast_scene::{Deformation, Instance, Mesh, NodeId, Snapshot};
 use rayon::prelude::*;
 
-use super::{Accel, Kernel, Levels, TriangleBvh};
+use super::{Accel, Kernel, Levels, Trees, TriangleBvh};
 
 /// Keeps one hierarchy a mesh (by the mesh's pointer) and one a deforming instance (by its node),
 /// and drops those that the latest snapshot does not use. With one level, keeps that of the latest
@@ -16,6 +16,8 @@ use super::{Accel, Kernel, Levels, TriangleBvh};
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
     levels: Levels,
+    /// How those that last are built.
+    trees: Trees,
     whole: Option<(Arc<Snapshot>, Arc<TriangleBvh>)>,
     pub(super) rigid: HashMap<Address, Kept<()>>,
     pub(super) deforming: HashMap<(NodeId, Address), Kept<Arc<Deformation>>>,
@@ -42,6 +44,11 @@ impl AccelCache {
         Self { levels, ..Self::default() }
     }
 
+    /// Which does less for hierarchies than it would.
+    pub(crate) fn with_trees(self, trees: Trees) -> Self {
+        Self { trees, ..self }
+    }
+
     pub(crate) fn levels(&self) -> Levels {
         self.levels
     }
@@ -53,7 +60,8 @@ impl AccelCache {
             return Accel::new([whole], kernel);
         }
         let rigid = snapshot.instances.iter().filter(|i| i.deformation.is_none());
-        update_all(&mut self.rigid, rigid.map(|i| (address(&i.mesh), i)), Kept::rigid);
+        let (trees, rigid) = (self.trees, rigid.map(|i| (address(&i.mesh), i)));
+        update_all(&mut self.rigid, rigid, |kept, i| Kept::rigid(kept, i, trees));
         let deforming =
             snapshot.instances.iter().filter_map(|i| Some((i, i.deformation.as_ref()?)));
         update_all(
@@ -77,7 +85,7 @@ impl AccelCache {
         {
             return bvh.clone();
         }
-        let bvh = Arc::new(TriangleBvh::whole(&snapshot.instances));
+        let bvh = Arc::new(TriangleBvh::whole(&snapshot.instances, self.trees));
         self.whole = Some((snapshot.clone(), bvh.clone()));
         bvh
     }
@@ -104,11 +112,11 @@ fn update_all<K, I, D>(
 }
 
 impl Kept<()> {
-    fn rigid(kept: Option<Self>, instance: &Instance) -> Self {
+    fn rigid(kept: Option<Self>, instance: &Instance, trees: Trees) -> Self {
         kept.unwrap_or_else(|| Self {
             mesh: instance.mesh.clone(),
             deformation: (),
-            bvh: Arc::new(TriangleBvh::build(&instance.mesh, None)),
+            bvh: Arc::new(TriangleBvh::build(&instance.mesh, None, trees)),
         })
     }
 }
@@ -122,7 +130,11 @@ impl Kept<Arc<Deformation>> {
             return Self {
                 mesh: instance.mesh.clone(),
                 deformation: deformation.clone(),
-                bvh: Arc::new(TriangleBvh::build(&instance.mesh, Some(deformation.vertices()))),
+                bvh: Arc::new(TriangleBvh::build(
+                    &instance.mesh,
+                    Some(deformation.vertices()),
+                    Trees::AsBuilt,
+                )),
             };
         };
         if !Arc::ptr_eq(&kept.deformation, deformation) {

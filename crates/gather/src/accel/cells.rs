@@ -83,9 +83,10 @@ pub(super) struct Over<'a> {
 }
 
 impl Cells {
-    /// Divides a rectangle into about so many cells and lists blocks over them. `shape` tells how the
-    /// rays see the triangle of a block's lane, if they can meet it; `is_opaque`, whether it stops
-    /// all of them that do not start at it. `None` where there is nothing to speak of.
+    /// Divides a rectangle into about so many cells, fewer where very much lies over each other, and
+    /// lists blocks over them. `shape` tells how the rays see the triangle of a block's lane, if they
+    /// can meet it; `is_opaque`, whether it stops all of them that do not start at it. `None` where
+    /// there is nothing to speak of.
     pub(super) fn over(
         blocks: &[Block],
         rectangle: &Flat,

@@ -136,9 +136,13 @@ impl ItemBuffer {
                 self.look_up(query);
             }
             for query in queries.drain(..) {
-                match self.nearest(&query, &accept, &triangles) {
-                    Some(hit) => found(query.with, hit),
-                    None => left(query.ray, query.with),
+                let is_listed = !query.listed.first().is_some_and(Listed::is_too_many);
+                let hit = is_listed.then(|| self.first_met(&query, &accept, &triangles)).flatten();
+                // To have passed what covers the cell would be a surprise.
+                if hit.is_some() || is_listed && !query.covered {
+                    found(query.with, hit);
+                } else {
+                    left(query.ray, query.with);
                 }
             }
         }
@@ -167,18 +171,15 @@ impl ItemBuffer {
         }
     }
 
-    /// What the ray meets first; `None` where the hierarchy has to tell.
+    /// What the ray meets first of all that is listed.
     #[inline(always)]
-    fn nearest<T>(
+    fn first_met<T>(
         &self,
         query: &Query<'_, T>,
         accept: &impl Fn(&T, &Hit) -> bool,
         triangles: &impl Fn(&Block, &Setup, f32) -> TriangleHits,
-    ) -> Option<Option<Hit>> {
+    ) -> Option<Hit> {
         let Query { ray, listed, .. } = query;
-        if listed.first().is_some_and(Listed::is_too_many) {
-            return None;
-        }
         let setup = Setup::new(ray.origin.into(), ray.direction.into());
         let mut t_max = f32::INFINITY;
         let mut best = None;
@@ -197,8 +198,7 @@ impl ItemBuffer {
                 best = Some(hit);
             }
         }
-        // To have passed what covers the cell would be a surprise.
-        (best.is_some() || !query.covered).then_some(best)
+        best
     }
 }
 
@@ -206,7 +206,7 @@ impl ItemBuffer {
 struct Query<'a, T> {
     with: T,
     ray: Ray,
-    /// How far ahead it is at its end, of which t counts the lengths.
+    /// Depth for each unit of t.
     depth: f32,
     cell: usize,
     /// Something covers the cell.
@@ -225,8 +225,8 @@ struct Camera {
 }
 
 impl Camera {
-    /// Right, up and ahead.
-    fn from_world(&self, point: [f64; 3]) -> [f64; 3] {
+    /// A point's coordinates to the right, up and ahead.
+    fn seen(&self, point: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = [0, 1, 2].map(|axis| point[axis] - self.eye[axis]);
         self.axes.map(|axis| axis[0] * x + axis[1] * y + axis[2] * z)
     }
@@ -238,7 +238,7 @@ impl Camera {
 
     /// `None` behind the eye.
     fn shape(&self, corners: [[f64; 3]; 3]) -> Option<Shape> {
-        let corners = corners.map(|corner| self.from_world(corner));
+        let corners = corners.map(|corner| self.seen(corner));
         let nearest = corners.iter().fold(f64::INFINITY, |nearest, p| nearest.min(p[2]));
         if nearest >= self.near {
             return Some(Shape::new(corners.map(Self::projected)));

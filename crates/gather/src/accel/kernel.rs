@@ -20,7 +20,7 @@
 
 use glam::Vec3A;
 
-use super::build::SAH_DEPTH;
+use super::build::DEEPEST;
 use super::triangle_bvh::{Block, LANES};
 use super::wide::{LEAF, Node};
 use super::{Accel, Hit, Placed, Ray};
@@ -75,11 +75,11 @@ const IN_FLIGHT: usize = 4;
 #[derive(Debug, Default)]
 pub(crate) struct Stacks(Box<[Stack; IN_FLIGHT]>);
 
-/// The most that a ray ever has still to visit. A tree has at most [`SAH_DEPTH`] + 31 binary levels,
+/// The most that a ray ever has still to visit. A tree has at most [`DEEPEST`] binary levels,
 /// each node takes one of them at least and leaves at most seven children behind: 498 entries for
 /// each of the two hierarchies.
 const DEPTH: usize = 1024;
-const _: () = assert!(2 * (1 + 7 * (SAH_DEPTH as usize + 31)) <= DEPTH);
+const _: () = assert!(2 * (1 + 7 * DEEPEST as usize) <= DEPTH);
 
 /// What is still to be visited by one ray, the next on top.
 #[derive(Debug)]

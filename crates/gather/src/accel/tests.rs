@@ -84,8 +84,9 @@ fn ball(rings: u32, bumps: f32) -> Arc<Mesh> {
 }
 
 fn accel(meshes: &[(Affine3A, Arc<Mesh>)], kernel: Kernel) -> Accel {
-    let built =
-        (0..).zip(meshes).map(|(i, (m, mesh))| (i, *m, Arc::new(TriangleBvh::build(mesh, None))));
+    let built = (0..)
+        .zip(meshes)
+        .map(|(i, (m, mesh))| (i, *m, Arc::new(TriangleBvh::build(mesh, None, Trees::Improved))));
     Accel::new(built, kernel)
 }
 
@@ -370,9 +371,9 @@ fn refitted_is_as_good_as_rebuilt() {
             .map(|(i, p)| p + strength * (random(6, i / 3) - 0.5))
             .collect();
         let moved = vec![Vertices { positions, ..rest.clone() }];
-        let mut refitted = TriangleBvh::build(&mesh, None);
+        let mut refitted = TriangleBvh::build(&mesh, None, Trees::AsBuilt);
         refitted.refit(&mesh, &moved);
-        let rebuilt = TriangleBvh::build(&mesh, Some(&moved));
+        let rebuilt = TriangleBvh::build(&mesh, Some(&moved), Trees::AsBuilt);
         assert_eq!(refitted.bounds(), rebuilt.bounds());
         let accel = |bvh| Accel::new([(0, Affine3A::IDENTITY, Arc::new(bvh))], Kernel::detect());
         let (a, b) = (accel(refitted), accel(rebuilt));

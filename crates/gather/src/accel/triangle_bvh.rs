@@ -5,11 +5,11 @@ use glam::Vec3A;
 use lumencast_scene::{Instance, Mesh, Vertices};
 use rayon::prelude::*;
 
-use super::Aabb;
 use super::build::{BinaryTree, Item};
 use super::collapse::collapse;
 use super::pages::Pages;
 use super::wide::{LEAF, Node};
+use super::{Aabb, Trees};
 
 /// Triangles a leaf.
 pub(super) const LANES: usize = 4;
@@ -80,15 +80,15 @@ pub(crate) struct TriangleBvh {
 
 impl TriangleBvh {
     /// Builds over the mesh at rest, or over `deformed` vertices (one entry a primitive).
-    pub(crate) fn build(mesh: &Mesh, deformed: Option<&[Vertices]>) -> Self {
+    pub(crate) fn build(mesh: &Mesh, deformed: Option<&[Vertices]>, trees: Trees) -> Self {
         let source = Source { mesh, deformed };
-        Self::over(ids(0, mesh).collect(), |id| source.corners(id.primitive, id.triangle))
+        Self::over(ids(0, mesh).collect(), trees, |id| source.corners(id.primitive, id.triangle))
     }
 
     /// Builds over all triangles of instances, in world space.
-    pub(crate) fn whole(instances: &[Instance]) -> Self {
+    pub(crate) fn whole(instances: &[Instance], trees: Trees) -> Self {
         let all = (0..).zip(instances).flat_map(|(n, instance)| ids(n, &instance.mesh));
-        Self::over(all.collect(), |id| {
+        Self::over(all.collect(), trees, |id| {
             let instance = &instances[id.instance as usize];
             let deformed = instance.deformation.as_ref().map(|d| d.vertices());
             let source = Source { mesh: &instance.mesh, deformed };
@@ -97,12 +97,16 @@ impl TriangleBvh {
         })
     }
 
-    fn over(ids: Vec<Id>, corners: impl Fn(Id) -> [Vec3A; 3] + Sync) -> Self {
+    fn over(ids: Vec<Id>, trees: Trees, corners: impl Fn(Id) -> [Vec3A; 3] + Sync) -> Self {
         let chunks = ids.par_chunks(CHUNK).enumerate();
         let items: Vec<_> = chunks
             .map(|(n, chunk)| paired(n * CHUNK, chunk.iter().map(|&id| around(corners(id)))))
             .collect();
         let tree = BinaryTree::new(items.concat(), LANES);
+        let tree = match trees {
+            Trees::AsBuilt => tree,
+            Trees::Improved => tree.improved(),
+        };
         let (nodes, leaves) = collapse(&tree);
         let block = |leaf: usize| {
             let mut block = Block::EMPTY;
@@ -160,7 +164,7 @@ impl TriangleBvh {
         }
         self.bounds = self.nodes[0].bounds();
         if !self.bounds.min.is_finite() || cost(&self.nodes) > REBUILD_COST * self.cost {
-            *self = Self::build(mesh, Some(deformed));
+            *self = Self::build(mesh, Some(deformed), Trees::AsBuilt);
         }
     }
 }

@@ -22,7 +22,7 @@ use crate::accel::Kernel;
 use crate::world::{World, WorldCache};
 use crate::{Gather, Gathered, Job, Progress, Ticket};
 
-pub use crate::accel::Levels;
+pub use crate::accel::{Levels, Trees};
 pub use crate::surface::MaterialModel;
 use job::Watch;
 
