@@ -18,7 +18,6 @@ use bytemuck::{Pod, Zeroable};
 
 use super::kernel::fetch_line;
 use super::pages::Pages;
-use super::triangle_bvh::Block;
 use fill::Grid;
 pub(super) use shape::{Flat, Shape, corners};
 
@@ -83,21 +82,6 @@ pub(super) struct Over<'a> {
 }
 
 impl Cells {
-    /// Divides a rectangle into about so many cells, fewer where very much lies over each other, and
-    /// lists blocks over them. `shape` tells how the rays see the triangle of a block's lane, if they
-    /// can meet it; `is_opaque`, whether it stops all of them that do not start at it. `None` where
-    /// there is nothing to speak of.
-    pub(super) fn over(
-        blocks: &[Block],
-        rectangle: &Flat,
-        count: f64,
-        margins: Margins,
-        shape: impl Fn(&Block, usize) -> Option<Shape> + Sync,
-        is_opaque: impl Fn(&Block, usize) -> bool + Sync,
-    ) -> Option<Self> {
-        fill::over(blocks, rectangle, count, margins, shape, is_opaque)
-    }
-
     /// Asks for the cell at a place, and gives its number.
     #[inline(always)]
     pub(super) fn find(&self, at: [f32; 2]) -> usize {

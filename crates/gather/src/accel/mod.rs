@@ -58,7 +58,7 @@ pub enum Levels {
 pub enum Trees {
     /// Built top down, and that is it: for what changes its shape.
     AsBuilt,
-    /// Then improved, for as long again, where it is to last (Sponza: nearest hits 1.15 times as fast).
+    /// Then improved, for about as long again: for what lasts (Sponza: nearest hits 1.15 times as fast).
     #[default]
     Improved,
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{Aabb, BinaryNode, BinaryTree, DEEPEST, INNER};
 use crate::accel::pages::Pages;
 
-/// In each round the largest subtrees are moved, of so many one: the smaller ones are many and bring little.
+/// In each round one of so many subtrees is looked at, those with most surface: the others bring little.
 const SHARE: usize = 10;
 /// Most rounds.
 const ROUNDS: usize = 12;
@@ -18,8 +18,7 @@ const ENOUGH: f32 = 1e-3;
 const FEW: usize = 64;
 
 impl BinaryTree {
-    /// The tree with its subtrees where they add less surface, at the price of about as much time as
-    /// building it took.
+    /// The tree with its subtrees where they add less surface; takes about as long as building it.
     pub(in crate::accel) fn improved(self) -> Self {
         let mut nodes = Vec::with_capacity(self.len());
         add(&mut nodes, &self.nodes, NONE);

@@ -18,41 +18,46 @@ const DEEP: f64 = 64.0;
 /// Rows that are filled together.
 const BAND: usize = 16;
 
-/// As [`Cells::over`].
-pub(super) fn over(
-    blocks: &[Block],
-    rectangle: &Flat,
-    count: f64,
-    margins: Margins,
-    shape: impl Fn(&Block, usize) -> Option<Shape> + Sync,
-    is_opaque: impl Fn(&Block, usize) -> bool + Sync,
-) -> Option<Cells> {
-    let shapes = |block| used(block).filter_map(|lane| Some((lane, shape(block, lane)?)));
-    let around = |block| Flat::around(shapes(block).flat_map(|(_, shape)| shape.points));
-    let bounds: Vec<_> = blocks.par_iter().map(around).collect();
-    let covered: f64 = bounds.iter().map(|flat| flat.area_within(rectangle)).sum();
-    let depth = covered / rectangle.area_within(rectangle);
-    let count = if depth > DEEP { count * DEEP / depth } else { count };
-    let grid = Grid::new(rectangle, count)?;
-    let bands: Vec<_> = (0..grid.rows.div_ceil(BAND))
-        .into_par_iter()
-        .map(|n| {
-            let rows = n * BAND..grid.rows.min((n + 1) * BAND);
-            let mut band = Band::new(grid, rows, margins);
-            let reach = band.reach();
-            let near = || (0..).zip(blocks).zip(&bounds).filter(|(_, flat)| flat.meets(&reach));
-            for ((_, block), _) in near() {
-                let opaque = shapes(block).filter(|&(lane, _)| is_opaque(block, lane));
-                opaque.for_each(|(_, shape)| band.cover(&shape));
-            }
-            for ((n, block), _) in near() {
-                shapes(block).for_each(|(_, shape)| band.list(n, &shape));
-            }
-            band.finish()
-        })
-        .collect();
-    let (cells, listed) = joined(&bands);
-    Some(Cells { grid, cells, listed })
+impl Cells {
+    /// Divides a rectangle into about so many cells, fewer where very much lies over each other, and
+    /// lists blocks over them. `shape` tells how the rays see the triangle of a block's lane, if they
+    /// can meet it; `is_opaque`, whether it stops all of them that do not start at it. `None` where
+    /// there is nothing to speak of.
+    pub(in crate::accel) fn over(
+        blocks: &[Block],
+        rectangle: &Flat,
+        count: f64,
+        margins: Margins,
+        shape: impl Fn(&Block, usize) -> Option<Shape> + Sync,
+        is_opaque: impl Fn(&Block, usize) -> bool + Sync,
+    ) -> Option<Self> {
+        let shapes = |block| used(block).filter_map(|lane| Some((lane, shape(block, lane)?)));
+        let around = |block| Flat::around(shapes(block).flat_map(|(_, shape)| shape.points));
+        let bounds: Vec<_> = blocks.par_iter().map(around).collect();
+        let covered: f64 = bounds.iter().map(|flat| flat.area_within(rectangle)).sum();
+        let depth = covered / rectangle.area_within(rectangle);
+        let count = if depth > DEEP { count * DEEP / depth } else { count };
+        let grid = Grid::new(rectangle, count)?;
+        let bands: Vec<_> = (0..grid.rows.div_ceil(BAND))
+            .into_par_iter()
+            .map(|n| {
+                let rows = n * BAND..grid.rows.min((n + 1) * BAND);
+                let mut band = Band::new(grid, rows, margins);
+                let reach = band.reach();
+                let near = || (0..).zip(blocks).zip(&bounds).filter(|(_, flat)| flat.meets(&reach));
+                for ((_, block), _) in near() {
+                    let opaque = shapes(block).filter(|&(lane, _)| is_opaque(block, lane));
+                    opaque.for_each(|(_, shape)| band.cover(&shape));
+                }
+                for ((n, block), _) in near() {
+                    shapes(block).for_each(|(_, shape)| band.list(n, &shape));
+                }
+                band.finish()
+            })
+            .collect();
+        let (cells, listed) = joined(&bands);
+        Some(Self { grid, cells, listed })
+    }
 }
 
 /// Where cells lie across the rays.
