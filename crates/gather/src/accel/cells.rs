@@ -14,9 +14,12 @@
 mod fill;
 mod shape;
 
+use std::sync::Arc;
+
 use bytemuck::{Pod, Zeroable};
 
-use super::kernel::fetch_line;
+use super::TriangleBvh;
+use super::kernel::{Kernel, fetch_line};
 use super::pages::Pages;
 use fill::Grid;
 pub(super) use shape::{Flat, Shape, corners};
@@ -27,6 +30,11 @@ pub(super) const AHEAD: usize = 16;
 /// What lies over each cell.
 #[derive(Debug)]
 pub(super) struct Cells {
+    pub(super) kernel: Kernel,
+    /// Whose blocks are listed.
+    pub(super) bvh: Arc<TriangleBvh>,
+    /// The instance that the blocks count from.
+    pub(super) instance: u32,
     grid: Grid,
     /// Row by row, and one that ends the last one's list.
     cells: Pages<Cell>,

@@ -7,14 +7,12 @@
 //! Coordinates are the camera's, divided by the depth; a height is 1 over the depth. So planes stay
 //! planes, the nearest are the highest, and what is true of parallel rays is true of these.
 
-use std::sync::Arc;
-
 use glam::Vec3;
 
 use super::cells::{AHEAD, Cells, Flat, Listed, Margins, Shape, corners};
 use super::kernel::{Kernel, Setup, TriangleHits, nearest, triangles_portable};
 use super::triangle_bvh::Block;
-use super::{Accel, Hit, Ray, TriangleBvh, fetch_ahead};
+use super::{Accel, Hit, Ray, fetch_ahead};
 
 /// What is nearer to the eye than this share of the scene's size is listed for all cells.
 const NEAR: f64 = 1e-4;
@@ -39,14 +37,9 @@ pub(crate) struct Pyramid {
 /// What is seen from a point.
 #[derive(Debug)]
 pub(crate) struct ItemBuffer {
-    kernel: Kernel,
     eye: Vec3,
     axes: [Vec3; 3],
     cells: Cells,
-    /// Whose blocks are listed.
-    bvh: Arc<TriangleBvh>,
-    /// The instance that the blocks count from.
-    instance: u32,
 }
 
 impl ItemBuffer {
@@ -57,10 +50,6 @@ impl ItemBuffer {
         pyramid: &Pyramid,
         is_opaque: impl Fn(u32, u32) -> bool + Sync,
     ) -> Option<Self> {
-        let (instance, bvh) = accel.whole()?;
-        let is_opaque = |block: &Block, lane: usize| {
-            is_opaque(instance + block.instance[lane], block.primitive[lane])
-        };
         let half = pyramid.half.map(f64::from);
         let pixel = f64::from(pyramid.pixel);
         // Of a few roundings of a unit direction, divided by how far it goes ahead.
@@ -77,9 +66,9 @@ impl ItemBuffer {
             rectangle,
         };
         let shape = |block: &Block, lane: usize| camera.shape(corners(block, lane));
-        let cells = Cells::over(&bvh.blocks, &rectangle, count, margins, shape, is_opaque)?;
+        let cells = Cells::over(accel, &rectangle, count, margins, shape, is_opaque)?;
         let Pyramid { eye, axes, .. } = *pyramid;
-        Some(Self { kernel: accel.kernel(), eye, axes, cells, bvh: bvh.clone(), instance })
+        Some(Self { eye, axes, cells })
     }
 
     /// Finds the nearest surface that `accept` lets count on each of the rays, like [`Accel::closest`].
@@ -92,7 +81,7 @@ impl ItemBuffer {
         found: impl FnMut(T, Option<Hit>),
         left: impl FnMut(Ray, T),
     ) {
-        match self.kernel {
+        match self.cells.kernel {
             #[cfg(target_arch = "x86_64")]
             Kernel::Avx2(_) => {
                 #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
@@ -165,7 +154,7 @@ impl ItemBuffer {
         query.listed = over.as_ref().map_or(&[Listed::TOO_MANY], |over| over.listed);
         query.covered = over.is_some_and(|over| over.covered_below > f32::NEG_INFINITY);
         if let Some(block) =
-            query.listed.first().and_then(|l| self.bvh.blocks.get(l.block as usize))
+            query.listed.first().and_then(|l| self.cells.bvh.blocks.get(l.block as usize))
         {
             fetch_ahead(block);
         }
@@ -188,12 +177,14 @@ impl ItemBuffer {
             if best.is_some() && listed.height * query.depth * t_max * FARTHER < 1.0 {
                 break;
             }
-            let block = &self.bvh.blocks[listed.block as usize];
+            let block = &self.cells.bvh.blocks[listed.block as usize];
             let hits = triangles(block, &setup, t_max);
             if hits.mask == 0 {
                 continue;
             }
-            if let Some(hit) = nearest(block, self.instance, hits, |hit| accept(&query.with, hit)) {
+            if let Some(hit) =
+                nearest(block, self.cells.instance, hits, |hit| accept(&query.with, hit))
+            {
                 t_max = hit.t;
                 best = Some(hit);
             }

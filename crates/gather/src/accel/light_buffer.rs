@@ -7,14 +7,12 @@
 //! Coordinates are those of the triangle test: what is sheared so that the rays become the last axis
 //! ([`Setup`]); a height is the distance along a ray from the plane through the world's origin.
 
-use std::sync::Arc;
-
 use glam::{Vec3, Vec3A};
 
 use super::cells::{AHEAD, Cells, Flat, Listed, Margins, Shape, corners};
 use super::kernel::{Kernel, Setup, TriangleHits, nearest, triangles_portable};
 use super::triangle_bvh::{Block, LANES};
-use super::{Accel, Hit, Ray, TriangleBvh, fetch_ahead};
+use super::{Accel, Hit, Ray, fetch_ahead};
 
 /// Cells a leaf's place for a triangle. Four times as many, or half as many, trace as fast; filling
 /// takes 2.2 or 0.7 times as long.
@@ -23,16 +21,11 @@ const CELLS: f64 = 1.0;
 /// What lies between a directional light and the surfaces of a scene.
 #[derive(Debug)]
 pub(crate) struct LightBuffer {
-    kernel: Kernel,
     /// Of every ray, but for its origin.
     setup: Setup,
     /// Along every ray.
     direction: Vec3,
     cells: Cells,
-    /// Whose blocks are listed.
-    bvh: Arc<TriangleBvh>,
-    /// The instance that the blocks count from.
-    instance: u32,
 }
 
 impl LightBuffer {
@@ -46,11 +39,8 @@ impl LightBuffer {
         slack: f32,
         is_opaque: impl Fn(u32, u32) -> bool + Sync,
     ) -> Option<Self> {
-        let (instance, bvh) = accel.whole()?;
+        let (_, bvh) = accel.whole()?;
         let setup = Setup::new(Vec3A::ZERO, direction.into());
-        let is_opaque = |block: &Block, lane: usize| {
-            is_opaque(instance + block.instance[lane], block.primitive[lane])
-        };
         let bounds = accel.bounds();
         let extent = f64::from(bounds.min.abs().max(bounds.max.abs()).max_element());
         // Of a few roundings of coordinates, each sheared by at most one.
@@ -63,8 +53,8 @@ impl LightBuffer {
         let shape = |block: &Block, lane: usize| {
             Some(Shape::new(corners(block, lane).map(|corner| sheared(&setup, corner))))
         };
-        let cells = Cells::over(&bvh.blocks, &rectangle, count, margins, shape, is_opaque)?;
-        Some(Self { kernel: accel.kernel(), setup, direction, cells, bvh: bvh.clone(), instance })
+        let cells = Cells::over(accel, &rectangle, count, margins, shape, is_opaque)?;
+        Some(Self { setup, direction, cells })
     }
 
     /// Whether it is for this ray, if that starts at a surface of the scene.
@@ -83,7 +73,7 @@ impl LightBuffer {
         found: impl FnMut(T, bool),
         left: impl FnMut(Ray, T),
     ) {
-        match self.kernel {
+        match self.cells.kernel {
             #[cfg(target_arch = "x86_64")]
             Kernel::Avx2(_) => {
                 #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
@@ -132,7 +122,7 @@ impl LightBuffer {
             });
             queries.retain(|query| {
                 let highest = &query.listed[0];
-                match self.bvh.blocks.get(highest.block as usize) {
+                match self.cells.bvh.blocks.get(highest.block as usize) {
                     Some(block) => fetch_ahead(block),
                     None => left(query.ray, query.with),
                 }
@@ -143,10 +133,10 @@ impl LightBuffer {
                 let higher = query.listed.iter();
                 let mut higher = higher.take_while(|listed| listed.height >= query.height);
                 let occluded = higher.any(|listed| {
-                    let block = &self.bvh.blocks[listed.block as usize];
+                    let block = &self.cells.bvh.blocks[listed.block as usize];
                     let hits = triangles(block, &setup, f32::INFINITY);
                     let accept = |hit: &Hit| accept(&query.with, hit);
-                    hits.mask != 0 && nearest(block, self.instance, hits, accept).is_some()
+                    hits.mask != 0 && nearest(block, self.cells.instance, hits, accept).is_some()
                 });
                 found(query.with, occluded);
             }

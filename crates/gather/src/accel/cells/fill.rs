@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::shape::used;
 use super::{Cell, Cells, Flat, Listed, Margins, Shape};
+use crate::accel::Accel;
 use crate::accel::pages::Pages;
 use crate::accel::triangle_bvh::Block;
 
@@ -21,16 +22,22 @@ const BAND: usize = 16;
 impl Cells {
     /// Divides a rectangle into about so many cells, fewer where very much lies over each other, and
     /// lists blocks over them. `shape` tells how the rays see the triangle of a block's lane, if they
-    /// can meet it; `is_opaque`, whether it stops all of them that do not start at it. `None` where
-    /// there is nothing to speak of.
+    /// can meet it; `is_opaque` tells of the primitives (instance, primitive) whose triangles stop all of
+    /// them that do not start at them. `None` where the structure is not a single hierarchy in the
+    /// world, or is empty.
     pub(in crate::accel) fn over(
-        blocks: &[Block],
+        accel: &Accel,
         rectangle: &Flat,
         count: f64,
         margins: Margins,
         shape: impl Fn(&Block, usize) -> Option<Shape> + Sync,
-        is_opaque: impl Fn(&Block, usize) -> bool + Sync,
+        is_opaque: impl Fn(u32, u32) -> bool + Sync,
     ) -> Option<Self> {
+        let (instance, bvh) = accel.whole()?;
+        let blocks: &[Block] = &bvh.blocks;
+        let is_opaque = |block: &Block, lane: usize| {
+            is_opaque(instance + block.instance[lane], block.primitive[lane])
+        };
         let shapes = |block| used(block).filter_map(|lane| Some((lane, shape(block, lane)?)));
         let around = |block| Flat::around(shapes(block).flat_map(|(_, shape)| shape.points));
         let bounds: Vec<_> = blocks.par_iter().map(around).collect();
@@ -56,7 +63,7 @@ impl Cells {
             })
             .collect();
         let (cells, listed) = joined(&bands);
-        Some(Self { grid, cells, listed })
+        Some(Self { kernel: accel.kernel(), bvh: bvh.clone(), instance, grid, cells, listed })
     }
 }
 
