@@ -2,6 +2,7 @@
 //! SAH-based bounding volume hierarchies").
 
 mod bins;
+mod few;
 mod reinsert;
 
 use std::ops::Range;
@@ -12,6 +13,7 @@ use glam::{Vec3, Vec3A, Vec4};
 use super::Aabb;
 use super::pages::Pages;
 use bins::Plane;
+use few::{FEW, Parting};
 
 /// Below this depth, splits halve the number of items, so that depth is bounded whatever the input.
 const SAH_DEPTH: u32 = 40;
@@ -25,7 +27,8 @@ const LARGE: usize = 16 * PARALLEL;
 const NODE_COST: f32 = 0.6;
 
 /// A thing to be put into a tree, or several that stay together.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Item {
     /// Its box's least coordinates; in the fourth number's bits the first thing, and [`ORDINARY`].
     low: Vec4,
@@ -72,7 +75,7 @@ impl Item {
 #[derive(Debug)]
 pub(super) struct BinaryTree {
     nodes: Pages<BinaryNode>,
-    items: Vec<Item>,
+    items: Pages<Item>,
 }
 
 /// A leaf, or a node with two sides.
@@ -99,7 +102,7 @@ pub(super) struct Subtree<'a> {
 
 impl BinaryTree {
     /// Builds a tree whose leaves hold at most `leaf` things, which no item may exceed.
-    pub(super) fn new(mut items: Vec<Item>, leaf: usize) -> Self {
+    pub(super) fn new(mut items: Pages<Item>, leaf: usize) -> Self {
         let mut nodes = Pages::zeroed((2 * items.len()).max(1));
         let extent = Extent::of(&items);
         let builder = Builder { nodes: &mut nodes, items: &mut items, first: 0, extent, depth: 0 };
@@ -156,9 +159,22 @@ struct Extent {
 
 impl Extent {
     fn of(items: &[Item]) -> Self {
+        if items.len() >= LARGE {
+            let (front, back) = items.split_at(items.len() / 2);
+            let (front, back) = rayon::join(|| Self::of(front), || Self::of(back));
+            return front.union(&back);
+        }
         let bounds = items.iter().fold(Aabb::EMPTY, |bounds, item| bounds.union(item.bounds()));
         let count = items.iter().map(|item| item.count() as f32).sum();
         Self { bounds, centers: centers(items), count }
+    }
+
+    fn union(&self, other: &Self) -> Self {
+        Self {
+            bounds: self.bounds.union(other.bounds),
+            centers: self.centers.union(other.centers),
+            count: self.count + other.count,
+        }
     }
 }
 
@@ -217,13 +233,23 @@ impl Builder<'_> {
     /// cheaper.
     fn split(&mut self, leaf: f32) -> Option<(usize, [Extent; 2])> {
         let Extent { bounds, centers, count } = self.extent;
+        let area = bounds.half_area();
+        let is_leaf =
+            |cost| count <= leaf && leaf_cost(count, leaf) * area <= NODE_COST * area + cost;
+        if self.items.len() <= FEW && self.depth < SAH_DEPTH {
+            let parting = Parting::cheapest(self.items, leaf);
+            return (!is_leaf(parting.cost)).then(|| {
+                let middle = parting.bring_left(self.items);
+                let (left, right) = self.items.split_at(middle);
+                (middle, [Extent::of(left), Extent::of(right)])
+            });
+        }
         let size = centers.max - centers.min;
         if self.depth >= SAH_DEPTH || size.max_element() <= f32::MIN_POSITIVE {
             return (count > leaf).then(|| self.halve());
         }
         let (cost, plane) = Plane::cheapest(self.items, &self.extent, leaf);
-        let area = bounds.half_area();
-        if count <= leaf && leaf_cost(count, leaf) * area <= NODE_COST * area + cost {
+        if is_leaf(cost) {
             return None;
         }
         Some(if cost.is_finite() { self.partition(&plane) } else { self.halve() })
@@ -315,7 +341,8 @@ mod tests {
         for count in [0, 1, 2, 7, 100, 3 * LARGE as u32] {
             let [one, three] = [1, 3].map(|threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-                let tree = pool.expect("threads").install(|| BinaryTree::new(items(count), 4));
+                let tree =
+                    pool.expect("threads").install(|| BinaryTree::new(items(count).into(), 4));
                 let mut all = Vec::new();
                 leaves(tree.root(), &mut all);
                 all

@@ -4,10 +4,11 @@
 //! programming over the tree (Ylitie, Karras and Laine 2017, "Efficient incoherent ray traversal on
 //! GPUs through compressed wide BVHs", section 3.2).
 
+use bytemuck::Pod;
 use rayon::prelude::*;
 
 use super::build::{BinaryTree, Item, Subtree};
-use super::pages::Pages;
+use super::pages::{Pages, split};
 use super::wide::{LEAF, Node};
 
 /// Cost of visiting a node, of visiting a leaf: one.
@@ -148,16 +149,26 @@ impl<'a> Part<'a> {
         part
     }
 
-    /// Puts the nodes where they are to lie, finished: nodes and leaves begin at these indices.
-    fn put(&self, places: &mut [Node], [node, leaf]: [u32; 2]) {
-        for (place, from) in places.iter_mut().zip(&self.nodes) {
+    /// Puts nodes and leaves where they are to lie, finished: they begin at these indices.
+    fn put<T: Send>(&self, places: Places<'_, T>, leaf: impl Fn(&[Item]) -> T + Sync) {
+        let [node, first_leaf] = places.begin;
+        for (place, from) in places.nodes.iter_mut().zip(&self.nodes) {
             *place = *from;
             for child in &mut place.child {
-                *child += if *child & LEAF == 0 { node } else { leaf };
+                *child += if *child & LEAF == 0 { node } else { first_leaf };
             }
             place.set_order();
         }
+        let leaves = places.leaves.par_iter_mut().with_min_len(RUN).zip(&self.leaves);
+        leaves.for_each(|(place, items)| *place = leaf(items));
     }
+}
+
+/// Where a part's nodes and leaves are to lie.
+struct Places<'p, T> {
+    nodes: &'p mut [Node],
+    leaves: &'p mut [T],
+    begin: [u32; 2],
 }
 
 /// Levels of nodes that one thread makes, before others make what is below, in trees not smaller than
@@ -165,9 +176,15 @@ impl<'a> Part<'a> {
 const UPPER: u32 = 2;
 const LARGE: usize = 1 << 13;
 
-/// Collapses a binary tree: nodes, parents before their children, the root first, and the items of
-/// their leaves.
-pub(super) fn collapse(tree: &BinaryTree) -> (Pages<Node>, Vec<&[Item]>) {
+/// Leaves that a thread makes at least.
+const RUN: usize = 64;
+
+/// Collapses a binary tree: nodes, parents before their children, the root first, and leaves made of
+/// their items.
+pub(super) fn collapse<T: Pod + Send + Sync>(
+    tree: &BinaryTree,
+    leaf: impl Fn(&[Item]) -> T + Sync,
+) -> (Pages<Node>, Pages<T>) {
     let mut cuts = vec![[0; 8]; tree.len()];
     plan(tree.root(), &mut cuts, 0);
     let (mut upper, mut deferred) = (Part::default(), Vec::new());
@@ -185,10 +202,13 @@ pub(super) fn collapse(tree: &BinaryTree) -> (Pages<Node>, Vec<&[Item]>) {
         count[1] += part.leaves.len() as u32;
     }
     let parts: Vec<_> = std::iter::once(upper).chain(lower).collect();
-    let mut nodes = Pages::zeroed(count[0] as usize);
-    let mut rest: &mut [Node] = &mut nodes;
-    let places = parts.iter().map_while(|part| rest.split_off_mut(..part.nodes.len()));
-    let places: Vec<_> = places.zip(&parts).zip(begins).collect();
-    places.into_par_iter().for_each(|((places, part), begin)| part.put(places, begin));
-    (nodes, parts.into_iter().flat_map(|part| part.leaves).collect())
+    let (mut nodes, mut leaves) =
+        (Pages::zeroed(count[0] as usize), Pages::zeroed(count[1] as usize));
+    let places = split(&mut nodes, parts.iter().map(|part| part.nodes.len()))
+        .into_par_iter()
+        .zip(split(&mut leaves, parts.iter().map(|part| part.leaves.len())))
+        .zip(begins)
+        .map(|((nodes, leaves), begin)| Places { nodes, leaves, begin });
+    places.zip(&parts).for_each(|(places, part)| part.put(places, &leaf));
+    (nodes, leaves)
 }

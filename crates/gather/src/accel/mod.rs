@@ -25,6 +25,7 @@ mod pages;
 #[cfg(test)]
 mod tests;
 mod triangle_bvh;
+mod triangles;
 mod wide;
 
 use std::sync::Arc;
@@ -200,12 +201,12 @@ impl Accel {
 
 /// A tree over boxes, one a leaf; leaf indices are those of the boxes.
 fn over_boxes(boxes: &[Aabb]) -> (Pages<Node>, Aabb) {
-    let items = (0..).zip(boxes).map(|(index, &bounds)| Item::new(bounds, index, 1)).collect();
-    let tree = BinaryTree::new(items, 1);
-    let (mut nodes, leaves) = collapse::collapse(&tree);
+    let items = (0..).zip(boxes).map(|(index, &bounds)| Item::new(bounds, index, 1));
+    let tree = BinaryTree::new(items.collect::<Vec<_>>().into(), 1);
+    let (mut nodes, leaves) = collapse::collapse(&tree, |items| items[0].indices().start as u32);
     for child in nodes.iter_mut().flat_map(|node| &mut node.child) {
-        if let Some([item]) = leaves.get((*child ^ LEAF) as usize) {
-            *child = LEAF | item.indices().start as u32;
+        if let Some(index) = leaves.get((*child ^ LEAF) as usize) {
+            *child = LEAF | index;
         }
     }
     (nodes, tree.root().bounds())

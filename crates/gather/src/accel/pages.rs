@@ -43,6 +43,27 @@ impl<T: Pod + Send + Sync> Pages<T> {
         places.for_each(|(n, place)| *place = value(n));
         pages
     }
+
+    /// Slices one after the other.
+    pub(super) fn concat(parts: &[impl AsRef<[T]> + Sync]) -> Self {
+        let lengths = || parts.iter().map(|part| part.as_ref().len());
+        let mut pages = Self::zeroed(lengths().sum());
+        let places = split(&mut pages, lengths()).into_par_iter().zip(parts);
+        places.for_each(|(places, part)| places.copy_from_slice(part.as_ref()));
+        pages
+    }
+}
+
+impl<T> From<Vec<T>> for Pages<T> {
+    fn from(values: Vec<T>) -> Self {
+        Self::Few(values)
+    }
+}
+
+/// Cuts a slice into parts of these lengths, whose sum is its own.
+pub(super) fn split<T>(mut rest: &mut [T], lengths: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
+    let parts = lengths.map_while(|length| rest.split_off_mut(..length));
+    parts.collect()
 }
 
 /// Room for so many bytes from the next multiple of a huge page on.

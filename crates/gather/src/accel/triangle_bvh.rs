@@ -1,13 +1,14 @@
 //! The hierarchy over triangles: of one mesh, in object space, or of a whole scene, in the world.
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3A;
+use glam::{Mat4, Vec3A};
 use lumencast_scene::{Instance, Mesh, Vertices};
 use rayon::prelude::*;
 
 use super::build::{BinaryTree, Item};
 use super::collapse::collapse;
 use super::pages::Pages;
+use super::triangles::{Triangle, Triangles};
 use super::wide::{LEAF, Node};
 use super::{Aabb, Trees};
 
@@ -31,12 +32,18 @@ pub(super) struct Block {
 }
 
 impl Block {
-    pub(super) const EMPTY: Self = Self {
-        corners: [[[0.0; LANES]; 3]; 3],
-        primitive: [0; LANES],
-        triangle: [UNUSED; LANES],
-        instance: [0; LANES],
-    };
+    /// At most [`LANES`] triangles.
+    pub(super) fn of<'t>(triangles: impl Iterator<Item = &'t Triangle>) -> Self {
+        let mut lanes = [Triangle::new([Vec3A::ZERO; 3], [0, 0, UNUSED]); LANES];
+        lanes.iter_mut().zip(triangles).for_each(|(lane, triangle)| *lane = *triangle);
+        let axes = [0, 1, 2].map(|vertex| {
+            let [a, b, c, d] = lanes.map(|triangle| triangle.0[vertex]);
+            Mat4::from_cols(a, b, c, d).transpose().to_cols_array_2d()
+        });
+        let [instance, primitive, triangle] = axes.map(|[.., name]| name.map(f32::to_bits));
+        let corners = axes.map(|[x, y, z, _]| [x, y, z]);
+        Self { corners, primitive, triangle, instance }
+    }
 
     /// Which lanes hold a triangle.
     pub(super) fn is_used(&self) -> [bool; LANES] {
@@ -52,22 +59,6 @@ impl Block {
     }
 }
 
-/// Names a triangle.
-#[derive(Clone, Copy)]
-struct Id {
-    instance: u32,
-    primitive: u32,
-    triangle: u32,
-}
-
-/// The triangles of a mesh.
-fn ids(instance: u32, mesh: &Mesh) -> impl Iterator<Item = Id> + '_ {
-    (0..).zip(&mesh.primitives).flat_map(move |(primitive, p)| {
-        let count = p.triangles.len() as u32;
-        (0..count).map(move |triangle| Id { instance, primitive, triangle })
-    })
-}
-
 /// A bounding-volume hierarchy over triangles.
 #[derive(Clone, Debug)]
 pub(crate) struct TriangleBvh {
@@ -81,45 +72,23 @@ pub(crate) struct TriangleBvh {
 impl TriangleBvh {
     /// Builds over the mesh at rest, or over `deformed` vertices (one entry a primitive).
     pub(crate) fn build(mesh: &Mesh, deformed: Option<&[Vertices]>, trees: Trees) -> Self {
-        let source = Source { mesh, deformed };
-        Self::over(ids(0, mesh).collect(), trees, |id| source.corners(id.primitive, id.triangle))
+        Self::over(Triangles::of_mesh(mesh, deformed), trees)
     }
 
     /// Builds over all triangles of instances, in world space.
     pub(crate) fn whole(instances: &[Instance], trees: Trees) -> Self {
-        let all = (0..).zip(instances).flat_map(|(n, instance)| ids(n, &instance.mesh));
-        Self::over(all.collect(), trees, |id| {
-            let instance = &instances[id.instance as usize];
-            let deformed = instance.deformation.as_ref().map(|d| d.vertices());
-            let source = Source { mesh: &instance.mesh, deformed };
-            let to_world = |corner| instance.world_from_object.transform_point3a(corner);
-            source.corners(id.primitive, id.triangle).map(to_world)
-        })
+        Self::over(Triangles::of_instances(instances), trees)
     }
 
-    fn over(ids: Vec<Id>, trees: Trees, corners: impl Fn(Id) -> [Vec3A; 3] + Sync) -> Self {
-        let chunks = ids.par_chunks(CHUNK).enumerate();
-        let items: Vec<_> = chunks
-            .map(|(n, chunk)| paired(n * CHUNK, chunk.iter().map(|&id| around(corners(id)))))
-            .collect();
-        let tree = BinaryTree::new(items.concat(), LANES);
+    fn over(Triangles { all, items }: Triangles, trees: Trees) -> Self {
+        let tree = BinaryTree::new(items, LANES);
         let tree = match trees {
             Trees::AsBuilt => tree,
             Trees::Improved => tree.improved(),
         };
-        let (nodes, leaves) = collapse(&tree);
-        let block = |leaf: usize| {
-            let mut block = Block::EMPTY;
-            let things = leaves[leaf].iter().flat_map(Item::indices);
-            for (lane, id) in things.map(|index| ids[index]).enumerate() {
-                block.instance[lane] = id.instance;
-                block.primitive[lane] = id.primitive;
-                block.triangle[lane] = id.triangle;
-                block.set(lane, corners(id));
-            }
-            block
-        };
-        let blocks = Pages::filled(leaves.len(), block);
+        let (nodes, blocks) = collapse(&tree, |items| {
+            Block::of(items.iter().flat_map(Item::indices).map(|index| &all[index]))
+        });
         let cost = cost(&nodes);
         Self { nodes, blocks, bounds: tree.root().bounds(), cost }
     }
@@ -169,43 +138,19 @@ impl TriangleBvh {
     }
 }
 
-/// Triangles that a thread looks at together when a tree is built.
-const CHUNK: usize = 4096;
-/// Two triangles stay together if the box around both has at most this share of the sum of their own
-/// boxes' areas.
-const PAIRED: f32 = 0.9;
-
-/// Triangles from an index on, given by their boxes, as items: neighbours that are two halves of a
-/// quad, as most are, as one. Nearly as good a tree over half as many items. What is not finite is
-/// left out.
-fn paired(first: usize, boxes: impl Iterator<Item = Aabb>) -> Vec<Item> {
-    let mut items = Vec::with_capacity(boxes.size_hint().0);
-    let mut last: Option<(u32, Aabb)> = None;
-    let alone = |(index, bounds)| Item::new(bounds, index, 1);
-    for (index, bounds) in (first as u32..).zip(boxes) {
-        if !(bounds.min.is_finite() && bounds.max.is_finite()) {
-            continue;
-        }
-        if let Some((before, other)) = last.filter(|(before, _)| before + 1 == index) {
-            let both = other.union(bounds);
-            if both.half_area() <= PAIRED * (other.half_area() + bounds.half_area()) {
-                items.push(Item::new(both, before, 2));
-                last = None;
-                continue;
-            }
-        }
-        items.extend(last.replace((index, bounds)).map(alone));
-    }
-    items.extend(last.map(alone));
-    items
-}
-
 /// Expected number of nodes and leaves that a random ray through the root's box visits.
 fn cost(nodes: &[Node]) -> f32 {
-    let area: f32 =
-        nodes.iter().flat_map(|n| n.lanes().map(|(lane, _)| n.lane_bounds(lane).half_area())).sum();
-    area / nodes[0].bounds().half_area().max(f32::MIN_POSITIVE)
+    let area = |node: &Node| -> f32 {
+        node.lanes().map(|(lane, _)| node.lane_bounds(lane).half_area()).sum()
+    };
+    // The sum does not depend on the threads.
+    let chunks = nodes.par_chunks(CHUNK).map(|nodes| nodes.iter().map(area).sum());
+    let areas: Vec<f32> = chunks.collect();
+    areas.iter().sum::<f32>() / nodes[0].bounds().half_area().max(f32::MIN_POSITIVE)
 }
+
+/// Nodes that a thread looks at together.
+const CHUNK: usize = 1024;
 
 fn around(corners: [Vec3A; 3]) -> Aabb {
     corners.into_iter().fold(Aabb::EMPTY, Aabb::with)
@@ -221,28 +166,5 @@ impl Source<'_> {
         let p = &self.mesh.primitives[primitive as usize];
         let vertices = self.deformed.map_or(&p.vertices, |d| &d[primitive as usize]);
         p.triangles[triangle as usize].map(|i| vertices.positions[i as usize].into())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn halves_of_a_quad_stay_together() {
-        let at = |min: [f32; 3], max: [f32; 3]| Aabb { min: min.into(), max: max.into() };
-        let quad = at([0.0; 3], [1.0, 1.0, 0.0]);
-        let aside = at([5.0, 0.0, 0.0], [6.0, 1.0, 0.0]);
-        let lost = at([f32::NAN; 3], [1.0; 3]);
-        let found = |boxes: &[Aabb]| -> Vec<_> {
-            paired(7, boxes.iter().copied()).iter().map(Item::indices).collect()
-        };
-        assert_eq!(found(&[quad, quad, aside]), [7..9, 9..10]);
-        assert_eq!(found(&[aside, quad, quad, quad]), [7..8, 8..10, 10..11]);
-        assert_eq!(found(&[quad, lost, quad]), [7..8, 9..10]);
-        // Side by side, their box is as large as both.
-        let beside = at([1.0, 0.0, 0.0], [2.0, 1.0, 0.0]);
-        assert_eq!(found(&[quad, beside]), [7..8, 8..9]);
-        assert!(found(&[lost]).is_empty() && found(&[]).is_empty());
     }
 }

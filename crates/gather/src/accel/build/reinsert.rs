@@ -288,10 +288,10 @@ mod tests {
         let few = [0, 1, 2, 7, 100].map(|count| (items(count), 0.0));
         let many = [(items(50_000), 0.001), (beams(200), 0.01), (beams(20_000), 0.1)];
         for (items, gain) in few.into_iter().chain(many) {
-            let built = BinaryTree::new(items.clone(), 4);
+            let built = BinaryTree::new(items.clone().into(), 4);
             let [one, three] = [1, 3].map(|threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-                let tree = || BinaryTree::new(items.clone(), 4).improved();
+                let tree = || BinaryTree::new(items.clone().into(), 4).improved();
                 pool.expect("threads").install(tree)
             });
             assert_eq!(indices(&one), indices(&three));
@@ -309,7 +309,7 @@ mod tests {
     /// What a move is said to gain is what it gains.
     #[test]
     fn gains_are_what_they_are_said_to_be() {
-        let tree = BinaryTree::new(beams(500), 4);
+        let tree = BinaryTree::new(beams(500).into(), 4);
         let mut loose = Loose(Vec::new());
         add(&mut loose.0, &tree.nodes, NONE);
         let mut moved = 0;
@@ -350,7 +350,8 @@ mod tests {
                 let (at, size) = shape(n);
                 Item::new(cube(at, size), n, 1)
             };
-            let tree = BinaryTree::new((0..3000).map(item).collect(), 4).improved();
+            let items: Vec<_> = (0..3000).map(item).collect();
+            let tree = BinaryTree::new(items.into(), 4).improved();
             let mut found = indices(&tree).concat();
             found.sort_unstable();
             assert!(found.into_iter().eq(0..3000));

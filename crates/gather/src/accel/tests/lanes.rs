@@ -87,7 +87,7 @@ fn every_set_of_lanes_is_told_from_every_other() {
                 }
             }
             for set in 0..16 {
-                let mut block = Block::EMPTY;
+                let mut block = Block::of([].into_iter());
                 for lane in 0..LANES {
                     let at = Vec3A::Z * side * (1.0 + lane as f32);
                     let at = if has(set, lane) { at } else { at + aside };
@@ -183,7 +183,7 @@ fn triangles_are_met_where_f64_says() {
         for i in 0..20_000 {
             let corner =
                 |lane: u64, k: u64| random(60 + 3 * lane + k, i) + Vec3::splat(0.2 * lane as f32);
-            let mut block = Block::EMPTY;
+            let mut block = Block::of([].into_iter());
             for lane in 0..4 {
                 block.set(lane as usize, [0, 1, 2].map(|k| corner(lane, k).into()));
             }
@@ -228,7 +228,7 @@ fn shared_edges_have_no_gap() {
             let [a, b, c, origin] = [0, 1, 2, 3].map(|k| random(70 + k, i));
             let target = a.lerp(b, random(74, i).x);
             let d = target + (target - c) + 0.1 * (random(75, i) - 0.5);
-            let mut block = Block::EMPTY;
+            let mut block = Block::of([].into_iter());
             block.set(1, [a, b, c].map(Vec3A::from));
             block.set(2, [b, a, d].map(Vec3A::from));
             let origin = 3.0 * origin - 1.0;
@@ -251,7 +251,7 @@ fn triangles_with_equal_corners_are_never_met() {
     for kernel in kernels() {
         for i in 0..20_000 {
             let [a, b, origin] = [0, 1, 2].map(|k| random(70 + k, i));
-            let mut block = Block::EMPTY;
+            let mut block = Block::of([].into_iter());
             let corners = [[a, a, b], [a, b, a], [b, a, a], [a, a, a]];
             for (lane, corners) in corners.into_iter().enumerate() {
                 block.set(lane, corners.map(Vec3A::from));
@@ -272,7 +272,7 @@ fn rays_that_are_not_finite_are_treated_alike() {
     let mut met = 0;
     for i in 0..2000 {
         let node = random_node(i);
-        let mut block = Block::EMPTY;
+        let mut block = Block::of([].into_iter());
         for lane in 0..LANES as u64 {
             let corners = [0, 1, 2].map(|k| random(60 + 3 * lane + k, i).into());
             block.set(lane as usize, corners);
