@@ -23,9 +23,11 @@ impl BinaryTree {
         let mut nodes = Vec::with_capacity(self.len());
         add(&mut nodes, &self.nodes, NONE);
         let mut loose = Loose(nodes);
+        let mut all: f32 = loose.0.iter().map(|node| node.area).sum();
         for _ in 0..ROUNDS {
-            let all: f32 = loose.0.iter().map(|node| node.area).sum();
-            if loose.improve() <= ENOUGH * all {
+            let gain = loose.improve();
+            all -= gain;
+            if gain <= ENOUGH * all {
                 break;
             }
         }
