@@ -22,7 +22,10 @@ pub(crate) struct Variant {
 #[derive(Debug)]
 pub(crate) struct Pipelines {
     pub(crate) variant: Variant,
-    forward: wgpu::RenderPipeline,
+    /// Puts the depth of solid surfaces into a picture, before they are shaded.
+    pub(crate) first: wgpu::RenderPipeline,
+    solid: wgpu::RenderPipeline,
+    masked: wgpu::RenderPipeline,
     blended: wgpu::RenderPipeline,
     pub(crate) background: wgpu::RenderPipeline,
 }
@@ -34,6 +37,7 @@ pub(crate) struct Layouts {
     pub(crate) material: wgpu::BindGroupLayout,
     forward: wgpu::PipelineLayout,
     background: wgpu::PipelineLayout,
+    depth: wgpu::PipelineLayout,
     solid_depth: wgpu::RenderPipeline,
     masked_depth: wgpu::RenderPipeline,
 }
@@ -77,17 +81,16 @@ impl Layouts {
         let forward = layout("forward", &[Some(&pass), Some(light), Some(field), Some(&material)]);
         let background = layout("background", &[Some(&pass), Some(light)]);
         let module = gpu.shader("depth", depth());
-        let solid = layout("depth", &[Some(&pass)]);
+        let depth = layout("depth", &[Some(&pass)]);
         let masked = layout("masked depth", &[Some(&pass), None, None, Some(&material)]);
-        let solid_depth = depth_pipeline(device, &solid, &module, "depth_vertex", None);
-        let masked_depth = depth_pipeline(
-            device,
-            &masked,
-            &module,
-            "masked_depth_vertex",
-            Some("masked_depth_fragment"),
-        );
-        Self { pass, material, forward, background, solid_depth, masked_depth }
+        let into_map = |layout, vertex, fragment| {
+            let entries = Entries { layout, module: &module, vertex, fragment, constants: &[] };
+            let depth = depth_state(wgpu::CompareFunction::Greater, true);
+            mesh_pipeline(device, "depth", &entries, None, depth, 1)
+        };
+        let solid_depth = into_map(&depth, "depth_vertex", None);
+        let masked_depth = into_map(&masked, "masked_depth_vertex", Some("masked_depth_fragment"));
+        Self { pass, material, forward, background, depth, solid_depth, masked_depth }
     }
 
     pub(crate) fn depth(&self, surface: Surface) -> &wgpu::RenderPipeline {
@@ -102,12 +105,24 @@ impl Pipelines {
     pub(crate) fn new(gpu: &Gpu, layouts: &Layouts, variant: Variant) -> Self {
         let device = &gpu.device;
         let module = gpu.shader("forward", forward(variant.shading));
+        let only_depth = gpu.shader("depth", depth());
+        let nothing =
+            wgpu::ColorTargetState { write_mask: wgpu::ColorWrites::empty(), ..COLOR.into() };
+        let first = Entries {
+            layout: &layouts.depth,
+            module: &only_depth,
+            vertex: "depth_vertex",
+            fragment: Some("depth_fragment"),
+            constants: &[],
+        };
+        let nearer = depth_state(wgpu::CompareFunction::Greater, true);
         let sky = gpu.shader("background", background());
-        let is_sorted = variant.transparency == Transparency::Sorted;
         Self {
             variant,
-            forward: forward_pipeline(device, layouts, &module, variant, false),
-            blended: forward_pipeline(device, layouts, &module, variant, is_sorted),
+            first: mesh_pipeline(device, "depth", &first, Some(nothing), nearer, variant.samples),
+            solid: forward_pipeline(device, layouts, &module, variant, Surface::Solid),
+            masked: forward_pipeline(device, layouts, &module, variant, Surface::Masked),
+            blended: forward_pipeline(device, layouts, &module, variant, Surface::Blended),
             background: device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some("background"),
                 layout: Some(&layouts.background),
@@ -130,7 +145,8 @@ impl Pipelines {
 
     pub(crate) fn forward(&self, surface: Surface) -> &wgpu::RenderPipeline {
         match surface {
-            Surface::Solid | Surface::Masked => &self.forward,
+            Surface::Solid => &self.solid,
+            Surface::Masked => &self.masked,
             Surface::Blended => &self.blended,
         }
     }
@@ -163,64 +179,74 @@ fn multisample(count: u32) -> wgpu::MultisampleState {
     wgpu::MultisampleState { count, ..Default::default() }
 }
 
+/// What a pipeline that draws meshes is made of.
+struct Entries<'a> {
+    layout: &'a wgpu::PipelineLayout,
+    module: &'a wgpu::ShaderModule,
+    vertex: &'a str,
+    fragment: Option<&'a str>,
+    constants: &'a [(&'a str, f64)],
+}
+
 fn forward_pipeline(
     device: &wgpu::Device,
     layouts: &Layouts,
     module: &wgpu::ShaderModule,
     variant: Variant,
-    blends: bool,
+    surface: Surface,
 ) -> wgpu::RenderPipeline {
-    let buffers = geometry::vertex_layouts();
+    let is_solid = surface == Surface::Solid;
+    let blends = surface == Surface::Blended && variant.transparency == Transparency::Sorted;
     let constant = |is: bool| f64::from(u8::from(is));
     let constants = [("BLENDED", constant(blends)), ("OCCLUDED", constant(variant.occluded))];
+    let entries = Entries {
+        layout: &layouts.forward,
+        module,
+        vertex: "forward_vertex",
+        fragment: Some(if is_solid { "solid_fragment" } else { "holed_fragment" }),
+        constants: &constants,
+    };
     let target = wgpu::ColorTargetState {
         format: COLOR,
         blend: blends.then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
         write_mask: wgpu::ColorWrites::ALL,
     };
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("forward"),
-        layout: Some(&layouts.forward),
-        vertex: vertex(module, "forward_vertex", &buffers),
-        // Nothing is culled: backs of single-sided materials hide what lies behind them.
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(depth_state(wgpu::CompareFunction::Greater, !blends)),
-        multisample: multisample(variant.samples),
-        fragment: Some(wgpu::FragmentState {
-            module,
-            entry_point: Some("forward_fragment"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &constants,
-                ..Default::default()
-            },
-            targets: &[Some(target)],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+    let depth = if is_solid {
+        // It is there already.
+        depth_state(wgpu::CompareFunction::Equal, false)
+    } else {
+        depth_state(wgpu::CompareFunction::Greater, !blends)
+    };
+    mesh_pipeline(device, "forward", &entries, Some(target), depth, variant.samples)
 }
 
-fn depth_pipeline(
+fn mesh_pipeline(
     device: &wgpu::Device,
-    layout: &wgpu::PipelineLayout,
-    module: &wgpu::ShaderModule,
-    vertex_entry: &str,
-    fragment_entry: Option<&str>,
+    label: &str,
+    entries: &Entries<'_>,
+    target: Option<wgpu::ColorTargetState>,
+    depth: wgpu::DepthStencilState,
+    samples: u32,
 ) -> wgpu::RenderPipeline {
     let buffers = geometry::vertex_layouts();
-    let fragment = fragment_entry.map(|entry| wgpu::FragmentState {
-        module,
+    let targets = [target];
+    let fragment = entries.fragment.map(|entry| wgpu::FragmentState {
+        module: entries.module,
         entry_point: Some(entry),
-        compilation_options: Default::default(),
-        targets: &[],
+        compilation_options: wgpu::PipelineCompilationOptions {
+            constants: entries.constants,
+            ..Default::default()
+        },
+        targets: if targets[0].is_some() { &targets } else { &[] },
     });
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("depth"),
-        layout: Some(layout),
-        vertex: vertex(module, vertex_entry, &buffers),
+        label: Some(label),
+        layout: Some(entries.layout),
+        vertex: vertex(entries.module, entries.vertex, &buffers),
+        // Nothing is culled: backs of single-sided materials hide what lies behind them.
         primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(depth_state(wgpu::CompareFunction::Greater, true)),
-        multisample: multisample(1),
+        depth_stencil: Some(depth),
+        multisample: multisample(samples),
         fragment,
         multiview_mask: None,
         cache: None,

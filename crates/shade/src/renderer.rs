@@ -486,6 +486,12 @@ impl Renderer {
                 && self.scene.draw(call).0.surface == Surface::Blended
         };
         let (drawn, mixed) = calls.split_at(calls.partition_point(|call| !is_mixed(call)));
+        // Depth first, so that no solid surface is shaded where another one hides it.
+        let is_solid = |call: &&Call| self.scene.draw(call).0.surface == Surface::Solid;
+        pass.set_pipeline(&pipelines.first);
+        for call in drawn.iter().filter(is_solid) {
+            draw_call(&mut pass, &self.scene.draw(call).0.part, call);
+        }
         self.draw_surfaces(&mut pass, pipelines, drawn);
         if lighting.emission {
             pass.set_pipeline(&pipelines.background);

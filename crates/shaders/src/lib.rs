@@ -14,7 +14,7 @@
 //! use lumencast_shaders::{Shading, forward};
 //!
 //! let shader = forward(Shading::Samples);
-//! assert!(shader.contains("fn forward_fragment"));
+//! assert!(shader.contains("fn solid_fragment"));
 //! ```
 
 #![forbid(unsafe_code)]
@@ -48,7 +48,8 @@ pub enum Shading {
     Samples,
 }
 
-/// Draws surfaces: `forward_vertex`, `forward_fragment`.
+/// Draws surfaces: `forward_vertex`; `solid_fragment` for those that cover all, `holed_fragment` for the
+/// others.
 pub fn forward(shading: Shading) -> String {
     let modules = [COMMON, VIEW, ENVIRONMENT, LIGHT, HARMONICS, FIELD, BSDF, MATERIAL].concat();
     let own = match shading {
@@ -62,8 +63,9 @@ pub fn forward(shading: Shading) -> String {
     modules + &own
 }
 
-/// Draws the depth that a light or a camera sees: `depth_vertex` alone for opaque surfaces;
-/// `masked_depth_vertex` and `masked_depth_fragment` for those with holes.
+/// Draws the depth that a light or a camera sees: `depth_vertex` alone for opaque surfaces (where there is
+/// a picture, with `depth_fragment`); `masked_depth_vertex` and `masked_depth_fragment` for those with
+/// holes. Depths of `depth_vertex` are those of `forward_vertex`, to the bit.
 pub fn depth() -> String {
     // `Bsdf` for what `material.wgsl` returns.
     [COMMON, VIEW, BSDF, MATERIAL, DEPTH].concat()

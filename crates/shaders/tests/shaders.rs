@@ -22,9 +22,9 @@ fn compiled(name: &str, source: &str) -> Module {
 #[test]
 fn every_shader_is_valid() {
     for (name, source, entries) in [
-        ("forward, by pixels", forward(Shading::Pixels), 2),
-        ("forward, by samples", forward(Shading::Samples), 2),
-        ("depth", depth(), 3),
+        ("forward, by pixels", forward(Shading::Pixels), 3),
+        ("forward, by samples", forward(Shading::Samples), 3),
+        ("depth", depth(), 4),
         ("background", background(), 2),
         ("deform", deform(), 1),
         ("occlusion", occlusion(), 3),

@@ -18,10 +18,14 @@ struct DepthVarying {
 }
 
 @vertex
-fn depth_vertex(@location(0) position: vec3f, @builtin(instance_index) instance: u32) -> @builtin(position) vec4f {
+fn depth_vertex(@location(0) position: vec3f, @builtin(instance_index) instance: u32) -> @builtin(position) @invariant vec4f {
     let placed = instances[visible[instance]];
     return view.clip_from_world * vec4f(transform_point(placed.world_from_object, position), 1.0);
 }
+
+// Nothing but depth, into pictures.
+@fragment
+fn depth_fragment() {}
 
 @vertex
 fn masked_depth_vertex(in: DepthVertex) -> DepthVarying {

@@ -11,7 +11,7 @@ struct Vertex {
 }
 
 struct Varying {
-    @builtin(position) clip: vec4f,
+    @builtin(position) @invariant clip: vec4f,
     @location(0) @interpolate(perspective, center) position: vec3f,
     @location(1) @interpolate(perspective, center) normal: vec3f,
     @location(2) @interpolate(perspective, center) tangent: vec4f,
@@ -86,57 +86,96 @@ fn covered(alpha: f32, pixel: vec2f, layer: u32) -> u32 {
     return mask;
 }
 
+// What is read at a point before anything is decided, since textures choose their mips by the pixels
+// beside.
+struct Point {
+    position: vec3f,
+    // Across the surface, of any length.
+    geometry: vec3f,
+    // By how much depth changes from a pixel to the next.
+    slopes: vec2f,
+    base_color: vec4f,
+    substance: Substance,
+    emission: vec3f,
+    occlusion: f32,
+    tangent_normal: vec3f,
+}
+
+fn point_at(in: Varying) -> Point {
+    var p: Point;
+    p.position = in.position / in.one;
+    p.geometry = cross(dpdx(p.position), dpdy(p.position));
+    p.slopes = vec2f(dpdx(in.clip.z), dpdy(in.clip.z));
+    let uv = in.uv / in.one;
+    let at = Coordinates(uv.xy, uv.zw);
+    p.base_color = base_color_at(at, in.color / in.one);
+    p.substance = substance_at(at, p.base_color);
+    p.emission = emission_at(at);
+    p.occlusion = occlusion_at(at);
+    p.tangent_normal = mapped_normal(at);
+    return p;
+}
+
+// Surfaces that cover all. Nothing here takes samples away, so that what lies behind what has been
+// drawn is never shaded.
 @fragment
-fn forward_fragment(
+fn solid_fragment(
+    in: Varying,
+    @builtin(front_facing) faces_front: bool,
+    /*SAMPLE*/
+) -> @location(0) vec4f {
+    let p = point_at(in);
+    let radiance = radiance_of(in, p, faces_front, pattern(in.clip.xy)/*ITS TURN*/);
+    return vec4f(radiance * frame.pre_exposure, 1.0);
+}
+
+// Surfaces with holes, and those that cover in part.
+@fragment
+fn holed_fragment(
     in: Varying,
     @builtin(front_facing) faces_front: bool,
     /*SAMPLE*/
 ) -> Shaded {
-    let position = in.position / in.one;
-    let geometry = cross(dpdx(position), dpdy(position));
-    let slopes = vec2f(dpdx(in.clip.z), dpdy(in.clip.z));
-    let uv = in.uv / in.one;
-    let at = Coordinates(uv.xy, uv.zw);
-    let base_color = base_color_at(at, in.color / in.one);
-    let substance = substance_at(at, base_color);
-    let emission = emission_at(at);
-    var occlusion = occlusion_at(at);
-    let tangent_normal = mapped_normal(at);
-
-    let plain = (material.flags & MATERIAL_LAMBERT) != 0u;
+    let p = point_at(in);
     var out: Shaded;
     out.coverage = 0xffffffffu;
     var alpha = 1.0;
-    if !plain {
-        if base_color.a < material.cutoff {
-            discard;
-        }
-        if (material.flags & MATERIAL_BLEND) != 0u {
-            alpha = saturate(base_color.a);
-            if BLENDED {
-                if alpha == 0.0 {
-                    discard;
-                }
-            } else {
-                // Layers of one surface differ in their side, or by a hundredth of their distance.
-                let depth = u32(i32(64.0 * log2(in.clip.w)) + 8192);
-                let side = select(0u, 1u, faces_front);
-                out.coverage = covered(alpha, in.clip.xy, hash(in.instance + hash(2u * depth + side)));
-                if out.coverage == 0u {
-                    discard;
-                }
-                alpha = 1.0;
+    if p.base_color.a < material.cutoff {
+        discard;
+    }
+    if (material.flags & MATERIAL_BLEND) != 0u {
+        alpha = saturate(p.base_color.a);
+        if BLENDED {
+            if alpha == 0.0 {
+                discard;
             }
+        } else {
+            // Layers of one surface differ in their side, or by a hundredth of their distance.
+            let depth = u32(i32(64.0 * log2(in.clip.w)) + 8192);
+            let side = select(0u, 1u, faces_front);
+            out.coverage = covered(alpha, in.clip.xy, hash(in.instance + hash(2u * depth + side)));
+            if out.coverage == 0u {
+                discard;
+            }
+            alpha = 1.0;
         }
     }
+    let radiance = radiance_of(in, p, faces_front, pattern(in.clip.xy)/*ITS TURN*/);
+    out.color = vec4f(radiance * frame.pre_exposure * alpha, alpha);
+    return out;
+}
 
+// What a point sends to the eye; `turn`: of the pattern of a shadow's samples.
+fn radiance_of(in: Varying, p: Point, faces_front: bool, turn: f32) -> vec3f {
+    let plain = (material.flags & MATERIAL_LAMBERT) != 0u;
+    var occlusion = p.occlusion;
     let instance = instances[in.instance];
     let front = faces_front != (instance.mirrors == 1u);
-    let v = towards_eye(position);
+    let v = towards_eye(p.position);
     // Of the side that is seen.
     var geometric = v;
-    if dot(geometry, geometry) > 0.0 {
-        geometric = normalize(geometry);
+    if dot(p.geometry, p.geometry) > 0.0 {
+        geometric = normalize(p.geometry);
         geometric = select(geometric, -geometric, dot(geometric, v) < 0.0);
     }
 
@@ -144,9 +183,9 @@ fn forward_fragment(
     let two_sided = (material.flags & MATERIAL_DOUBLE_SIDED) != 0u;
     if (frame.parts & PART_EMISSION) != 0u {
         if (material.flags & MATERIAL_UNLIT) != 0u && !plain {
-            radiance += select(vec3f(0.0), saturate(base_color.rgb), front || two_sided) / frame.pre_exposure;
+            radiance += select(vec3f(0.0), saturate(p.base_color.rgb), front || two_sided) / frame.pre_exposure;
         } else if front || (two_sided && !plain) {
-            radiance += emission;
+            radiance += p.emission;
         }
     }
     let scatters = plain || ((material.flags & MATERIAL_UNLIT) == 0u && (front || two_sided));
@@ -155,28 +194,27 @@ fn forward_fragment(
         var object_normal = n0;
         if material.normal_map.row1.w > 0.5 && !plain && dot(in.tangent.xyz, in.tangent.xyz) > 0.0 {
             let bitangent = cross(n0, in.tangent.xyz) * sign(in.tangent.w);
-            object_normal = tangent_normal.x * in.tangent.xyz + tangent_normal.y * bitangent + tangent_normal.z * n0;
+            object_normal = p.tangent_normal.x * in.tangent.xyz + p.tangent_normal.y * bitangent + p.tangent_normal.z * n0;
         }
         let shading = transform_vector(instance.normal_from_object, object_normal);
         let n = visible_normal(shading, geometric, v);
-        var b = bsdf_of(substance);
+        var b = bsdf_of(p.substance);
         if plain {
-            b = lambert(substance.base_color);
+            b = lambert(p.substance.base_color);
             occlusion = 1.0;
         }
         if (frame.parts & PART_DIRECT) != 0u {
-            radiance += direct_light(b, n, v, position, geometric, pattern(in.clip.xy)/*ITS TURN*/);
+            radiance += direct_light(b, n, v, p.position, geometric, turn);
         }
         if (frame.parts & PART_INDIRECT) != 0u {
             var visible = 1.0;
             if OCCLUDED {
-                visible = ambient_visibility(in.clip, slopes);
+                visible = ambient_visibility(in.clip, p.slopes);
             }
-            radiance += indirect_light(b, n, v, position, substance.roughness, occlusion, visible);
+            radiance += indirect_light(b, n, v, p.position, p.substance.roughness, occlusion, visible);
         }
     }
-    out.color = vec4f(radiance * frame.pre_exposure * alpha, alpha);
-    return out;
+    return radiance;
 }
 
 fn normalize_or_zero(v: vec3f) -> vec3f {
