@@ -38,8 +38,8 @@ pub struct Job {
     /// Surface scattering events on a path seen from a receiver: 0 sees only emission and
     /// environment, 1 light scattered once, and so on.
     pub bounces: u32,
-    /// Upper limit of one path vertex's contribution (luminance, cd/m²), against fireflies;
-    /// infinite for none. The second paper's clamp (4.1.1).
+    /// Upper limit of one path vertex's contribution (luminance, cd/m²) to light that was scattered
+    /// before it arrives, against fireflies; infinite for none. The second paper's clamp (chapter 5).
     pub clamp: f32,
     /// Asks for [`Sums::distances`]: up to how many metres a distance counts. What is farther, or
     /// nowhere, counts as so far.

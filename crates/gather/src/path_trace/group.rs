@@ -504,20 +504,28 @@ impl Shader<'_, '_> {
         weight * lights.sky.radiance(direction)
     }
 
-    /// Scattered light held to the limit; what the receiver sees itself is left alone. A value that
-    /// is not a number would spoil a whole field, so it counts as nothing.
+    /// Light that was scattered so often, held to the limit. A value that is not a number would spoil a
+    /// whole field, so it counts as nothing.
     #[inline]
     fn limited(&self, scattered: u32, light: Vec3) -> Vec3 {
         if !light.is_finite() {
+            #[cfg(test)]
+            LOST.with(|lost| lost.set(lost.get() + 1));
             return Vec3::ZERO;
         }
         let y = luminance(light);
-        if scattered == 0 || y <= self.limits.clamp {
+        if scattered < self.limits.clamp_from || y <= self.limits.clamp {
             light
         } else {
             light * (self.limits.clamp / y)
         }
     }
+}
+
+#[cfg(test)]
+thread_local! {
+    /// How much light was none that a number tells, on this thread.
+    pub(super) static LOST: std::cell::Cell<u32> = const { std::cell::Cell::new(0) };
 }
 
 /// Where a point of an emissive triangle or of the environment is.

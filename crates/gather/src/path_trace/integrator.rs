@@ -21,6 +21,9 @@ pub(crate) struct Paths<'a> {
     pub(crate) bounces: u32,
     /// Upper limit of the luminance that a vertex adds to scattered light, cd/m².
     pub(crate) clamp: f32,
+    /// Scattering events from which on that holds. Light that is scattered once is direct light to a
+    /// camera and indirect light to a probe: so both are held to the limit alike.
+    pub(crate) clamp_from: u32,
     /// Scattering events from which on paths may end by chance.
     pub(crate) roulette_from: u32,
     /// The light that the last surface of a path scatters, beside that of punctual lights; without
@@ -40,6 +43,7 @@ impl Paths<'_> {
         Self {
             bounces,
             clamp: f32::INFINITY,
+            clamp_from: 1,
             roulette_from: u32::MAX,
             previous: None,
             beam: None,

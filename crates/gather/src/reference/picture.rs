@@ -42,7 +42,8 @@ pub struct PictureSettings {
     pub size: UVec2,
     /// Surface scattering events on a path: 1 is direct light.
     pub bounces: u32,
-    /// As in [`crate::Job::clamp`]; directly seen light is not clamped.
+    /// As in [`crate::Job::clamp`], of light that is scattered twice or more: what a probe sees scattered
+    /// once, a camera sees scattered twice.
     pub clamp: f32,
     /// Scattering events from which on paths may end by chance, in favour of others (Russian
     /// roulette); none do before, and never where it is `u32::MAX`.
@@ -241,7 +242,12 @@ impl Renderer {
     /// The paths to follow, without a beam.
     pub(super) fn paths(&self) -> Paths<'_> {
         let s = &self.settings;
-        Paths { clamp: s.clamp, roulette_from: s.roulette_from, ..Paths::new(s.bounces) }
+        Paths {
+            clamp: s.clamp,
+            clamp_from: 2,
+            roulette_from: s.roulette_from,
+            ..Paths::new(s.bounces)
+        }
     }
 
     /// Batches of camera rays on all threads, in order: what `of` makes of each.

@@ -152,7 +152,7 @@ fn a_mirror_shows_the_disc() {
         check(look_down(&stage, 1), Vec3::splat(radiance), Vec3::splat(0.98 * radiance));
         let (mean, error) = look_down(&stage, 1);
         assert!(error.max_element() < 1e-3 * mean.max_element(), "{mean} ± {error}");
-        let (away, _) = look(&stage.snapshot(), at + 0.1 * Vec3::Y, mirrored, 1, f32::INFINITY);
+        let (away, _) = look(&stage.snapshot(), at + 0.1 * Vec3::Y, mirrored, super::Paths::new(1));
         assert_eq!(away, BLACK);
     }
 }
