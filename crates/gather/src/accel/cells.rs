@@ -90,6 +90,12 @@ pub(super) struct Over<'a> {
 }
 
 impl Cells {
+    #[cfg(test)]
+    pub(super) fn count(&self) -> usize {
+        // One ends the last one's list.
+        self.cells.len() - 1
+    }
+
     /// Asks for the cell at a place, and gives its number.
     #[inline(always)]
     pub(super) fn find(&self, at: [f32; 2]) -> usize {

@@ -71,6 +71,11 @@ impl ItemBuffer {
         Some(Self { eye, axes, cells })
     }
 
+    #[cfg(test)]
+    pub(super) fn cell_count(&self) -> usize {
+        self.cells.count()
+    }
+
     /// Finds the nearest surface that `accept` lets count on each of the rays, like [`Accel::closest`].
     /// Rays that it cannot tell of are passed to `left`.
     #[inline]
