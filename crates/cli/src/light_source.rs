@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
-use lumencast_codec::LightFile;
+use lumencast_codec::{Catalog, DecodeError, LightFile};
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::{Grid, ProbeVolume};
+use lumencast_light::ProbeVolume;
 use lumencast_scene::{Scene, Snapshot, VolumeSpec};
 
 use crate::arguments::Reading;
@@ -18,21 +18,31 @@ pub(crate) fn is_address(what: &str) -> bool {
     what.starts_with("http://") || what.starts_with("https://")
 }
 
-/// The volumes of a file, or the newest ones of a server's scene.
-pub(crate) fn volumes(what: &str) -> Result<Vec<ProbeVolume>> {
+/// The light of a file, or the newest of a server's scene: what it is of, and its volumes.
+pub(crate) fn light(what: &str) -> Result<(Catalog, Vec<ProbeVolume>)> {
     if is_address(what) {
-        return Ok(remote::look(what)?.volumes);
+        let seen = remote::look(what)?;
+        return Ok((seen.catalog, seen.volumes));
     }
     let bytes = std::fs::read(Path::new(what)).with_context(|| format!("cannot read {what}"))?;
-    let read = || LightFile::read(&bytes)?.volumes();
-    read().with_context(|| format!("{what} is no light field"))
+    let read = || {
+        let file = LightFile::read(&bytes)?;
+        let volumes = file.volumes()?;
+        Ok((file.catalog, volumes))
+    };
+    let read: Result<_, DecodeError> = read();
+    read.with_context(|| format!("{what} is no light field"))
 }
 
-/// Warns where no volume of a field lights any part of a scene.
-pub(crate) fn check_fits<'a>(what: &str, grids: impl IntoIterator<Item = &'a Grid>, scene: &Scene) {
+/// Warns where light is another scene's: by its name, or because none of it reaches this one.
+pub(crate) fn check_fits(what: &str, catalog: &Catalog, scene: &Scene) {
+    let (of, this) = (&catalog.scene.name, scene.name());
+    if of != this {
+        eprintln!("warning: {what} is the light of {of:?}, and this scene is {this:?}");
+    }
     let bounds = scene.bounds();
     let (middle, reach) = (0.5 * (bounds.min + bounds.max), 0.5 * bounds.min.distance(bounds.max));
-    if !grids.into_iter().any(|grid| grid.distance(middle) <= reach) {
+    if !catalog.fields.iter().any(|field| field.grid.distance(middle) <= reach) {
         eprintln!("warning: {what} lights no part of this scene; is it another scene's?");
     }
 }

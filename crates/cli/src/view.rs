@@ -146,18 +146,18 @@ impl View {
     fn saved(&self, file: &Path) -> Result<Box<dyn World>> {
         let scene = self.scene.source.open()?;
         let name = file.display().to_string();
-        let light = LightField::new(light_source::volumes(&name)?);
-        let grids = light.volumes().iter().map(|volume| &volume.grid);
-        light_source::check_fits(&name, grids, &scene);
-        Ok(Box::new(Still::new(scene, light, name)))
+        let (catalog, volumes) = light_source::light(&name)?;
+        light_source::check_fits(&name, &catalog, &scene);
+        Ok(Box::new(Still::new(scene, LightField::new(volumes), name)))
     }
 
     /// A scene from here under a server's light.
     fn under_a_servers_light(&self, runtime: &Runtime, url: &str) -> Result<Box<dyn World>> {
         let scene = self.scene.source.open()?;
         let session = runtime.block_on(connect(url))?;
-        let fields = session.catalog().map(|catalog| catalog.fields).unwrap_or_default();
-        light_source::check_fits(url, fields.iter().map(|field| &field.grid), &scene);
+        if let Some(catalog) = session.catalog() {
+            light_source::check_fits(url, &catalog, &scene);
+        }
         Ok(world(session, scene))
     }
 

@@ -118,14 +118,23 @@ fn goes_on_after_an_interruption() {
     assert!(partial.exists(), "nothing was kept in {:?}", began.elapsed());
     assert!(!picture.exists());
 
-    // Far more than were kept would take too long; as many as there are is enough.
-    let ran = finish(&picture, "1");
-    assert_eq!(ran.code, Some(0), "{ran:?}");
-    let report = ran.json();
-    let samples = report["samples"].as_u64().expect("a number");
-    assert!(samples > 1, "{report}");
-    assert_eq!(report["samples_taken_before"].as_u64(), Some(samples));
-    assert!(!partial.exists());
+    let finished = |samples: &str| {
+        let ran = finish(&picture, samples);
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        assert!(!partial.exists());
+        let report = ran.json();
+        ["samples", "samples_taken_before"].map(|key| report[key].as_u64().expect("a number"))
+    };
+    // As many as were asked for, far more than there are, would take too long. That there are some is
+    // enough for a picture; and it goes on from them where some more are asked for.
+    let kept = std::fs::read(&partial).expect("what was kept");
+    let [before, known] = finished("1");
+    assert!(before > 1);
+    assert_eq!(known, before);
+    std::fs::write(&partial, kept).expect("put back");
+    let [samples, known] = finished(&(before + 8).to_string());
+    assert!(samples >= before + 8, "{samples}, {before} before");
+    assert_eq!(known, before);
 
     let ran = finish(&whole, &samples.to_string());
     assert_eq!(ran.code, Some(0), "{ran:?}");
@@ -266,7 +275,40 @@ fn what_cannot_be_drawn_is_said() {
     std::fs::write(&other, b"LUMENCST is not all").expect("written");
     render(&["--lighting", "field", "--light", text(&other)]).failed_saying(&["no light field"]);
     render(&["--lighting", "field", "--parts", "direct"]).failed_saying(&["--lighting direct"]);
+    for what in [["--views", "stereo"], ["--light", "nowhere.light"]] {
+        render(&[&["--lighting", "reference"][..], &what].concat())
+            .failed_saying(&[what[0], "--lighting field"]);
+    }
     let behind = render(&["--lighting", "field", "--occlusion=-1"]);
     assert!(behind.code == Some(2) && behind.stderr.contains("metres"), "{behind:?}");
     assert!(!picture.exists());
+}
+
+/// Light of another scene that lies in the same place is told by its name; that a field is given says how
+/// light is computed.
+#[test]
+fn light_of_another_scene_is_drawn_with_a_warning() {
+    let folder = Folder::new("render-another");
+    let [light, picture] = ["a.light", "a.png"].map(|name| folder.0.join(name));
+    let bake = |scene: &str| {
+        let volume = ["--volume", "1x1x1@0,1,0:2,2,2", "--samples", "1"];
+        let ran = run(&[&["bake", scene, "-o", text(&light)][..], &volume].concat());
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+    };
+    let render = || {
+        let size = ["--size", "8x8", "--samples", "1", "--shadow-resolution", "64", "--json"];
+        let files = ["--light", text(&light), "-o", text(&picture)];
+        let ran = run(&[&["render", "cornell"][..], &size, &files].concat());
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        assert_eq!(ran.json()["probes"], 1);
+        ran.stderr
+    };
+    bake("door");
+    let said = render();
+    assert!(
+        ["warning", "\"door\"", "\"cornell\""].iter().all(|word| said.contains(word)),
+        "{said}"
+    );
+    bake("cornell");
+    assert!(!render().contains("warning"));
 }

@@ -38,9 +38,9 @@ EXR holds linear radiance in cd/m²; PNG is shown by exposure and tone map.")]
 pub(crate) struct Render {
     #[command(flatten)]
     scene: SceneArguments,
-    /// How light is computed.
-    #[arg(long, value_enum, default_value_t = Lighting::Reference)]
-    lighting: Lighting,
+    /// How light is computed: reference unless given, but field where --light or --views are.
+    #[arg(long, value_enum)]
+    lighting: Option<Lighting>,
     /// The picture's file, .exr or .png; may be given several times.
     #[arg(short, long, value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
@@ -60,7 +60,8 @@ pub(crate) struct Render {
     /// How a pixel weighs what it sees.
     #[arg(long, value_enum, default_value_t = FilterArgument::Box)]
     filter: FilterArgument,
-    /// Upper limit of one path vertex's contribution, cd/m², against bright speckles.
+    /// Upper limit of one path vertex's contribution to light scattered twice or more, cd/m², against
+    /// bright speckles.
     #[arg(long, value_name = "CD/M2", default_value = "inf", value_parser = parse_positive)]
     clamp: f32,
     /// Scattering events from which on paths may end by chance.
@@ -125,14 +126,25 @@ enum FilterArgument {
 
 impl Render {
     pub(crate) fn run(self) -> Result<()> {
+        if let (Lighting::Reference, Some(asked)) = (self.lighting(), self.raster.asked_for()) {
+            bail!("{asked} is for pictures that an adapter draws; give --lighting field");
+        }
         self.check_outputs()?;
         let mut scene = self.scene.source.open()?;
         scene.advance(self.time);
         let view = camera::view(&scene, self.picture.camera.as_ref())?;
-        match self.lighting {
+        match self.lighting() {
             Lighting::Reference => self.trace_picture(&mut scene, view),
             _ => self.draw_picture(&mut scene, view),
         }
+    }
+
+    fn lighting(&self) -> Lighting {
+        let unless_given = match self.raster.asked_for() {
+            Some(_) => Lighting::Field,
+            None => Lighting::Reference,
+        };
+        self.lighting.unwrap_or(unless_given)
     }
 
     /// Said before hours of work, not after.

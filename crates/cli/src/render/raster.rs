@@ -84,6 +84,14 @@ enum TransparencyArgument {
     Sorted,
 }
 
+impl RasterArguments {
+    /// What only an adapter's pictures have, where it is asked for.
+    pub(super) fn asked_for(&self) -> Option<&'static str> {
+        let light = self.light.is_some().then_some("--light");
+        light.or_else(|| self.views.is_some().then_some("--views"))
+    }
+}
+
 impl Render {
     pub(super) fn draw_picture(&self, scene: &mut Scene, view: View) -> Result<()> {
         ensure!(
@@ -105,13 +113,18 @@ impl Render {
         }
         let grid = self.raster.views.unwrap_or(UVec2::ONE);
         let views = views(&view, grid, self.raster.view_spacing);
-        let known = self.exposure.0;
-        let exposure = known.map_or_else(|| glance(&mut renderer, &views, &settings), Ok)?;
+        let (exposure, before) = match self.exposure.0 {
+            Some(exposure) => (exposure, None),
+            None => glance(&mut renderer, &views, &settings)?,
+        };
         let settings = Settings { pre_exposure: exposure, ..settings };
 
         let start = Instant::now();
-        let (pictures, drawn) = renderer.pictures_with(&views, &settings)?;
+        let (pictures, mut drawn) = renderer.pictures_with(&views, &settings)?;
         let seconds = start.elapsed().as_secs_f64();
+        if let (Some(time), Some(before)) = (&mut drawn.time, before) {
+            keep(time, &before);
+        }
         let picture = side_by_side(&pictures, settings.size, grid)?;
         self.write(&picture, exposure)?;
         self.report_drawn(&adapter, &drawn, probes, seconds, exposure)
@@ -126,7 +139,7 @@ impl Render {
                 ShadingArgument::Pixels => Shading::Pixels,
                 ShadingArgument::Samples => Shading::Samples,
             },
-            lighting: match self.lighting {
+            lighting: match self.lighting() {
                 Lighting::Reference | Lighting::Field => lumencast_shade::Lighting::FIELD,
                 Lighting::Direct => lumencast_shade::Lighting::DIRECT,
                 Lighting::Indirect => lumencast_shade::Lighting::INDIRECT,
@@ -151,9 +164,8 @@ impl Render {
     /// The field given, or else one computed for this picture.
     fn volumes(&self, scene: &mut Scene) -> Result<Vec<ProbeVolume>> {
         if let Some(light) = &self.raster.light {
-            let volumes = light_source::volumes(light)?;
-            let grids = volumes.iter().map(|volume| &volume.grid);
-            light_source::check_fits(light, grids, scene);
+            let (catalog, volumes) = light_source::light(light)?;
+            light_source::check_fits(light, &catalog, scene);
             return Ok(volumes);
         }
         let specs = self.scene.volumes(scene)?;
@@ -233,16 +245,31 @@ impl Render {
     }
 }
 
-/// The exposure of a first, small picture.
-fn glance(renderer: &mut Renderer, views: &[View], settings: &Settings) -> Result<f32> {
+/// The exposure of a first, small picture, and what that took.
+fn glance(
+    renderer: &mut Renderer,
+    views: &[View],
+    settings: &Settings,
+) -> Result<(f32, Option<PassTimes>)> {
     let small = Settings {
         size: (settings.size / GLANCE).max(UVec2::ONE),
         samples: 1,
         pre_exposure: GLANCE_PRE_EXPOSURE,
         ..*settings
     };
-    let pictures = renderer.pictures(&views[..1], &small)?;
-    Ok(exposure(&side_by_side(&pictures, small.size, UVec2::ONE)?))
+    let (pictures, drawn) = renderer.pictures_with(&views[..1], &small)?;
+    Ok((exposure(&side_by_side(&pictures, small.size, UVec2::ONE)?), drawn.time))
+}
+
+/// Adds what a picture found on the device already, from the glance before it.
+fn keep(time: &mut PassTimes, before: &PassTimes) {
+    for (now, before) in
+        [(&mut time.deformation, before.deformation), (&mut time.shadows, before.shadows)]
+    {
+        if *now == 0.0 {
+            *now = before;
+        }
+    }
 }
 
 /// A grid of cameras about one, all looking in parallel; row by row from the upper left.
