@@ -29,12 +29,17 @@ fn number(report: &Value, pointer: &str) -> f64 {
 #[test]
 fn fields_and_the_baseline_are_judged() {
     let folder = Folder::new("quality");
-    let [kept, out] = ["kept", "out"].map(|name| folder.0.join(name));
-    let [kept, out] = [&kept, &out].map(|path| path.to_str().expect("text"));
+    let [kept, out, document] = ["kept", "out", "results.md"].map(|name| folder.0.join(name));
+    let [kept, out, document] = [&kept, &out, &document].map(|path| path.to_str().expect("text"));
+    std::fs::write(document, "# Results\n\nBy hand.\n").expect("a document");
     let mut arguments = vec!["--orders", "1,2", "--keep", kept, "--json"];
     let report = bench(
-        &[&arguments[..], &["--baseline-frames", "24", "--resolutions", "16,48", "-o", out]]
-            .concat(),
+        &[
+            &arguments[..],
+            &["--baseline-frames", "24", "--resolutions", "16,48", "-o", out],
+            &["--document", document],
+        ]
+        .concat(),
     )
     .json();
 
@@ -71,6 +76,7 @@ fn fields_and_the_baseline_are_judged() {
     let traced = |n| number(&report, &format!("/resolutions/{n}/baseline/light_seconds"));
     assert!(traced(1) > traced(0), "nine times the paths: {report}");
     what_was_written_is_what_was_measured(&report, Path::new(out));
+    a_document_has_it_too(&report, Path::new(document));
 
     // The reference is kept, and grows no further where that is enough.
     arguments.extend(["--baseline-frames", "0"]);
@@ -125,6 +131,22 @@ fn what_was_written_is_what_was_measured(report: &Value, folder: &Path) {
     }
 }
 
+/// The tables stand below what stood there, and all that they show is there.
+fn a_document_has_it_too(report: &Value, document: &Path) {
+    let text = std::fs::read_to_string(document).expect("the document");
+    assert!(text.starts_with("# Results\n\nBy hand.\n\n<!-- quality of cornell"), "{text}");
+    for row in report["fields"].as_array().expect("rows") {
+        let psnr = row["whole"]["psnr"].as_f64().expect("a number");
+        assert!(text.contains(&format!("| {psnr:.2} |")), "{text}");
+    }
+    let shown: Vec<_> = text.split("](").skip(1).filter_map(|s| s.split(')').next()).collect();
+    let folder = document.parent().expect("a folder");
+    assert_eq!(shown.len(), 3, "{text}");
+    assert!(shown.iter().all(|name| folder.join(name).is_file()), "{shown:?}");
+    let sheet = std::fs::read(folder.join(shown[0])).expect("a picture");
+    assert!(sheet.starts_with(&[0xff, 0xd8, 0xff]), "a JPEG");
+}
+
 #[test]
 fn tables_are_for_people_too() {
     let ran = bench(&["--orders", "2", "--baseline-frames", "2", "--fit", "0"]);
@@ -132,6 +154,8 @@ fn tables_are_for_people_too() {
     for words in ["| 4x4x4 L2 3 bounces |", "| 1 spp |", "| 1 spp, BMFR |", "direct light alone:"] {
         assert!(ran.stdout.contains(words), "{words:?} is missing: {ran:?}");
     }
-    let ran = run(&["bench", "quality", "cornell", "--resolutions", "0"]);
-    assert_eq!(ran.code, Some(2), "{ran:?}");
+    for wrong in [&["--resolutions", "0"][..], &["--document", "a.md", "--section", "a-->b"]] {
+        let ran = run(&[&["bench", "quality", "cornell"], wrong].concat());
+        assert_eq!(ran.code, Some(2), "{ran:?}");
+    }
 }

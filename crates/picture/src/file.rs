@@ -1,4 +1,4 @@
-//! Files: PNG and OpenEXR written, Radiance HDR read as well.
+//! Files: PNG, JPEG and OpenEXR written; PNG, OpenEXR and Radiance HDR read.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter};
@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::Vec3;
 use image::{
     DynamicImage, ExtendedColorType, ImageEncoder, ImageError, ImageFormat, ImageReader, Limits,
-    codecs::{openexr::OpenExrEncoder, png::PngEncoder},
+    codecs::{jpeg::JpegEncoder, openexr::OpenExrEncoder, png::PngEncoder},
 };
 
 use crate::tone::{gamma_code, linear_from_srgb};
@@ -17,6 +17,8 @@ use crate::{Picture, PictureError, ToneMap};
 const SIDE: u32 = 32_768;
 /// The most memory that reading may take, bytes: 16 k × 16 k pixels of 12 bytes.
 const MEMORY: u64 = 3 << 30;
+/// Of 100.
+const JPEG_QUALITY: u8 = 85;
 
 /// What a file holds, by its kind.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,11 +98,7 @@ impl Picture {
         tone_map: ToneMap,
         exposure: f32,
     ) -> Result<(), PictureError> {
-        let code = |p: &Vec3| {
-            let code = tone_map.encode(*p * exposure);
-            code.to_array().map(|v| (255.0 * v + 0.5) as u8)
-        };
-        let bytes: Vec<u8> = self.pixels().iter().flat_map(code).collect();
+        let bytes = self.bytes(tone_map, exposure);
         write_whole(path.as_ref(), |out| {
             PngEncoder::new(out).write_image(
                 &bytes,
@@ -109,6 +107,38 @@ impl Picture {
                 ExtendedColorType::Rgb8,
             )
         })
+    }
+
+    /// Writes a JPEG for documents, a tenth of a PNG's size, shown by `tone_map` after a factor of
+    /// `exposure`. Not for comparisons: its blocks are changed.
+    ///
+    /// # Errors
+    /// The file cannot be written, as it is not where a side is over 65,535 pixels; one that was there
+    /// before is left as it was.
+    pub fn write_jpeg(
+        &self,
+        path: impl AsRef<Path>,
+        tone_map: ToneMap,
+        exposure: f32,
+    ) -> Result<(), PictureError> {
+        let bytes = self.bytes(tone_map, exposure);
+        write_whole(path.as_ref(), |out| {
+            JpegEncoder::new_with_quality(out, JPEG_QUALITY).write_image(
+                &bytes,
+                self.width(),
+                self.height(),
+                ExtendedColorType::Rgb8,
+            )
+        })
+    }
+
+    /// Codes of 8 bits a channel.
+    fn bytes(&self, tone_map: ToneMap, exposure: f32) -> Vec<u8> {
+        let code = |p: &Vec3| {
+            let code = tone_map.encode(*p * exposure);
+            code.to_array().map(|v| (255.0 * v + 0.5) as u8)
+        };
+        self.pixels().iter().flat_map(code).collect()
     }
 
     /// Writes an OpenEXR of 32-bit floats, channels R, G and B, linear as they are.

@@ -59,6 +59,21 @@ fn png_keeps_codes_to_half_a_step() {
 }
 
 #[test]
+fn jpeg_shows_what_a_png_does() {
+    let folder = Folder::new("jpeg");
+    let picture = Picture::from_fn(64, 48, |x, y| Vec3::new(x as f32, y as f32, 20.0) / 64.0);
+    picture.write_jpeg(folder.at("a.jpg"), ToneMap::Gamma, 0.5).expect("written");
+    picture.write_png(folder.at("a.png"), ToneMap::Gamma, 0.5).expect("written");
+    let [jpeg, png] = ["a.jpg", "a.png"].map(|name| {
+        let file = image::open(folder.at(name)).expect("a picture");
+        file.into_rgb8()
+    });
+    let off = jpeg.iter().zip(png.iter()).map(|(a, b)| f64::from(a.abs_diff(*b)));
+    let mean = off.sum::<f64>() / jpeg.len() as f64;
+    assert!((0.01..3.0).contains(&mean), "{mean} of 255");
+}
+
+#[test]
 fn png_of_other_kinds_and_hdr_are_read() {
     let folder = Folder::new("kinds");
     let grey = image::ImageBuffer::from_fn(2, 1, |x, _| image::Luma([60_000 * x as u16]));

@@ -1,11 +1,13 @@
 //! `lumencast bench quality`: how near a client's pictures come to path-traced ones.
 
 mod baseline;
+mod document;
 mod field;
 mod plot;
 mod reference;
 mod report;
 mod results;
+mod sheet;
 
 use std::fs;
 use std::path::PathBuf;
@@ -36,6 +38,7 @@ Examples:
   lumencast bench quality sponza.glb --environment sky:4 --volume 10x6x7 --volume 20x12x14
   lumencast bench quality breakfast.glb --volume 8x4x8 --orders 2,3,4 --keep references -o results
   lumencast bench quality breakfast.glb --volume 8x4x8 --resolutions 64,128,256,512 -o results
+  lumencast bench quality breakfast.glb --volume 8x4x8 --document docs/results.md
 
 Every --volume is a grid to be measured by itself. A row is a grid and an order, as its light is
 gathered, and, unless --fit is 0, another one fitted to surfaces; the first grid is also measured with as
@@ -93,6 +96,13 @@ pub(crate) struct BenchQuality {
     /// reference, and plots.
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
+    /// Puts the tables into this document of markdown, in place of the section that an earlier run put
+    /// there or at its end, with one picture of pictures and the plots in pictures/ beside it.
+    #[arg(long, value_name = "FILE")]
+    document: Option<PathBuf>,
+    /// The name of that section; the scene's unless given.
+    #[arg(long, value_name = "NAME", requires = "document", value_parser = document::parse_name)]
+    section: Option<String>,
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
@@ -112,6 +122,10 @@ impl BenchQuality {
                 .with_context(|| format!("cannot make {}", folder.display()))?;
         }
         let mut scene = self.scene.source.open()?;
+        let section = self.section.clone().unwrap_or_else(|| scene.name().to_owned());
+        if let Some(document) = &self.document {
+            document::check(&section, document)?;
+        }
         let snapshot = scene.snapshot();
         let view = camera::view(&scene, self.picture.camera.as_ref())?;
         let subject = Subject { scene: &scene, snapshot, view };
@@ -141,6 +155,9 @@ impl BenchQuality {
         };
         if let Some(folder) = &self.output {
             results::write(&report, folder)?;
+        }
+        if let Some(document) = &self.document {
+            document::write(&report, &section, document)?;
         }
         if self.json {
             return output::json(&serde_json::to_value(&report)?);

@@ -164,6 +164,11 @@ impl Report {
         );
         let (samples, noise) = (reference.samples, decibels(reference.noise_psnr));
         // Writing to a string does not fail.
+        let _ = writeln!(
+            text,
+            "pictures: {} samples a pixel; light: {} samples a probe; materials: {}  ",
+            self.samples, self.probe_samples, self.materials
+        );
         let _ = writeln!(text, "reference: {samples} samples a pixel, noise {noise}  ");
         let (psnr, flip) = (direct.psnr, direct.flip);
         let _ = writeln!(text, "direct light alone: {psnr:.2} dB, FLIP {flip:.4}\n");

@@ -59,7 +59,7 @@ fn gallery(report: &Report) -> String {
 }
 
 /// Figures 5.7 and 5.8 of the second paper.
-fn plots(rows: &[AtResolution]) -> [Plot; 2] {
+pub(super) fn plots(rows: &[AtResolution]) -> [Plot; 2] {
     let of_field = |value: fn(&Row) -> f64| {
         rows.iter().map(|r| (f64::from(r.side), value(&r.field))).collect()
     };
@@ -106,6 +106,6 @@ fn file_name(row: &Row) -> String {
     row.name.replace(',', "").replace(' ', "-")
 }
 
-fn write_text(path: &Path, text: &str) -> Result<()> {
+pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
     fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }
