@@ -4,14 +4,61 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::UVec2;
 
-use crate::ShadeError;
 use crate::bindings::entry;
-use crate::timing;
+use crate::settings::{Settings, Shading};
+use crate::{ShadeError, timing};
 
 /// What colours are drawn in before they are shown: linear, pre-exposed.
 pub(crate) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 /// Depth, of pictures and shadow maps alike.
 pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// What is used where an adapter has it, and done without where it has not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Abilities {
+    /// The most samples that a pixel has at once: 1, 2, 4 or 8. Pictures of more are averaged over
+    /// frames.
+    pub samples: u32,
+    /// Every sample of a pixel can be shaded. Without it, pictures are averaged over frames of one
+    /// sample instead, and windows are shaded once a pixel.
+    pub sample_shading: bool,
+    /// It tells how long passes take.
+    pub clock: bool,
+}
+
+impl Abilities {
+    /// What pictures by these settings have to do without, for people.
+    pub fn missing(&self, settings: &Settings) -> Vec<&'static str> {
+        let mut missing = Vec::new();
+        let shades_samples = settings.shading == Shading::Samples && settings.samples > 1;
+        if shades_samples && !self.sample_shading {
+            missing.push(
+                "the adapter cannot shade single samples of a pixel: pictures are averaged over \
+                 frames of one sample, windows are shaded once a pixel",
+            );
+        }
+        if !self.clock {
+            missing.push("the adapter has no clock: passes are not timed");
+        }
+        missing
+    }
+}
+
+/// What there is no drawing without: shaders read instances and lights from storage buffers, skins are
+/// computed, shadow maps compared.
+const NEEDED: wgpu::DownlevelFlags = wgpu::DownlevelFlags::COMPUTE_SHADERS
+    .union(wgpu::DownlevelFlags::VERTEX_STORAGE)
+    .union(wgpu::DownlevelFlags::FRAGMENT_STORAGE);
+
+/// Why an adapter with these abilities cannot be used.
+fn refusal(flags: wgpu::DownlevelFlags) -> Option<String> {
+    let lacking = NEEDED.difference(flags);
+    let names: Vec<_> = lacking.iter_names().map(|(name, _)| name).collect();
+    let names = names.join(", ");
+    (!lacking.is_empty()).then(|| {
+        format!("it lacks {names}; another one, or one in software (mesa-vulkan-drivers), may do")
+    })
+}
 
 /// A device, and what is known of its adapter.
 #[derive(Debug)]
@@ -24,6 +71,7 @@ pub struct Gpu {
     pub(crate) clock: Option<wgpu::QuerySet>,
     /// Sample counts that pictures can be multisampled with.
     sample_counts: Vec<u32>,
+    sample_shading: bool,
     /// What went wrong since it was last asked for.
     fault: Arc<Mutex<Option<String>>>,
 }
@@ -71,6 +119,10 @@ impl Gpu {
 
     async fn of_adapter(adapter: wgpu::Adapter) -> Result<Self, ShadeError> {
         let info = adapter.get_info();
+        let flags = adapter.get_downlevel_capabilities().flags;
+        if let Some(reason) = refusal(flags) {
+            return Err(ShadeError::Device { adapter: info.name, reason });
+        }
         // With this feature, sample counts are those of the adapter instead of WebGPU's 1 and 4.
         let specific = wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES;
         let wanted = specific | wgpu::Features::TIMESTAMP_QUERY;
@@ -111,7 +163,26 @@ impl Gpu {
             }
         });
         let clock = timing::clock(&device);
-        Ok(Self { adapter, device, queue, info, clock, sample_counts, fault })
+        let sample_shading = flags.contains(wgpu::DownlevelFlags::MULTISAMPLED_SHADING);
+        Ok(Self { adapter, device, queue, info, clock, sample_counts, sample_shading, fault })
+    }
+
+    /// What it has of all that can be done without.
+    pub fn abilities(&self) -> Abilities {
+        Abilities {
+            samples: self.samples_at_once(u32::MAX),
+            sample_shading: self.sample_shading,
+            clock: self.clock.is_some(),
+        }
+    }
+
+    /// The same device, used as if it had no more than these: what a lesser adapter would draw.
+    #[must_use]
+    pub fn limited_to(mut self, most: Abilities) -> Self {
+        self.sample_counts.retain(|&count| count <= most.samples);
+        self.sample_shading &= most.sample_shading;
+        self.clock = self.clock.filter(|_| most.clock);
+        self
     }
 
     /// For those who draw more onto what is shown.
@@ -249,5 +320,30 @@ impl Gpu {
             self.queue.write_buffer(&buffer, 0, contents);
         }
         buffer
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn adapters_that_cannot_draw_are_refused_with_what_they_lack() {
+        let all = wgpu::DownlevelFlags::all();
+        assert_eq!(refusal(all), None);
+        assert_eq!(refusal(NEEDED), None, "all else can be done without");
+        let said = refusal(all - wgpu::DownlevelFlags::VERTEX_STORAGE).expect("a reason");
+        assert!(said.contains("VERTEX_STORAGE") && !said.contains("COMPUTE"), "{said}");
+    }
+
+    #[test]
+    fn what_is_missing_is_said_where_it_is_asked_for() {
+        let all = Abilities { samples: 4, sample_shading: true, clock: true };
+        let samples = Settings { samples: 8, shading: Shading::Samples, ..Settings::default() };
+        assert!(all.missing(&samples).is_empty());
+        let none = Abilities { samples: 1, sample_shading: false, clock: false };
+        assert_eq!(none.missing(&samples).len(), 2);
+        let pixels = Settings { shading: Shading::Pixels, ..samples };
+        assert!(none.missing(&pixels)[0].contains("clock"));
     }
 }

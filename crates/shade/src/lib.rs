@@ -40,7 +40,7 @@ mod timing;
 
 pub use environment_brdf::{Reflected, environment_brdf, reflected};
 pub use error::ShadeError;
-pub use gpu::Gpu;
+pub use gpu::{Abilities, Gpu};
 pub use renderer::{Drawn, Renderer};
 pub use screen::{Measured, Screen, Show};
 pub use settings::{Lighting, Materials, Occlusion, Settings, Shading, Shadows, Transparency};

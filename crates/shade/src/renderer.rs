@@ -18,7 +18,7 @@ use crate::occlusion::{Groups, Occluder};
 use crate::pipelines::{Layouts, Pipelines, Variant};
 use crate::scene::{Call, GpuScene};
 use crate::screen::{Screen, Show};
-use crate::settings::{Lighting, Materials, Settings, Transparency};
+use crate::settings::{Lighting, Materials, Settings, Shading, Transparency};
 use crate::shadows::ShadowPlan;
 use crate::target::{Target, depth_attachment};
 use crate::timing::{Commands, PassTimes, Stage};
@@ -170,7 +170,10 @@ impl Renderer {
         settings: &Settings,
     ) -> Result<(Vec<Vec<Vec3>>, Drawn), ShadeError> {
         self.gpu.check_size(settings.size)?;
-        let samples = self.gpu.samples_at_once(settings.samples.max(1));
+        let one_by_one =
+            settings.shading == Shading::Samples && !self.gpu.abilities().sample_shading;
+        let wanted = if one_by_one { 1 } else { settings.samples.max(1) };
+        let samples = self.gpu.samples_at_once(wanted);
         let frames = settings.samples.max(1).div_ceil(samples);
         let mut commands = Commands::new(&self.gpu);
         self.prepare(settings, samples, &mut commands);
@@ -252,7 +255,10 @@ impl Renderer {
         let variant = Variant {
             samples,
             // A pixel of one sample is shaded once either way.
-            shading: if samples > 1 { settings.shading } else { Default::default() },
+            shading: match samples > 1 && self.gpu.abilities().sample_shading {
+                true => settings.shading,
+                false => Shading::Pixels,
+            },
             transparency: settings.transparency,
             occluded: settings.drawn_occlusion().is_some(),
         };

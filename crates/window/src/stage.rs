@@ -121,6 +121,8 @@ impl Stage {
 
     /// One frame at `now` seconds, onto a texture of `size` pixels.
     ///
+    /// Where there is nothing to draw onto, as in a window of no size, time goes on and that is all.
+    ///
     /// # Errors
     /// Where the device has failed, or a screenshot cannot be saved.
     pub fn frame(
@@ -133,6 +135,9 @@ impl Stage {
         let seconds = self.frames.begin(now);
         self.meter(now)?;
         self.world.update(now, self.camera.eye());
+        if size.min_element() == 0 {
+            return Ok(PlatformOutput::default());
+        }
         let facts = self.facts(size);
         let context = self.context.clone();
         let mut asked = Asked::default();
@@ -216,6 +221,8 @@ impl Stage {
             format!("{} of {}²", self.drawn.shadow_maps, self.drawn.shadow_resolution),
         ));
         let mut notices: Vec<String> = self.world.notice().into_iter().collect();
+        let missing = self.gpu().abilities().missing(&self.settings(size));
+        notices.extend(missing.into_iter().map(|what| format!("{what}.")));
         if self.drawn.lights_without_shadow > 0 {
             let count = self.drawn.lights_without_shadow;
             notices

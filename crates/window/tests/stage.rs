@@ -60,10 +60,14 @@ impl Test {
     }
 
     fn frame(&mut self, events: Vec<Event>) -> Result<(), WindowError> {
+        self.frame_of(SIZE, events)
+    }
+
+    fn frame_of(&mut self, size: UVec2, events: Vec<Event>) -> Result<(), WindowError> {
         let rect = Rect::from_min_size(Pos2::ZERO, vec2(SIZE.x as f32, SIZE.y as f32));
         let input = RawInput { screen_rect: Some(rect), events, ..RawInput::default() };
         self.now += 0.5;
-        self.stage.frame(self.now, input, SIZE, &self.onto)?;
+        self.stage.frame(self.now, input, size, &self.onto)?;
         // A window waits for its display; here the device would fall behind.
         let waited = self.stage.gpu().device().poll(wgpu::PollType::wait_indefinitely());
         assert!(waited.is_ok(), "{waited:?}");
@@ -176,6 +180,17 @@ fn screenshots_do_not_overwrite_each_other() {
     std::fs::remove_dir_all(&test.folder).unwrap();
     test.press(Key::P);
     assert!(!test.folder.exists());
+}
+
+/// A window may be made so small that nothing is left of it, and large again.
+#[test]
+fn a_window_of_no_size_draws_nothing() {
+    let mut test = Test::new("nothing");
+    test.frames([vec![], vec![]]);
+    for size in [UVec2::ZERO, UVec2::new(0, SIZE.y), UVec2::new(SIZE.x, 0)] {
+        test.frame_of(size, vec![]).unwrap();
+        test.frame(vec![]).unwrap();
+    }
 }
 
 #[test]

@@ -101,6 +101,9 @@ impl Render {
         let settings = self.raster_settings();
         let gpu = Gpu::new()?;
         let adapter = gpu.name();
+        for what in gpu.abilities().missing(&settings) {
+            eprintln!("warning: {what}");
+        }
         let snapshot = scene.snapshot();
         let mut renderer = Renderer::new(gpu, &settings);
         renderer.set_scene(&snapshot);

@@ -1,6 +1,7 @@
 //! Pictures that an adapter draws: on a machine without a GPU in software, which is part of what is
 //! tested.
 
+mod abilities;
 mod bad_input;
 mod committed;
 mod common;
