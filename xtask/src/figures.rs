@@ -76,19 +76,22 @@ impl Figures {
     }
 }
 
-fn json_of(mut command: Command) -> Result<Value> {
-    let output = command.output().context("cannot start lumencast")?;
+/// What a program prints as JSON.
+pub(crate) fn json_of(mut command: Command) -> Result<Value> {
+    let output = command
+        .output()
+        .with_context(|| format!("cannot start {}", command.get_program().to_string_lossy()))?;
     ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr).trim());
     Ok(serde_json::from_slice(&output.stdout)?)
 }
 
-fn write(file: &Path, report: &Value) -> Result<()> {
+pub(crate) fn write(file: &Path, report: &Value) -> Result<()> {
     let text = serde_json::to_string_pretty(report)? + "\n";
     std::fs::write(file, text).with_context(|| format!("cannot write {}", file.display()))
 }
 
 /// What was measured on.
-fn machine() -> Value {
+pub(crate) fn machine() -> Value {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model =
         cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split(": ").nth(1));

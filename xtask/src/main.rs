@@ -1,8 +1,9 @@
 //! What one runs by hand in this repository: `cargo xtask demo`, `cargo xtask test`,
-//! `cargo xtask arm`, `cargo xtask figures`, `cargo xtask setup`.
+//! `cargo xtask arm`, `cargo xtask figures`, `cargo xtask contenders`, `cargo xtask setup`.
 #![expect(clippy::print_stdout, reason = "a program for the terminal")]
 
 mod arm;
+mod contenders;
 mod demo;
 mod figures;
 mod oracles;
@@ -31,6 +32,8 @@ enum Command {
     Arm,
     /// Measure this machine: ticks, and the way to a page; writes benches/results/NAME.json
     Figures(figures::Figures),
+    /// Measure beside Embree and Mitsuba, in turns; writes benches/results/NAME-contenders.json
+    Contenders(contenders::Contenders),
     /// Install what building and testing need (as root), or print the commands that do
     Setup,
 }
@@ -41,6 +44,7 @@ fn main() -> ExitCode {
         Command::Test(test) => test.run(),
         Command::Arm => arm::run(),
         Command::Figures(figures) => figures.run(),
+        Command::Contenders(contenders) => contenders.run(),
         Command::Setup => setup::install(setup::Purpose::Test),
     };
     match outcome {

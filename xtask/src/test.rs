@@ -17,6 +17,7 @@ pub(crate) struct Test {
 
 impl Test {
     pub(crate) fn run(&self) -> Result<()> {
+        let mut left_out = Vec::new();
         setup::install(Purpose::Test)?;
         step("formatting", cargo(&["fmt", "--all", "--check"]))?;
         step("web packages", npm(&["ci", "--no-audit", "--no-fund"]))?;
@@ -29,7 +30,12 @@ impl Test {
         let mut tests = cargo(&["nextest", "run", "--workspace"]);
         match oracles::embree() {
             Ok(library) => drop(tests.env("LUMENCAST_EMBREE", library)),
-            Err(why) => println!("without Embree, so its test is left out: {why:#}"),
+            Err(why) => left_out.push(format!("hits beside Embree's: {why:#}")),
+        }
+        let scenes = oracles::scenes();
+        if !scenes.is_dir() {
+            let scenes = scenes.display();
+            left_out.push(format!("light beside Mitsuba's in real scenes: {scenes} is not here"));
         }
         step("tests", tests)?;
         step("doctests", cargo(&["test", "--workspace", "--doc", "--quiet"]))?;
@@ -44,8 +50,13 @@ impl Test {
                 browser.env("LUMENCAST_LINK", "required");
             }
             step("the page in a real browser", browser)?;
+        } else {
+            left_out.push("the page in a real browser: --no-browser".to_owned());
         }
         println!("\nAll steps passed.");
+        for what in left_out {
+            println!("Left out: {what}");
+        }
         Ok(())
     }
 }
