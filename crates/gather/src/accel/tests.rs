@@ -1,7 +1,9 @@
+mod agree;
 mod crowd;
 mod item_buffer;
 mod lanes;
 mod light_buffer;
+mod refit;
 
 use std::iter::once;
 use std::sync::Arc;
@@ -236,28 +238,6 @@ fn near_surfaces_are_met_first() {
 }
 
 #[test]
-fn kernels_agree() {
-    let meshes = placed_soups();
-    let all: Vec<_> = kernels().into_iter().map(|k| accel(&meshes, k)).collect();
-    for i in 0..4000 {
-        let ray = ray(3.0 * random(7, i) - 1.0, sphere(random(8, i).truncate()));
-        let hits: Vec<_> = all.iter().map(|a| closest(a, &ray, |_| true)).collect();
-        for pair in hits.windows(2) {
-            match (pair[0], pair[1]) {
-                (Some(a), Some(b)) => {
-                    assert_eq!(
-                        (a.instance, a.primitive, a.triangle),
-                        (b.instance, b.primitive, b.triangle)
-                    );
-                    assert!((a.t - b.t).abs() <= 1e-4 * a.t && (a.u - b.u).abs() < 1e-3);
-                }
-                (a, b) => assert_eq!(a, b),
-            }
-        }
-    }
-}
-
-#[test]
 fn refused_hits_let_the_next_one_through() {
     let at = |y: f32| [Vec3::new(-1.0, y, -1.0), Vec3::new(3.0, y, -1.0), Vec3::new(-1.0, y, 3.0)];
     let positions = (0..20).flat_map(|k| at(k as f32)).collect();
@@ -358,31 +338,6 @@ fn degenerate_input_is_harmless() {
     let nothing = accel(&[], Kernel::detect());
     assert!(nothing.bounds().is_empty());
     assert!(!occluded(&nothing, &ray(Vec3::ZERO, Vec3::X), |_| true));
-}
-
-#[test]
-fn refitted_is_as_good_as_rebuilt() {
-    let mesh = soup(500, 0.1);
-    let rest = &mesh.primitives[0].vertices;
-    // A gentle wave refits; scattering everything makes it rebuild. Both must trace alike.
-    for strength in [0.05, 20.0] {
-        let positions: Vec<_> = (0..)
-            .zip(&rest.positions)
-            .map(|(i, p)| p + strength * (random(6, i / 3) - 0.5))
-            .collect();
-        let moved = vec![Vertices { positions, ..rest.clone() }];
-        let mut refitted = TriangleBvh::build(&mesh, None, Trees::AsBuilt);
-        refitted.refit(&mesh, &moved);
-        let rebuilt = TriangleBvh::build(&mesh, Some(&moved), Trees::AsBuilt);
-        assert_eq!(refitted.bounds(), rebuilt.bounds());
-        let accel = |bvh| Accel::new([(0, Affine3A::IDENTITY, Arc::new(bvh))], Kernel::detect());
-        let (a, b) = (accel(refitted), accel(rebuilt));
-        for i in 0..2000 {
-            let ray = ray(random(7, i) * strength.max(1.0), sphere(random(8, i).truncate()));
-            let [a, b] = [&a, &b].map(|x| closest(x, &ray, |_| true));
-            assert_eq!(a.map(|h| h.triangle), b.map(|h| h.triangle));
-        }
-    }
 }
 
 fn snapshot(instances: Vec<Instance>) -> Arc<Snapshot> {

@@ -15,7 +15,7 @@ use super::{Aabb, Trees};
 /// Triangles a leaf.
 pub(super) const LANES: usize = 4;
 /// When refitting has made the tree this much dearer than it was when built, it is built anew.
-const REBUILD_COST: f32 = 1.8;
+pub(super) const REBUILD_COST: f32 = 1.8;
 const UNUSED: u32 = u32::MAX;
 
 /// Up to four triangles, laid out so that one instruction tests all: three cache lines. Eight to a
@@ -106,6 +106,18 @@ impl TriangleBvh {
     /// Brings the hierarchy to new vertices of the same mesh: its boxes are fitted anew, and where
     /// that leaves too poor a tree it is rebuilt. Costs about a tenth of building.
     pub(crate) fn refit(&mut self, mesh: &Mesh, deformed: &[Vertices]) {
+        let fitted = self.fit(mesh, deformed);
+        // What is not finite has no box, and what was not when the tree was built is not in it.
+        let lacks_some = fitted < mesh.triangle_count();
+        if lacks_some || cost(&self.nodes) > REBUILD_COST * self.cost {
+            *self = Self::build(mesh, Some(deformed), Trees::AsBuilt);
+        }
+    }
+
+    /// Fits boxes and triangles to new vertices, whatever becomes of the tree, and counts those
+    /// triangles that are finite.
+    pub(super) fn fit(&mut self, mesh: &Mesh, deformed: &[Vertices]) -> usize {
+        let mut finite = 0;
         let source = Source { mesh, deformed: Some(deformed) };
         let mut boxes = Vec::with_capacity(self.blocks.len());
         for block in self.blocks.iter_mut() {
@@ -116,6 +128,7 @@ impl TriangleBvh {
                 }
                 let corners = source.corners(block.primitive[lane], block.triangle[lane]);
                 block.set(lane, corners);
+                finite += usize::from(corners.iter().all(|corner| corner.is_finite()));
                 bounds = bounds.union(around(corners));
             }
             boxes.push(bounds);
@@ -132,14 +145,12 @@ impl TriangleBvh {
             self.nodes[n] = node;
         }
         self.bounds = self.nodes[0].bounds();
-        if !self.bounds.min.is_finite() || cost(&self.nodes) > REBUILD_COST * self.cost {
-            *self = Self::build(mesh, Some(deformed), Trees::AsBuilt);
-        }
+        finite
     }
 }
 
 /// Expected number of nodes and leaves that a random ray through the root's box visits.
-fn cost(nodes: &[Node]) -> f32 {
+pub(super) fn cost(nodes: &[Node]) -> f32 {
     let area = |node: &Node| -> f32 {
         node.lanes().map(|(lane, _)| node.lane_bounds(lane).half_area()).sum()
     };

@@ -13,7 +13,7 @@ use crate::accel::kernel_neon as compiled;
 use crate::accel::triangle_bvh::{Block, LANES};
 use crate::accel::wide::Node;
 
-fn boxes(kernel: Kernel, node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
+pub(super) fn boxes(kernel: Kernel, node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
     match kernel {
         Kernel::Portable => boxes_portable(node, ray, t_max),
         #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
@@ -23,7 +23,7 @@ fn boxes(kernel: Kernel, node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
     }
 }
 
-fn triangles(kernel: Kernel, block: &Block, ray: &Setup, t_max: f32) -> TriangleHits {
+pub(super) fn triangles(kernel: Kernel, block: &Block, ray: &Setup, t_max: f32) -> TriangleHits {
     match kernel {
         Kernel::Portable => triangles_portable(block, ray, t_max),
         #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
@@ -33,16 +33,16 @@ fn triangles(kernel: Kernel, block: &Block, ray: &Setup, t_max: f32) -> Triangle
     }
 }
 
-fn setup(origin: Vec3, direction: Vec3) -> Setup {
+pub(super) fn setup(origin: Vec3, direction: Vec3) -> Setup {
     Setup::new(origin.into(), direction.into())
 }
 
-fn has(mask: u32, lane: usize) -> bool {
+pub(super) fn has(mask: u32, lane: usize) -> bool {
     mask & (1 << lane) != 0
 }
 
 /// Eight boxes of up to unit size in a cube of two, from the `i`-th set of random numbers.
-fn random_node(i: u32) -> Node {
+pub(super) fn random_node(i: u32) -> Node {
     let mut node = Node::EMPTY;
     for lane in 0..8 {
         let [a, b] = [0, 1].map(|k| Vec3A::from(random(20 + 2 * lane + k, i)));
@@ -53,7 +53,7 @@ fn random_node(i: u32) -> Node {
 }
 
 /// A direction, every other time with zeros of either sign among its components.
-fn with_zeros(direction: Vec3, i: u32) -> Vec3 {
+pub(super) fn with_zeros(direction: Vec3, i: u32) -> Vec3 {
     let zero = |bit: u32| if i & bit == 0 { 0.0 } else { -0.0 };
     match i / 8 % 8 {
         0 => direction * Vec3::new(0.0, 1.0, 1.0) + Vec3::new(zero(1), -0.0, -0.0),
