@@ -84,12 +84,13 @@ impl RayBench {
         count: usize,
         threads: Option<NonZeroUsize>,
         levels: Levels,
+        trees: Trees,
     ) -> std::io::Result<Self> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads.map_or(0, NonZeroUsize::get))
             .build()
             .map_err(std::io::Error::other)?;
-        let world = pool.install(|| world(scene, levels));
+        let world = pool.install(|| world(scene, levels, trees));
         let mut next = 0;
         let mut count_from = |n: usize| {
             next += n as u32;
@@ -226,8 +227,8 @@ impl RayBench {
     }
 }
 
-fn world(scene: &Arc<Snapshot>, levels: Levels) -> World {
-    let mut cache = WorldCache::new(levels);
+fn world(scene: &Arc<Snapshot>, levels: Levels, trees: Trees) -> World {
+    let mut cache = WorldCache::new(levels).with_trees(trees);
     World::new(scene.clone(), MaterialModel::Lambert, Kernel::detect(), &mut cache)
 }
 

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use lumencast_scene::{AlphaMode, Instance, Material, PlacedLight, Snapshot};
 
 use crate::accel::{
-    Accel, AccelCache, Hit, ItemBuffer, Kernel, Levels, LightBuffer, Pyramid, Ray, Stacks,
+    Accel, AccelCache, Hit, ItemBuffer, Kernel, Levels, LightBuffer, Pyramid, Ray, Stacks, Trees,
 };
 use crate::bsdf::Scatter;
 use crate::lights::emission::EmissionCache;
@@ -28,6 +28,10 @@ pub(crate) struct WorldCache {
 impl WorldCache {
     pub(crate) fn new(levels: Levels) -> Self {
         Self { accel: AccelCache::new(levels), ..Self::default() }
+    }
+
+    pub(crate) fn with_trees(self, trees: Trees) -> Self {
+        Self { accel: self.accel.with_trees(trees), ..self }
     }
 }
 

@@ -60,7 +60,8 @@ impl BenchRays {
         let levels = if self.levels == 1 { Levels::One } else { Levels::Two };
         let peak = build_peak_bytes(&snapshot, levels);
         let spinner = output::spinner("Finding rays".into());
-        let bench = RayBench::new(&snapshot, view, self.rays as usize, self.threads, levels)
+        let rays = self.rays as usize;
+        let bench = RayBench::new(&snapshot, view, rays, self.threads, levels, Trees::Improved)
             .context("cannot start the threads that trace")?;
         spinner.finish_and_clear();
         ensure!(
