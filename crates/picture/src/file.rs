@@ -7,6 +7,7 @@ use std::path::Path;
 use glam::Vec3;
 use image::{
     DynamicImage, ExtendedColorType, ImageEncoder, ImageError, ImageFormat, ImageReader, Limits,
+    Rgb, RgbImage,
     codecs::{jpeg::JpegEncoder, openexr::OpenExrEncoder, png::PngEncoder},
 };
 
@@ -98,15 +99,8 @@ impl Picture {
         tone_map: ToneMap,
         exposure: f32,
     ) -> Result<(), PictureError> {
-        let bytes = self.bytes(tone_map, exposure);
-        write_whole(path.as_ref(), |out| {
-            PngEncoder::new(out).write_image(
-                &bytes,
-                self.width(),
-                self.height(),
-                ExtendedColorType::Rgb8,
-            )
-        })
+        let image = self.coded(tone_map, exposure);
+        write_whole(path.as_ref(), |out| image.write_with_encoder(PngEncoder::new(out)))
     }
 
     /// Writes a JPEG for documents, a tenth of a PNG's size, shown by `tone_map` after a factor of
@@ -121,24 +115,20 @@ impl Picture {
         tone_map: ToneMap,
         exposure: f32,
     ) -> Result<(), PictureError> {
-        let bytes = self.bytes(tone_map, exposure);
+        let image = self.coded(tone_map, exposure);
         write_whole(path.as_ref(), |out| {
-            JpegEncoder::new_with_quality(out, JPEG_QUALITY).write_image(
-                &bytes,
-                self.width(),
-                self.height(),
-                ExtendedColorType::Rgb8,
-            )
+            image.write_with_encoder(JpegEncoder::new_with_quality(out, JPEG_QUALITY))
         })
     }
 
     /// Codes of 8 bits a channel.
-    fn bytes(&self, tone_map: ToneMap, exposure: f32) -> Vec<u8> {
-        let code = |p: &Vec3| {
-            let code = tone_map.encode(*p * exposure);
-            code.to_array().map(|v| (255.0 * v + 0.5) as u8)
+    fn coded(&self, tone_map: ToneMap, exposure: f32) -> RgbImage {
+        let code = |x, y| {
+            let linear = self.pixel(x, y).unwrap_or_default();
+            let code = tone_map.encode(linear * exposure).to_array();
+            Rgb(code.map(|v| (255.0 * v + 0.5) as u8))
         };
-        self.pixels().iter().flat_map(code).collect()
+        RgbImage::from_fn(self.width(), self.height(), code)
     }
 
     /// Writes an OpenEXR of 32-bit floats, channels R, G and B, linear as they are.

@@ -275,14 +275,12 @@ fn lit_room() -> Arc<Snapshot> {
         ..lambert(Vec3::splat(0.7), Vec3::splat(0.1))
     });
     stage.room(BLACK, Vec3::splat(4.0), wall).sphere(Vec3::new(0.0, -1.0, 0.0), 0.5, 12, wall);
-    let light = Light {
-        kind: LightKind::Point { radius: 0.0 },
-        color: Vec3::ONE,
-        intensity: 3.0,
-        range: None,
-    };
-    stage.light(light, Vec3::new(1.0, 1.0, 1.0), Vec3::X);
+    stage.light(lamp(0.0), Vec3::ONE, Vec3::X);
     stage.snapshot()
+}
+
+fn lamp(radius: f32) -> Light {
+    Light { kind: LightKind::Point { radius }, color: Vec3::ONE, intensity: 3.0, range: None }
 }
 
 /// Paths are followed many at a time, and each finds what it finds alone.
@@ -359,15 +357,8 @@ fn every_material() -> Arc<Snapshot> {
             stage.sphere(middle, 0.25, 12, material);
         }
     }
-    let light = Light {
-        kind: LightKind::Point { radius: 0.0 },
-        color: Vec3::ONE,
-        intensity: 3.0,
-        range: None,
-    };
-    stage.light(light, Vec3::new(1.0, 1.0, 1.0), Vec3::X);
-    let sized = Light { kind: LightKind::Point { radius: 0.05 }, ..light };
-    stage.light(sized, Vec3::new(-1.0, 1.2, 0.3), Vec3::X);
+    stage.light(lamp(0.0), Vec3::ONE, Vec3::X);
+    stage.light(lamp(0.05), Vec3::new(-1.0, 1.2, 0.3), Vec3::X);
     stage.snapshot()
 }
 
