@@ -181,14 +181,15 @@ fn radiance_of(in: Varying, p: Point, faces_front: bool, turn: f32) -> vec3f {
 
     var radiance = vec3f(0.0);
     let two_sided = (material.flags & MATERIAL_DOUBLE_SIDED) != 0u;
+    let unlit = (material.flags & MATERIAL_UNLIT) != 0u;
     if (frame.parts & PART_EMISSION) != 0u {
-        if (material.flags & MATERIAL_UNLIT) != 0u && !plain {
+        if unlit && !plain {
             radiance += select(vec3f(0.0), saturate(p.base_color.rgb), front || two_sided) / frame.pre_exposure;
-        } else if front || (two_sided && !plain) {
+        } else if !unlit && (front || (two_sided && !plain)) {
             radiance += p.emission;
         }
     }
-    let scatters = plain || ((material.flags & MATERIAL_UNLIT) == 0u && (front || two_sided));
+    let scatters = plain || (!unlit && (front || two_sided));
     if scatters {
         let n0 = normalize_or_zero(in.normal);
         var object_normal = n0;

@@ -277,9 +277,10 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
             // How far from the light what is there lies, as a share of this point's distance; in
             // parallel light, how many metres before the point.
             let place = select(here / depth, (depth - here) * shadow.depth_range, parallel);
-            // Only what lies between the point and the light's disc casts a shadow here.
+            // Only what lies between the point and the light's disc casts a shadow here. At a steep angle
+            // the surface's plane may reach behind the light within the search.
             let reach = light.size * select((1.0 - place) / max(place, 1e-3), place, parallel);
-            if depth > here && length(o) <= reach + texel {
+            if (parallel || here > 0.0) && depth > here && length(o) <= reach + texel {
                 sum += place;
                 found += 1.0;
             }

@@ -11,13 +11,14 @@ use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
 use lumencast_picture::{Loaded, PIXELS_PER_DEGREE, Pair, Picture, ToneMap, flip};
 use lumencast_scene::{Environment, Light, LightKind, Material, Scene, Snapshot, View, VolumeSpec};
 use lumencast_server::{GatherOptions, bake};
-use lumencast_shade::{Settings, Shading, Shadows};
+use lumencast_shade::{Materials, Settings, Shading, Shadows};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 /// Mean FLIP that adapters may differ by: rounding, and samples at other places.
 const TOLERANCE: f64 = 0.005;
 
 /// A scene with its light, as it is drawn.
+#[derive(Clone)]
 struct Drawn {
     scene: Arc<Snapshot>,
     light: LightField,
@@ -51,21 +52,28 @@ impl Drawn {
 /// How far a picture of codes is from the committed one; the picture is left beside the tests'
 /// others.
 fn distance(name: &str, codes: &Picture) -> f64 {
-    let committed = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/pictures/committed")
-        .join(format!("{name}.png"));
     let drawn = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.png"));
     let linear = codes.map(lumencast_picture::linear_from_srgb);
     linear.write_png(&drawn, ToneMap::Srgb, 1.0).unwrap();
     if std::env::var_os("LUMENCAST_BLESS").is_some() {
-        std::fs::copy(&drawn, &committed).unwrap();
+        std::fs::copy(&drawn, committed(name)).unwrap();
     }
+    let error = flip_from_committed(name, codes);
+    eprintln!("{name}: FLIP {error:.4}, {}", drawn.display());
+    error
+}
+
+fn flip_from_committed(name: &str, codes: &Picture) -> f64 {
+    let committed = committed(name);
     let Loaded::Coded(reference) = Loaded::read(&committed).unwrap() else {
         panic!("{} is no PNG", committed.display())
     };
-    let error = flip(&Pair::new(&reference, codes).unwrap(), PIXELS_PER_DEGREE).mean();
-    eprintln!("{name}: FLIP {error:.4}, {}", drawn.display());
-    error
+    flip(&Pair::new(&reference, codes).unwrap(), PIXELS_PER_DEGREE).mean()
+}
+
+fn committed(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pictures/committed");
+    folder.join(format!("{name}.png"))
 }
 
 /// The Cornell box under light that was computed for it.
@@ -146,32 +154,39 @@ fn pictures_are_as_committed() {
     }
 }
 
-/// Faults that one makes: each shows by more than twice the tolerance.
-#[test]
-fn faults_are_noticed() {
-    let sound = materials(|r| r);
-    let mut upside_down = materials(|r| r);
-    for volume in upside_down.light.volumes_mut() {
+/// What becomes of light when the band along y has the other sign.
+fn upside_down(mut drawn: Drawn) -> Drawn {
+    for volume in drawn.light.volumes_mut() {
         for probe in 0..volume.grid.probe_count() {
             volume.probe_mut(probe)[1] *= -1.0;
         }
     }
-    let mut left_out = materials(|r| r);
-    left_out.light = LightField::default();
+    drawn
+}
+
+fn without_field(drawn: Drawn) -> Drawn {
+    Drawn { light: LightField::default(), ..drawn }
+}
+
+/// Faults that one makes: each shows by more than twice the tolerance.
+#[test]
+fn faults_are_noticed() {
     let no_shadows = Shadows { resolution: 0, ..Shadows::default() };
-    for (fault, drawn, shadows) in [
-        ("a band with the other sign", &upside_down, Shadows::default()),
-        ("roughness for its square", &materials(|r| r * r), Shadows::default()),
-        ("no indirect light", &left_out, Shadows::default()),
-        ("no shadows", &sound, no_shadows),
+    let no_shadows = Settings { shadows: no_shadows, ..settings() };
+    let plain = Settings { materials: Materials::Lambert, ..settings() };
+    let cornell = cornell();
+    for (name, fault, drawn, settings) in [
+        ("materials", "a band with the other sign", upside_down(materials(|r| r)), settings()),
+        ("materials", "roughness for its square", materials(|r| r * r), settings()),
+        ("materials", "no indirect light", without_field(materials(|r| r)), settings()),
+        ("materials", "no shadows", materials(|r| r), no_shadows),
+        ("cornell", "a band with the other sign", upside_down(cornell.clone()), settings()),
+        ("cornell", "no indirect light", without_field(cornell.clone()), settings()),
+        ("cornell", "no shadows", cornell.clone(), no_shadows),
+        ("cornell", "no maps but of the base colour", cornell, plain),
     ] {
-        let picture = drawn.picture(&Settings { shadows, ..settings() });
-        let committed = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let committed = committed.join("tests/pictures/committed/materials.png");
-        let reference = Loaded::read(&committed).unwrap();
-        let Loaded::Coded(reference) = reference else { panic!("no PNG") };
-        let error = flip(&Pair::new(&reference, &picture).unwrap(), PIXELS_PER_DEGREE).mean();
-        eprintln!("{fault}: FLIP {error:.4}");
-        assert!(error > 2.0 * TOLERANCE, "{fault}: FLIP {error}");
+        let error = flip_from_committed(name, &drawn.picture(&settings));
+        eprintln!("{name}, {fault}: FLIP {error:.4}");
+        assert!(error > 2.0 * TOLERANCE, "{name}, {fault}: FLIP {error}");
     }
 }

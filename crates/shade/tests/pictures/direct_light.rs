@@ -3,11 +3,11 @@
 
 use std::sync::Arc;
 
-use crate::common::{SIZE, difference, direct as settings, drawn, traced};
+use crate::common::{SIZE, difference, direct as settings, drawn, renderer, traced};
 use glam::{Affine3A, Vec3, Vec4};
 use lumencast_gather::reference::Parts;
 use lumencast_scene::{
-    AlphaMode, Environment, Light, LightKind, Material, Projection, Scene, Snapshot, View,
+    AlphaMode, Environment, Light, LightKind, Material, MeshId, Projection, Scene, Snapshot, View,
 };
 use lumencast_shade::{Materials, Settings, Shadows};
 use lumencast_testkit::scenes::{Stage, lambert};
@@ -113,6 +113,9 @@ fn sized_lights_have_soft_edges() {
     for (name, kind, intensity) in [
         ("sphere", LightKind::Point { radius: 0.4 }, 60.0),
         ("sun", LightKind::Directional { angle: 0.12 }, 4.0),
+        // One map, and a cube.
+        ("spot", LightKind::Spot { inner: 0.5, outer: 0.8, radius: 0.4 }, 60.0),
+        ("wide spot", LightKind::Spot { inner: 0.6, outer: 1.4, radius: 0.4 }, 60.0),
     ] {
         let scene = stage(|stage| {
             let white = stage.material(lambert(Vec3::splat(0.7), Vec3::ZERO));
@@ -133,6 +136,51 @@ fn sized_lights_have_soft_edges() {
         let sharp = difference(&format!("sharp {name}"), &sharp, &reference, 0.1).rms;
         assert!(soft < 0.01 && soft < 0.7 * sharp, "{name}: {soft} soft, {sharp} sharp");
     }
+}
+
+/// Many instances of one mesh, most of them beside what is seen: those cast their shadows into it, and one
+/// that is left out is missed.
+#[test]
+fn instances_beside_the_picture_cast_shadows() {
+    let mut stage = Stage::default();
+    let white = stage.material(lambert(Vec3::splat(0.7), Vec3::ZERO));
+    stage.sphere(Vec3::ZERO, 0.35, 32, white);
+    let ball = stage.snapshot().instances[0].mesh.clone();
+    let at = |i: u8| Vec3::new(1.2 * f32::from(i % 5) - 2.4, 0.5, 1.2 * f32::from(i / 5) - 2.4);
+    // Of the ball at the right of the middle row, its shadow is all that is seen.
+    const UNSEEN: u8 = 14;
+    let scene = |kind, is_there: &dyn Fn(u8) -> bool| {
+        let mut stage = Stage::default();
+        let white = stage.material(lambert(Vec3::splat(0.7), Vec3::ZERO));
+        stage.quad(Vec3::new(-4.0, 0.0, 4.0), Vec3::X * 8.0, Vec3::NEG_Z * 8.0, white);
+        for i in (0..25).filter(|i| is_there(*i)) {
+            stage.instance(MeshId(7), ball.clone(), Affine3A::from_translation(at(i)));
+        }
+        let lamp = light(kind, if kind == POINT { 60.0 } else { 4.0 });
+        stage.light(lamp, Vec3::new(7.0, 2.4, 0.0), Vec3::new(-1.0, -0.4, 0.0));
+        stage.snapshot()
+    };
+    let view = View::look_at(Vec3::new(0.3, 3.0, 0.0), Vec3::new(0.3, 0.0, -0.1), 0.6).unwrap();
+    let mut renderer = renderer(&scene(POINT, &|_| true), &settings());
+    let mut drawn = |scene: &Arc<Snapshot>, settings: &Settings| {
+        renderer.set_scene(scene);
+        renderer.pictures(&[view], settings).unwrap().remove(0)
+    };
+    for (name, kind) in [("point", POINT), ("sun", LightKind::Directional { angle: 0.0 })] {
+        let (all, without) = (scene(kind, &|_| true), scene(kind, &|i| i != UNSEEN));
+        let reference = traced(&all, view, &settings(), Parts::Direct, 64);
+        let [all, without] = [("all", all), ("without one", without)].map(|(which, scene)| {
+            let name = format!("instances, {which}, {name}");
+            difference(&name, &drawn(&scene, &settings()), &reference, 0.01)
+        });
+        // Where the edges of two shadows meet, what one filters reaches a few pixels farther.
+        assert!(all.off < 0.005 && all.mean_at_edges.abs() < 0.002, "{name}: {all:?}");
+        assert!(without.off > 0.02, "{name}: {without:?}");
+    }
+    let unshadowed = Shadows { resolution: 0, ..Shadows::default() };
+    let unshadowed = Settings { shadows: unshadowed, ..settings() };
+    let (all, without) = (scene(POINT, &|_| true), scene(POINT, &|i| i != UNSEEN));
+    assert!(drawn(&all, &unshadowed) == drawn(&without, &unshadowed), "it is beside the picture");
 }
 
 /// Masked and blended surfaces cast the shadows that the tracer gives them.

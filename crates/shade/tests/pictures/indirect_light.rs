@@ -223,6 +223,45 @@ fn furnace() {
     }
 }
 
+/// Light of which no coefficient fits a half, as a sun of 100,000 lux makes on white ground: a surface
+/// of albedo ρ shows ρ times the radiance of a field that is the same everywhere. A field that is a
+/// hundredth brighter is told from it; so is a picture that is stored without a pre-exposure, which halves
+/// do not hold either.
+#[test]
+fn light_beyond_halves() {
+    const ALBEDO: f32 = 0.8;
+    // Y₀₀
+    const CONSTANT: f32 = 0.282_094_8;
+    let scene = floor(lambert(Vec3::splat(ALBEDO), Vec3::ZERO));
+    let view = View::look_at(Vec3::new(1.0, 2.5, 3.0), Vec3::ZERO, 0.3).unwrap();
+    let mut renderer = renderer(&scene, &settings());
+    for order in [Order::L1, Order::L4] {
+        for c0 in [7e4, 1e5 / std::f32::consts::PI / CONSTANT, 1e6] {
+            assert!(c0 > 65_504.0, "{c0} fits");
+            let color = c0 * CONSTANT * Vec3::new(1.0, 0.5, 1e-3);
+            let mut worst = |share: f32, pre_exposure: f32| {
+                let mut sh = Sh::dark(order);
+                sh.coefficients[0] = share * color / CONSTANT;
+                renderer.set_light(&uniform(&sh)).unwrap();
+                let settings = Settings { pre_exposure, ..settings() };
+                let picture = renderer.pictures(&[view], &settings).unwrap().remove(0);
+                let error = |p: &Vec3| (*p / (ALBEDO * color) - 1.0).abs().max_element();
+                // What is no number stays none.
+                let larger = |a: f32, b: f32| if b <= a { a } else { b };
+                picture.iter().map(error).fold(0.0, larger)
+            };
+            let error = worst(1.0, 1.0 / color.x);
+            eprintln!("{order:?}, {c0}: {error}");
+            assert!(error < 2e-3, "{order:?}, {c0}: {error}");
+            assert!(worst(1.01, 1.0 / color.x) > 8e-3, "{order:?}, {c0}");
+            if ALBEDO * color.x > 65_504.0 {
+                let clipped = worst(1.0, 1.0);
+                assert!(clipped.is_nan() || clipped > 0.1, "{order:?}, {c0}: {clipped}");
+            }
+        }
+    }
+}
+
 /// A map whose texels let through 128/255 and all of the light, moved by half its width: on the floor
 /// they lie the other way round. Only red has a say.
 fn occlusion_map() -> TextureRef {

@@ -3,10 +3,13 @@
 
 mod abilities;
 mod bad_input;
+mod blending;
 mod committed;
 mod common;
 mod direct_light;
+mod environments;
 mod indirect_light;
+mod materials;
 mod occlusion;
 mod screen;
 mod shadows;
