@@ -181,8 +181,10 @@ fn a_moved_member_is_noticed() {
 /// Numbers that shaders and Rust both name.
 #[test]
 fn constants_agree() {
-    use layout::{meter as bins, tone};
+    use layout::{deform as bits, material, meter as bins, parts, tone};
     let screen = compiled("screen", &screen());
+    let forward = compiled("forward", &forward(Shading::Pixels));
+    let deform = compiled("deform", &deform());
     let meter = compiled("meter", &meter());
     let value = |module: &Module, name: &str| {
         let (_, constant) = module
@@ -196,14 +198,23 @@ fn constants_agree() {
             ref other => panic!("{name} is {other:?}"),
         }
     };
-    for (name, number) in [
-        ("TONE_GAMMA", tone::GAMMA),
-        ("TONE_SRGB", tone::SRGB),
-        ("TONE_REINHARD", tone::REINHARD),
-        ("TONE_FILMIC", tone::FILMIC),
-        ("TONE_NEUTRAL", tone::NEUTRAL),
+    for (module, name, number) in [
+        (&screen, "TONE_GAMMA", tone::GAMMA),
+        (&screen, "TONE_SRGB", tone::SRGB),
+        (&screen, "TONE_REINHARD", tone::REINHARD),
+        (&screen, "TONE_FILMIC", tone::FILMIC),
+        (&screen, "TONE_NEUTRAL", tone::NEUTRAL),
+        (&forward, "PART_EMISSION", parts::EMISSION),
+        (&forward, "PART_DIRECT", parts::DIRECT),
+        (&forward, "PART_INDIRECT", parts::INDIRECT),
+        (&forward, "MATERIAL_DOUBLE_SIDED", material::DOUBLE_SIDED),
+        (&forward, "MATERIAL_UNLIT", material::UNLIT),
+        (&forward, "MATERIAL_BLEND", material::BLEND),
+        (&forward, "MATERIAL_LAMBERT", material::LAMBERT),
+        (&deform, "DEFORM_SKINNED", bits::SKINNED),
+        (&deform, "DEFORM_FLAT", bits::FLAT),
     ] {
-        assert_eq!(value(&screen, name), f64::from(number), "{name}");
+        assert_eq!(value(module, name), f64::from(number), "{name}");
     }
     assert_eq!(value(&meter, "METER_BINS"), bins::BINS as f64);
     assert_eq!(value(&meter, "METER_LEAST"), f64::from(bins::LEAST));

@@ -1,8 +1,10 @@
 import { DirectionalLight, Group, PointLight, SpotLight, Vector3 } from 'three';
 import { describe, expect, it } from 'vitest';
+import { readVectors } from '../../client/test/support/vectors.js';
 import { INTENSITY, intensityAt, intensityText } from '../src/ui/intensity.js';
 import { exposureFor, STOPS, withinStops } from '../src/view/exposure.js';
 import { findFlashlight } from '../src/view/flashlight.js';
+import { irradianceWeights } from '../src/view/probes.js';
 import { setSunAngles, sunAngles } from '../src/view/sun.js';
 
 describe('exposureFor', () => {
@@ -93,5 +95,31 @@ describe('findFlashlight', () => {
     expect(findFlashlight([new PointLight(), ceiling, flashlight])).toBe(flashlight);
     expect(findFlashlight([ceiling])).toBe(ceiling);
     expect(findFlashlight([new PointLight()])).toBeUndefined();
+  });
+});
+
+describe('spheres at probes', () => {
+  interface Case {
+    order: number;
+    normal: number[];
+    coefficients: number[][];
+    lux: number[];
+  }
+  const { irradiance } = readVectors<{ irradiance: Case[] }>('sh');
+  const cases = irradiance.filter(({ order }) => order === 2);
+  const found = ({ normal, coefficients }: Case, channel: number) => {
+    const weights = irradianceWeights(new Float32Array(normal));
+    return weights.reduce((sum, weight, k) => sum + weight * coefficients[k][channel], 0) * Math.PI;
+  };
+
+  it('have the irradiance that Rust finds', () => {
+    expect(cases.length).toBeGreaterThan(3);
+    for (const one of cases) one.lux.forEach((lux, c) => expect(found(one, c)).toBeCloseTo(lux, 4));
+  });
+
+  it('have another one where axes are exchanged', () => {
+    const turned = (one: Case) => ({ ...one, normal: [one.normal[1], one.normal[2], one.normal[0]] });
+    const off = cases.map((one) => Math.abs(found(turned(one), 0) - one.lux[0]));
+    expect(Math.max(...off)).toBeGreaterThan(0.01);
   });
 });

@@ -103,7 +103,7 @@ function unitSphere(detail: number): BufferGeometry {
 }
 
 /** What a white diffuse surface with these normals reflects, as weights of the nine L2 coefficients. */
-function irradianceWeights(normals: Float32Array): Float32Array {
+export function irradianceWeights(normals: Float32Array): Float32Array {
   const weights: number[] = [];
   // The clamped cosine's bands over π.
   const [a0, a1, a2] = [1, 2 / 3, 1 / 4];
