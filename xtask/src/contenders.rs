@@ -161,7 +161,7 @@ impl Contenders {
                 add("error", error::measure(&program, mitsuba, &subjects, &effort)?);
             }
         }
-        let llvm = mitsuba.map(|mitsuba| mitsuba.llvm);
+        let llvm = mitsuba.and_then(|m| Some(m.llvm.file_name()?.to_string_lossy().into_owned()));
         let contenders = json!({ "embree": EMBREE_WHEEL, "mitsuba": MITSUBA_WHEEL, "llvm": llvm });
         report.insert("contenders".into(), contenders);
 

@@ -75,7 +75,8 @@ fn row(said: &str) -> Result<Value> {
             "improved": after(build, "improved ")?,
             "top_level": after(top, "instances: ")?,
         },
-        "lines": said.lines().collect::<Vec<_>>(),
+        // The first has the path of the scene.
+        "lines": said.lines().skip(1).collect::<Vec<_>>(),
     });
     for (key, levels) in LEVELS {
         for mode in MODES {
