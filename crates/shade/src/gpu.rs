@@ -44,8 +44,8 @@ impl Abilities {
     }
 }
 
-/// What there is no drawing without: shaders read instances and lights from storage buffers, skins are
-/// computed, shadow maps compared.
+/// What there is no drawing without: shaders read instances and lights from storage buffers, and skins
+/// are computed.
 const NEEDED: wgpu::DownlevelFlags = wgpu::DownlevelFlags::COMPUTE_SHADERS
     .union(wgpu::DownlevelFlags::VERTEX_STORAGE)
     .union(wgpu::DownlevelFlags::FRAGMENT_STORAGE);
