@@ -33,37 +33,35 @@ struct TwoLobes {
     b: vec3f,
 }
 
-fn cell_of(v: Volume, position: vec3f) -> vec3f {
-    return transform_point(v.cell_from_world, position);
+// Volumes are told by their number, and of each no more is read than is needed: a shader that reads
+// all of a volume at every step spends most of its time on that.
+
+fn cell_of(number: u32, position: vec3f) -> vec3f {
+    return transform_point(volumes[number].cell_from_world, position);
 }
 
-// How much a position belongs to the box (Grid::weight).
-fn volume_weight(v: Volume, position: vec3f) -> f32 {
-    let cell = cell_of(v, position);
-    let t = clamp(2.0 * min(cell + 0.5, v.resolution - 0.5 - cell), vec3f(0.0), vec3f(1.0));
+// How much a cell's position belongs to the box (Grid::weight).
+fn weight_in(resolution: vec3f, cell: vec3f) -> f32 {
+    let t = clamp(2.0 * min(cell + 0.5, resolution - 0.5 - cell), vec3f(0.0), vec3f(1.0));
     let s = t * t * (3.0 - 2.0 * t);
     return s.x * s.y * s.z;
 }
 
+// By how many cells a position lies outside the box.
+fn outside(resolution: vec3f, cell: vec3f) -> vec3f {
+    return max(max(-0.5 - cell, cell + 0.5 - resolution), vec3f(0.0));
+}
+
 // How much of what no box claims belongs to this one (Grid::reach).
-fn volume_reach(v: Volume, position: vec3f) -> f32 {
-    let cell = cell_of(v, position);
-    let outside = max(max(-0.5 - cell, cell + 0.5 - v.resolution), vec3f(0.0));
-    let near = max(1.0 - 2.0 * outside, vec3f(0.0));
+fn reach_of(resolution: vec3f, cell: vec3f) -> f32 {
+    let near = max(1.0 - 2.0 * outside(resolution, cell), vec3f(0.0));
     return near.x * near.y * near.z;
 }
 
-// Distance from the box, metres (Grid::distance).
-fn volume_distance(v: Volume, position: vec3f) -> f32 {
-    let cell = cell_of(v, position);
-    return length(max(max(-0.5 - cell, cell + 0.5 - v.resolution), vec3f(0.0)) * v.spacing);
-}
-
 // Where the texture is read for a surface: in cells, clamped to the outermost probes.
-fn sampled_cell(v: Volume, position: vec3f, normal: vec3f) -> vec3f {
-    let out = transform_vector(v.cell_from_world, normal) * v.spacing;
-    let cell = cell_of(v, position) + v.offset * out;
-    return clamp(cell, vec3f(0.0), v.resolution - 1.0);
+fn sampled_cell(number: u32, cell: vec3f, normal: vec3f) -> vec3f {
+    let out = transform_vector(volumes[number].cell_from_world, normal) * volumes[number].spacing;
+    return clamp(cell + volumes[number].offset * out, vec3f(0.0), volumes[number].resolution - 1.0);
 }
 
 // A group of four coefficients, three texels of four channels each, weighed.
@@ -91,67 +89,77 @@ fn add_last(light: ptr<function, TwoLobes>, first: vec3f, step: vec3f, number: f
 // What two lobes see from a cell of a volume. A texel is read once for both, and what it brings is
 // added at once: no probe's coefficients are ever held together, so that order 4 needs no more
 // registers than order 1.
-fn volume_light(v: Volume, cell: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
+fn volume_light(number: u32, cell: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
     let texel = 1.0 / vec3f(textureDimensions(atlas));
-    let first = (v.origin + cell + vec3f(0.5, 0.5, 1.5)) * texel;
-    let step = vec3f(0.0, 0.0, (v.resolution.z + 2.0) * texel.z);
+    let first = (volumes[number].origin + cell + vec3f(0.5, 0.5, 1.5)) * texel;
+    let step = vec3f(0.0, 0.0, (volumes[number].resolution.z + 2.0) * texel.z);
+    let texels = volumes[number].texels;
     var light: TwoLobes;
     add_group(&light, first, step, 0.0, a.g0, b.g0);
-    if v.texels > 3u {
+    if texels > 3u {
         add_group(&light, first, step, 1.0, a.g1, b.g1);
     }
-    if v.texels == 7u {
+    if texels == 7u {
         add_last(&light, first, step, 2.0, a.g2.x, b.g2.x);
     }
-    if v.texels > 7u {
+    if texels > 7u {
         add_group(&light, first, step, 2.0, a.g2, b.g2);
         add_group(&light, first, step, 3.0, a.g3, b.g3);
     }
-    if v.texels > 12u {
+    if texels > 12u {
         add_group(&light, first, step, 4.0, a.g4, b.g4);
         add_group(&light, first, step, 5.0, a.g5, b.g5);
         add_last(&light, first, step, 6.0, a.g6, b.g6);
     }
-    return TwoLobes(light.a * v.scale, light.b * v.scale);
+    let scale = volumes[number].scale;
+    return TwoLobes(light.a * scale, light.b * scale);
 }
 
 // What two lobes see at a point of a surface (LightField::sample): the finest volume counts, passing
 // smoothly into the next; beyond all of them the nearest one's border does. Negative light, which
-// truncated expansions have, is none.
+// truncated expansions have, is none. Each volume is read once at most, whatever of the point it has.
 fn field_light(position: vec3f, normal: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
-    var sum = TwoLobes(vec3f(0.0), vec3f(0.0));
-    var left = 1.0;
-    for (var i = 0u; i < field.count && left > 0.0; i++) {
-        let weight = left * volume_weight(volumes[i], position);
-        if weight > 0.0 {
-            let light = volume_light(volumes[i], sampled_cell(volumes[i], position, normal), a, b);
-            sum.a += weight * light.a;
-            sum.b += weight * light.b;
-            left -= weight;
+    if field.count == 1u {
+        // All that there is has all of every point.
+        let light = volume_light(0u, sampled_cell(0u, cell_of(0u, position), normal), a, b);
+        return TwoLobes(max(light.a, vec3f(0.0)), max(light.b, vec3f(0.0)));
+    }
+    var unclaimed = 1.0;
+    for (var i = 0u; i < field.count && unclaimed > 0.0; i++) {
+        unclaimed -= unclaimed * weight_in(volumes[i].resolution, cell_of(i, position));
+    }
+    var reach = 0.0;
+    var nearest = 0u;
+    if unclaimed > 0.0 {
+        var least = 3.4e38;
+        for (var i = 0u; i < field.count; i++) {
+            let resolution = volumes[i].resolution;
+            let cell = cell_of(i, position);
+            reach += reach_of(resolution, cell);
+            // Metres (Grid::distance).
+            let distance = length(outside(resolution, cell) * volumes[i].spacing);
+            if distance < least {
+                nearest = i;
+                least = distance;
+            }
         }
     }
-    if left > 0.0 && field.count > 0u {
-        var reach = 0.0;
-        var nearest = 0u;
-        var distance = 3.4e38;
-        for (var i = 0u; i < field.count; i++) {
-            reach += volume_reach(volumes[i], position);
-            let d = volume_distance(volumes[i], position);
-            if d < distance {
-                nearest = i;
-                distance = d;
-            }
+    var sum = TwoLobes(vec3f(0.0), vec3f(0.0));
+    var left = 1.0;
+    for (var i = 0u; i < field.count && left + unclaimed > 0.0; i++) {
+        let resolution = volumes[i].resolution;
+        let cell = cell_of(i, position);
+        let claimed = left * weight_in(resolution, cell);
+        left -= claimed;
+        var share = select(0.0, 1.0, i == nearest);
+        if reach > 0.0 {
+            share = reach_of(resolution, cell) / reach;
         }
-        for (var i = 0u; i < field.count; i++) {
-            var share = select(0.0, 1.0, i == nearest);
-            if reach > 0.0 {
-                share = volume_reach(volumes[i], position) / reach;
-            }
-            if share > 0.0 {
-                let light = volume_light(volumes[i], sampled_cell(volumes[i], position, normal), a, b);
-                sum.a += left * share * light.a;
-                sum.b += left * share * light.b;
-            }
+        let weight = claimed + unclaimed * share;
+        if weight > 0.0 {
+            let light = volume_light(i, sampled_cell(i, cell, normal), a, b);
+            sum.a += weight * light.a;
+            sum.b += weight * light.b;
         }
     }
     return TwoLobes(max(sum.a, vec3f(0.0)), max(sum.b, vec3f(0.0)));

@@ -247,7 +247,6 @@ fn indirect_light(
     b: Bsdf, n: vec3f, v: vec3f, position: vec3f, roughness: f32, occlusion: f32, visible: f32,
 ) -> vec3f {
     let n_v = dot(n, v);
-    let bands = ggx_bands(roughness);
     let table = table_at(n_v, roughness);
     let by = textureSampleLevel(environment_brdf, table_sampler, table, 0.0);
     let light = field_light(position, n, lobe(n, cosine_bands()), specular_lobe(n, v, by.zw, table));
@@ -261,7 +260,8 @@ fn indirect_light(
     var sum = b.diffuse * under * of_diffuse * light.a / PI;
     sum += (b.f0 * by.x + b.f90 * by.y) * specular_occlusion(n_v, of_specular, b.alpha) * light.b;
     if any(b.transmission > vec3f(0.0)) {
-        let behind = field_light(position, -n, lobe(-v, bands), lobe(-v, bands));
+        let through = lobe(-v, ggx_bands(roughness));
+        let behind = field_light(position, -n, through, through);
         sum += b.transmission * under * behind.a;
     }
     return sum;
