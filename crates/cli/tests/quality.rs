@@ -103,10 +103,15 @@ fn fields_and_the_baseline_are_judged() {
     assert!((4.0..9.0).contains(&gain), "four times the samples are 6 dB, {gain}");
 }
 
+/// What a text of markdown links to.
+fn shown_in(text: &str) -> Vec<&str> {
+    text.split("](").skip(1).filter_map(|s| s.split(')').next()).collect()
+}
+
 /// Every picture that quality.md shows is there, and as far from the reference as the table says.
 fn what_was_written_is_what_was_measured(report: &Value, folder: &Path) {
     let text = std::fs::read_to_string(folder.join("quality.md")).expect("the tables");
-    let shown: Vec<_> = text.split("](").skip(1).filter_map(|s| s.split(')').next()).collect();
+    let shown = shown_in(&text);
     assert_eq!(shown.len(), 1 + 2 * 7 + 2, "{text}");
     for name in &shown {
         assert!(folder.join(name).is_file(), "{name}");
@@ -139,7 +144,7 @@ fn a_document_has_it_too(report: &Value, document: &Path) {
         let psnr = row["whole"]["psnr"].as_f64().expect("a number");
         assert!(text.contains(&format!("| {psnr:.2} |")), "{text}");
     }
-    let shown: Vec<_> = text.split("](").skip(1).filter_map(|s| s.split(')').next()).collect();
+    let shown = shown_in(&text);
     let folder = document.parent().expect("a folder");
     assert_eq!(shown.len(), 3, "{text}");
     assert!(shown.iter().all(|name| folder.join(name).is_file()), "{shown:?}");
