@@ -19,8 +19,8 @@ struct DepthVarying {
 
 @vertex
 fn depth_vertex(@location(0) position: vec3f, @builtin(instance_index) instance: u32) -> @builtin(position) @invariant vec4f {
-    let placed = instances[visible[instance]];
-    return view.clip_from_world * vec4f(transform_point(placed.world_from_object, position), 1.0);
+    let point = transform_point(instances[visible[instance]].world_from_object, position);
+    return view.clip_from_world * vec4f(point, 1.0);
 }
 
 // Nothing but depth, into pictures.

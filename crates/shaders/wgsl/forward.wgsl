@@ -27,9 +27,8 @@ struct Varying {
 @vertex
 fn forward_vertex(in: Vertex) -> Varying {
     let index = visible[in.instance];
-    let instance = instances[index];
     var out: Varying;
-    out.position = transform_point(instance.world_from_object, in.position);
+    out.position = transform_point(instances[index].world_from_object, in.position);
     out.clip = view.clip_from_world * vec4f(out.position, 1.0);
     // In object space, as the tracer interpolates them.
     out.normal = in.normal;
@@ -169,8 +168,7 @@ fn holed_fragment(
 fn radiance_of(in: Varying, p: Point, faces_front: bool, turn: f32) -> vec3f {
     let plain = (material.flags & MATERIAL_LAMBERT) != 0u;
     var occlusion = p.occlusion;
-    let instance = instances[in.instance];
-    let front = faces_front != (instance.mirrors == 1u);
+    let front = faces_front != (instances[in.instance].mirrors == 1u);
     let v = towards_eye(p.position);
     // Of the side that is seen.
     var geometric = v;
@@ -197,7 +195,7 @@ fn radiance_of(in: Varying, p: Point, faces_front: bool, turn: f32) -> vec3f {
             let bitangent = cross(n0, in.tangent.xyz) * sign(in.tangent.w);
             object_normal = p.tangent_normal.x * in.tangent.xyz + p.tangent_normal.y * bitangent + p.tangent_normal.z * n0;
         }
-        let shading = transform_vector(instance.normal_from_object, object_normal);
+        let shading = transform_vector(instances[in.instance].normal_from_object, object_normal);
         let n = visible_normal(shading, geometric, v);
         var b = bsdf_of(p.substance);
         if plain {
@@ -227,13 +225,12 @@ fn normalize_or_zero(v: vec3f) -> vec3f {
 fn direct_light(b: Bsdf, n: vec3f, v: vec3f, position: vec3f, geometric: vec3f, turn: f32) -> vec3f {
     var sum = vec3f(0.0);
     for (var i = 0u; i < frame.light_count; i++) {
-        let light = lights[i];
-        let arriving = incident(light, position);
+        let arriving = incident(i, position);
         let scattered_light = scattered(b, n, v, arriving.direction) * arriving.irradiance;
         if max(max(scattered_light.x, scattered_light.y), scattered_light.z) > 0.0 {
             // Light through a thin surface arrives at its other side.
             let side = select(geometric, -geometric, dot(n, arriving.direction) < 0.0);
-            sum += scattered_light * visibility(light, arriving.direction, arriving.distance, position, side, turn);
+            sum += scattered_light * visibility(i, arriving.direction, arriving.distance, position, side, turn);
         }
     }
     return sum;

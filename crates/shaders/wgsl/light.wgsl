@@ -2,7 +2,7 @@
 
 struct Light {
     position: vec3f,
-    // 0: point, 1: spot, 2: directional.
+    // POINT, SPOT or DIRECTIONAL.
     kind: u32,
     // Along which it shines, unit.
     direction: vec3f,
@@ -19,6 +19,10 @@ struct Light {
     first_shadow: u32,
     shadow_count: u32,
 }
+
+const POINT: u32 = 0u;
+const SPOT: u32 = 1u;
+const DIRECTIONAL: u32 = 2u;
 
 // A shadow map: one layer of the array.
 struct ShadowView {
@@ -88,62 +92,69 @@ struct Incident {
     irradiance: vec3f,
 }
 
-fn incident(light: Light, at: vec3f) -> Incident {
-    if light.kind == 2u {
-        return Incident(-light.direction, 0.0, light.intensity);
+// Lights and maps are told by their number, and of each no more is read than is needed.
+
+fn incident(light: u32, at: vec3f) -> Incident {
+    let kind = lights[light].kind;
+    let intensity = lights[light].intensity;
+    if kind == DIRECTIONAL {
+        return Incident(-lights[light].direction, 0.0, intensity);
     }
-    let to_light = light.position - at;
+    let to_light = lights[light].position - at;
     let distance = length(to_light);
     if distance == 0.0 {
         return Incident(vec3f(0.0, 1.0, 0.0), 0.0, vec3f(0.0));
     }
     let direction = to_light / distance;
     let square = distance * distance;
-    var falloff = saturate(1.0 - square * square * light.window);
-    if light.kind == 1u {
-        let t = saturate(dot(direction, -light.direction) * light.cone_scale + light.cone_offset);
+    var falloff = saturate(1.0 - square * square * lights[light].window);
+    if kind == SPOT {
+        let cosine = dot(direction, -lights[light].direction);
+        let t = saturate(cosine * lights[light].cone_scale + lights[light].cone_offset);
         falloff *= t * t;
     }
     // Within the sphere it is as bright as on it.
-    let outside = max(distance, light.size);
-    return Incident(direction, distance, light.intensity * (falloff / outside / outside));
+    let outside = max(distance, lights[light].size);
+    return Incident(direction, distance, intensity * (falloff / outside / outside));
 }
 
 // How far in front of a surface that faces the light shadows are looked up, texels.
 const OFF: f32 = 0.125;
 
-const NO_VIEW: u32 = 0xffffffffu;
+const NO_MAP: u32 = 0xffffffffu;
 
-// Which of a light's views sees a point, counted from its first: the face of a point light's cube that
-// it lies in, the first cascade that reaches it.
-fn shadow_view_of(light: Light, point: vec3f) -> u32 {
-    if light.shadow_count == 6u && light.kind != 2u {
-        let d = point - light.position;
-        let a = abs(d);
-        if a.x >= a.y && a.x >= a.z {
-            return select(1u, 0u, d.x > 0.0);
+// The map that sees a point, of those of one light: of a point light's cube the face that it lies in, of
+// cascades the first that reaches it.
+fn map_of(light: u32, point: vec3f) -> u32 {
+    let kind = lights[light].kind;
+    let first = lights[light].first_shadow;
+    let count = lights[light].shadow_count;
+    if kind == DIRECTIONAL {
+        for (var map = first; map < first + count; map++) {
+            let clip = shadow_views[map].clip_from_world * vec4f(point, 1.0);
+            if all(abs(clip.xy) < shadow_views[map].reach) {
+                return map;
+            }
         }
-        if a.y >= a.z {
-            return select(3u, 2u, d.y > 0.0);
-        }
-        return select(5u, 4u, d.z > 0.0);
+        return NO_MAP;
     }
-    if light.kind != 2u {
-        return 0u;
+    if count < 6u {
+        return first;
     }
-    for (var i = 0u; i < light.shadow_count; i++) {
-        let shadow = shadow_views[light.first_shadow + i];
-        let clip = shadow.clip_from_world * vec4f(point, 1.0);
-        if all(abs(clip.xy) < shadow.reach) {
-            return i;
-        }
+    let d = point - lights[light].position;
+    let a = abs(d);
+    if a.x >= a.y && a.x >= a.z {
+        return first + select(1u, 0u, d.x > 0.0);
     }
-    return NO_VIEW;
+    if a.y >= a.z {
+        return first + select(3u, 2u, d.y > 0.0);
+    }
+    return first + select(5u, 4u, d.z > 0.0);
 }
 
 // Where a point lies in a map: texture coordinates, depth, and the clip w.
-fn in_map(shadow: ShadowView, point: vec3f) -> vec4f {
-    let clip = shadow.clip_from_world * vec4f(point, 1.0);
+fn in_map(map: u32, point: vec3f) -> vec4f {
+    let clip = shadow_views[map].clip_from_world * vec4f(point, 1.0);
     let w = max(clip.w, 1e-6);
     return vec4f(0.5 + 0.5 * clip.x / w, 0.5 - 0.5 * clip.y / w, clip.z / w, w);
 }
@@ -176,11 +187,11 @@ struct PlaneInMap {
 }
 
 // About a point of a surface.
-fn plane_in_map(shadow: ShadowView, point: vec3f, surface: SurfacePlane) -> PlaneInMap {
-    let at = in_map(shadow, point).xyz;
+fn plane_in_map(map: u32, point: vec3f, surface: SurfacePlane) -> PlaneInMap {
+    let at = in_map(map, point).xyz;
     let texel = surface.texel;
-    let dx = in_map(shadow, point + texel * surface.u).xyz - at;
-    let dy = in_map(shadow, point + texel * surface.v).xyz - at;
+    let dx = in_map(map, point + texel * surface.u).xyz - at;
+    let dy = in_map(map, point + texel * surface.v).xyz - at;
     let area = dx.x * dy.y - dx.y * dy.x;
     let gradient = vec2f(dx.z * dy.y - dy.z * dx.y, dy.z * dx.x - dx.z * dy.x);
     let axes = mat2x2f(dx.xy / texel, dy.xy / texel);
@@ -189,7 +200,7 @@ fn plane_in_map(shadow: ShadowView, point: vec3f, surface: SurfacePlane) -> Plan
 
 // Share of the four texels about a place that nothing lies before, each compared with the plane's own
 // depth at its middle: so a plane does not shadow itself, however low the light stands.
-fn filtered(plane: PlaneInMap, layer: u32, at: vec2f) -> f32 {
+fn filtered(map: u32, plane: PlaneInMap, at: vec2f) -> f32 {
     let size = vec2f(textureDimensions(shadow_maps));
     let place = at * size - 0.5;
     let low = floor(place);
@@ -199,7 +210,7 @@ fn filtered(plane: PlaneInMap, layer: u32, at: vec2f) -> f32 {
     let step = plane.gradient / size;
     let depth = plane.at.z + dot(plane.gradient, corner - plane.at.xy);
     // At the lower left, the lower right, the upper right, the upper left.
-    let stored = textureGather(shadow_maps, shadow_sampler, corner, i32(layer));
+    let stored = textureGather(shadow_maps, shadow_sampler, corner, i32(map));
     let own = depth + 0.5 * vec4f(step.y - step.x, step.x + step.y, step.x - step.y, -step.x - step.y);
     let lit = select(vec4f(0.0), vec4f(1.0), stored <= own);
     let rows = mix(lit.wx, lit.zy, part.x);
@@ -208,27 +219,23 @@ fn filtered(plane: PlaneInMap, layer: u32, at: vec2f) -> f32 {
 
 // Where a point of a surface's plane is looked up.
 struct ShadowSample {
-    // Counted from the light's first.
-    view: u32,
+    map: u32,
     plane: PlaneInMap,
     at: vec2f,
 }
 
-// Metres `o` along the plane's axes from where it is known in a view.
-fn sample_of(
-    light: Light, known: u32, plane: PlaneInMap, surface: SurfacePlane, o: vec2f,
-) -> ShadowSample {
-    if light.kind == 2u {
+// Metres `o` along the plane's axes from where it is known in a map.
+fn sample_of(light: u32, known: u32, plane: PlaneInMap, surface: SurfacePlane, o: vec2f) -> ShadowSample {
+    if lights[light].kind == DIRECTIONAL {
         return ShadowSample(known, plane, plane.at.xy + plane.axes * o);
     }
     let point = surface.start + o.x * surface.u + o.y * surface.v;
-    let view = shadow_view_of(light, point);
-    let map = shadow_views[light.first_shadow + view];
-    if view == known {
-        return ShadowSample(view, plane, in_map(map, point).xy);
+    let map = map_of(light, point);
+    if map == known {
+        return ShadowSample(map, plane, in_map(map, point).xy);
     }
     let other = plane_in_map(map, point, surface);
-    return ShadowSample(view, other, other.at.xy);
+    return ShadowSample(map, other, other.at.xy);
 }
 
 // Share of a light that reaches a point of a surface with the given geometric normal, 0 to 1.
@@ -237,20 +244,19 @@ fn sample_of(
 // tells how wide the edge is; the edge is then filtered (Reeves et al. 1987). Samples lie in the
 // surface's own plane rather than across the light's direction, so that a surface does not shadow
 // itself however wide the edge.
-fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: vec3f, turn: f32) -> f32 {
-    if light.shadow_count == 0u {
+fn visibility(light: u32, l: vec3f, distance: f32, position: vec3f, normal: vec3f, turn: f32) -> f32 {
+    if lights[light].shadow_count == 0u {
         return 1.0;
     }
-    let index = shadow_view_of(light, position);
-    if index == NO_VIEW {
+    let map = map_of(light, position);
+    if map == NO_MAP {
         return 1.0;
     }
-    let shadow = shadow_views[light.first_shadow + index];
-    let parallel = light.kind == 2u;
+    let parallel = lights[light].kind == DIRECTIONAL;
     let facing = dot(normal, l);
     // What lies at the back of a surface is shadowed by it; coarse meshes are lit a little beyond.
     let cosine = max(facing, 0.05);
-    let texel = shadow.texel * select(distance, 1.0, parallel);
+    let texel = shadow_views[map].texel * select(distance, 1.0, parallel);
     // Surfaces are not quite planes: within a texel they leave them, the more the lower the light stands.
     let start = position + normal * (texel * OFF / cosine);
     let x = tangent_of(l);
@@ -258,28 +264,30 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
     // How much depth the plane gains along x and y.
     let slope = clamp(vec2f(dot(normal, x), dot(normal, y)) / cosine, vec2f(-8.0), vec2f(8.0));
     let surface = SurfacePlane(start, x - l * slope.x, y - l * slope.y, texel);
-    let plane = plane_in_map(shadow, start, surface);
+    let plane = plane_in_map(map, start, surface);
 
     var radius = frame.filter_radius * texel;
-    if light.size > 0.0 && frame.search_samples > 0u {
+    let light_size = lights[light].size;
+    if light_size > 0.0 && frame.search_samples > 0u {
         let size = vec2f(textureDimensions(shadow_maps));
-        let search = max(shadow.search, radius);
+        let search = max(shadow_views[map].search, radius);
+        let depth_range = shadow_views[map].depth_range;
         var sum = 0.0;
         var found = 0.0;
         for (var i = 0u; i < frame.search_samples; i++) {
             // More of them near the middle, where they count whatever casts the shadow.
             let toward = disc_point(i, frame.search_samples, turn);
             let o = search * length(toward) * toward;
-            let s = sample_of(light, index, plane, surface, o);
+            let s = sample_of(light, map, plane, surface, o);
             let texel_at = clamp(vec2i(s.at * size), vec2i(0), vec2i(size) - 1);
-            let depth = textureLoad(shadow_maps, texel_at, i32(light.first_shadow + s.view), 0);
+            let depth = textureLoad(shadow_maps, texel_at, i32(s.map), 0);
             let here = s.plane.at.z + dot(s.plane.gradient, (vec2f(texel_at) + 0.5) / size - s.plane.at.xy);
             // How far from the light what is there lies, as a share of this point's distance; in
             // parallel light, how many metres before the point.
-            let place = select(here / depth, (depth - here) * shadow.depth_range, parallel);
+            let place = select(here / depth, (depth - here) * depth_range, parallel);
             // Only what lies between the point and the light's disc casts a shadow here. At a steep angle
             // the surface's plane may reach behind the light within the search.
-            let reach = light.size * select((1.0 - place) / max(place, 1e-3), place, parallel);
+            let reach = light_size * select((1.0 - place) / max(place, 1e-3), place, parallel);
             if (parallel || here > 0.0) && depth > here && length(o) <= reach + texel {
                 sum += place;
                 found += 1.0;
@@ -288,7 +296,7 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
         // Where nothing was found the light is seen, or what hides it is too near to have been met.
         if found > 0.0 {
             let mean = sum / found;
-            let penumbra = select(light.size * (1.0 - mean) / max(mean, 0.05), light.size * mean, parallel);
+            let penumbra = select(light_size * (1.0 - mean) / max(mean, 0.05), light_size * mean, parallel);
             radius = max(radius, penumbra);
         }
     }
@@ -296,8 +304,8 @@ fn visibility(light: Light, l: vec3f, distance: f32, position: vec3f, normal: ve
     var lit = 0.0;
     for (var i = 0u; i < frame.filter_samples; i++) {
         let o = radius * disc_point(i, frame.filter_samples, turn);
-        let s = sample_of(light, index, plane, surface, o);
-        lit += filtered(s.plane, light.first_shadow + s.view, s.at);
+        let s = sample_of(light, map, plane, surface, o);
+        lit += filtered(s.map, s.plane, s.at);
     }
     return lit / f32(frame.filter_samples);
 }
