@@ -9,9 +9,10 @@
 //!
 //! Direct light has the materials of the path tracer (the shaders are twins of `gather::bsdf`),
 //! shadows come from shadow maps. Indirect light is the field's, trilinearly filtered: diffuse by
-//! convolution with the clamped cosine, specular by the split sum with the fitted lobe of the second
-//! paper's appendix A; what probes are too sparse for, [`Occlusion`] of short range can take away from
-//! it. The shaders are in `lumencast-shaders`.
+//! convolution with its lobe, specular by the split sum with a lobe round about its mean direction
+//! (`environment_brdf`), where the second paper's appendix A has a fitted one about the mirrored
+//! direction; what probes are too sparse for, [`Occlusion`] of short range can take away from it. The
+//! shaders are in `lumencast-shaders`.
 
 #![forbid(unsafe_code)]
 

@@ -236,17 +236,20 @@ fn direct_light(b: Bsdf, n: vec3f, v: vec3f, position: vec3f, geometric: vec3f, 
     return sum;
 }
 
-// Light of the field, chapter 4.2.2 of the second paper: diffuse by irradiance, specular by the split
-// sum, the mean radiance under the lobe times the environment BRDF. The material's occlusion is of the
-// side that is seen: light through a thin surface it leaves alone. So is `visible`, what ambient
-// occlusion leaves; both tell of the same crevices, of which each counts once.
+// Light of the field, chapter 4.2.2 of the second paper: diffuse by convolution with its lobe, specular by
+// the split sum, the mean radiance under the lobe times the environment BRDF. Light through a thin surface
+// comes from the mirror image of that lobe. The material's occlusion is of the side that is seen: light
+// from behind it leaves alone. So is `visible`, what ambient occlusion leaves; both tell of the same
+// crevices, of which each counts once.
 fn indirect_light(
     b: Bsdf, n: vec3f, v: vec3f, position: vec3f, roughness: f32, occlusion: f32, visible: f32,
 ) -> vec3f {
     let n_v = dot(n, v);
     let table = table_at(n_v, roughness);
     let by = textureSampleLevel(environment_brdf, table_sampler, table, 0.0);
-    let light = field_light(position, n, lobe(n, cosine_bands()), specular_lobe(n, v, by.zw, table));
+    let toward = mean_direction(n, v, by.zw);
+    let bands = specular_bands(length(by.zw), table);
+    let light = field_light(position, n, lobe(n, diffuse_bands(b)), lobe(toward, bands));
     let under = 1.0 - reflectance(b, n_v);
     var of_diffuse = vec3f(occlusion);
     var of_specular = occlusion;
@@ -257,21 +260,47 @@ fn indirect_light(
     var sum = b.diffuse * under * of_diffuse * light.a / PI;
     sum += (b.f0 * by.x + b.f90 * by.y) * specular_occlusion(n_v, of_specular, b.alpha) * light.b;
     if any(b.transmission > vec3f(0.0)) {
-        let through = lobe(-v, ggx_bands(roughness));
+        let through = lobe(reflect(toward, n), bands);
         let behind = field_light(position, -n, through, through);
-        sum += b.transmission * under * behind.a;
+        let share = (1.0 - b.dielectric_f0) * by.x + (1.0 - b.dielectric_f90) * by.y;
+        sum += b.transmission * share * behind.a;
     }
     return sum;
 }
 
-// The specular lobe, round about its mean direction, of which the parts along the mirrored direction
-// and across it are given.
-fn specular_lobe(n: vec3f, v: vec3f, mean: vec2f, table: vec2f) -> Lobe {
+// The diffuse lobe's share of light by its direction, `coupling` times the clamped cosine, as multipliers of
+// bands, times what the direction of sight leaves: exact for light of any order. Schlick's term has the
+// bands 2π ∫ c (1 − c)⁵ P_l(c) dc over 0 ≤ c ≤ 1.
+fn diffuse_bands(b: Bsdf) -> Bands {
+    let grazing = b.dielectric_f90 - b.dielectric_f0;
+    let mean = b.dielectric_f0 + grazing / 21.0;
+    if mean >= 1.0 {
+        return Bands();
+    }
+    let straight = (1.0 - b.dielectric_f0) / (1.0 - mean);
+    let lost = grazing / (1.0 - mean);
+    let cosine = cosine_bands();
+    return Bands(
+        straight * cosine.b0 - lost * 0.14959965,
+        straight * cosine.b1 - lost * 0.037399913,
+        straight * cosine.b2 + lost * 0.05609987,
+        lost * 0.043633231,
+        straight * cosine.b4 - lost * 0.019266622,
+    );
+}
+
+// The direction about which the specular lobe is round, its mean, of which the parts along the mirrored
+// direction and across it are given.
+fn mean_direction(n: vec3f, v: vec3f, mean: vec2f) -> vec3f {
     let mirrored = reflect(-v, n);
     let across = n - dot(n, mirrored) * mirrored;
-    let direction = mean.x * mirrored + mean.y * across * inverseSqrt(max(dot(across, across), 1e-8));
+    return normalize(mean.x * mirrored + mean.y * across * inverseSqrt(max(dot(across, across), 1e-8)));
+}
+
+// The specular lobe's bands; the first is the length of its mean.
+fn specular_bands(length_of_mean: f32, table: vec2f) -> Bands {
     let higher = textureSampleLevel(environment_brdf, table_sampler, table + vec2f(0.5, 0.0), 0.0);
-    return lobe(normalize(direction), Bands(1.0, length(mean), higher.x, higher.y, higher.z));
+    return Bands(1.0, length_of_mean, higher.x, higher.y, higher.z);
 }
 
 // What ambient occlusion leaves of the light at a place of the picture whose depth changes so much from

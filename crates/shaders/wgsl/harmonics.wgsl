@@ -64,18 +64,3 @@ fn lobe(d: vec3f, bands: Bands) -> Lobe {
 fn cosine_bands() -> Bands {
     return Bands(PI, 2.0943951, 0.7853982, 0.0, -0.1308997);
 }
-
-// The specular lobe of GGX, normalised, for a perceptual roughness: the second paper's appendix A.
-fn ggx_bands(roughness: f32) -> Bands {
-    let r = vec4f(clamp(roughness, 0.0, 1.0));
-    let offset = vec4f(0.27793123, 0.5937202, 0.2400839, 0.0002507005);
-    let first = vec4f(0.90550125, 10.575183, 21.648092, 5.533406)
-        * cos(r * vec4f(2.4922082, 3.4913207, 3.9251013, 3.9890213) + vec4f(2.8875563, 0.5667296, 0.50116944, 0.7050972));
-    let second = vec4f(1.9874332, 9.528553, 19.906906, 3.233481)
-        * cos(r * vec4f(1.7953715, 3.5860846, 4.01505, 4.63842) + vec4f(0.6362613, 3.606898, 3.5555115, 3.2514422));
-    let slope = vec4f(1.5405431, 4.351719, 7.5814686, 9.844106);
-    let linear = vec4f(-4.7317914e-4, -3.5867841, -6.4756713, -8.768045);
-    let squared = vec4f(0.32961586, 0.29109984, 0.25094584, 0.21165547);
-    let bands = offset + first + second + r * (slope * inverseSqrt(squared + r * r) + linear);
-    return Bands(1.0, bands.x, bands.y, bands.z, bands.w);
-}

@@ -10,7 +10,7 @@ use lumencast_light::{Grid, LightField, Offset, Order, ProbeVolume, Sh, VolumeId
 use lumencast_scene::{
     Filter, Image, Light, LightKind, Material, Snapshot, TextureRef, View, Wrap,
 };
-use lumencast_shade::{Lighting, Materials, Settings};
+use lumencast_shade::{Lighting, Materials, Renderer, Settings};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 fn settings() -> Settings {
@@ -121,35 +121,87 @@ fn uniform(sh: &Sh) -> LightField {
     LightField::new(vec![volume])
 }
 
-/// ∫ f(v, l) L(l) (n·l) dω for a metal of F0 = 1 seen from `v`, in its surface's own directions with
-/// the normal along y, by quadrature over half vectors.
-fn reflected_by_metal(sh: &Sh, roughness: f64, v: DVec3) -> f64 {
-    const STEPS: u32 = 200;
-    const AROUND: u32 = 128;
+/// Steps of quadrature, by the angle to the normal and around it.
+const STEPS: [u32; 2] = [200, 128];
+
+/// The middles of all parts of a hemisphere, as shares of the way to its border and of a turn.
+fn parts() -> impl Iterator<Item = (f64, f64)> {
+    let middle = |i: u32, n: u32| (f64::from(i) + 0.5) / f64::from(n);
+    let [steps, around] = STEPS;
+    (0..steps)
+        .flat_map(move |i| (0..around).map(move |k| (middle(i, steps), TAU * middle(k, around))))
+}
+
+/// Mean of what `weight` makes of v·h and of the light's direction over the lobe of GGX seen from `v`,
+/// ∫ D G / (4 n·v n·l) weight (n·l) dω, in its surface's own directions with the normal along y, by
+/// quadrature over half vectors.
+fn over_lobe(roughness: f64, v: DVec3, weight: impl Fn(f64, DVec3) -> f64) -> f64 {
     let alpha2 = roughness.powi(4);
     let lambda = |cos: f64| 0.5 * ((1.0 + alpha2 * (1.0 - cos * cos) / (cos * cos)).sqrt() - 1.0);
     let mut sum = 0.0;
-    for i in 0..STEPS {
+    for (t, phi) in parts() {
         // Denser near the normal: cos θ_h = 1 − t³.
-        let t = (f64::from(i) + 0.5) / f64::from(STEPS);
         let cos_h = 1.0 - t.powi(3);
-        let solid_angle = TAU * 3.0 * t * t / f64::from(STEPS * AROUND);
+        let solid_angle = TAU * 3.0 * t * t / f64::from(STEPS[0] * STEPS[1]);
         let d = alpha2 / (PI * (cos_h * cos_h * (alpha2 - 1.0) + 1.0).powi(2));
         let sin_h = (1.0 - cos_h * cos_h).sqrt();
-        for k in 0..AROUND {
-            let phi = TAU * (f64::from(k) + 0.5) / f64::from(AROUND);
-            let h = DVec3::new(sin_h * phi.cos(), cos_h, sin_h * phi.sin());
-            let v_h = v.dot(h);
-            let l = 2.0 * v_h * h - v;
-            if v_h <= 0.0 || l.y <= 0.0 {
-                continue;
-            }
-            // D G / (4 n·v n·l) n·l dω_l, and dω_l = 4 v·h dω_h.
-            let g = 1.0 / (1.0 + lambda(v.y) + lambda(l.y));
-            sum += d * g * v_h / v.y * solid_angle * f64::from(sh.radiance(l.as_vec3()).x);
+        let h = DVec3::new(sin_h * phi.cos(), cos_h, sin_h * phi.sin());
+        let v_h = v.dot(h);
+        let l = 2.0 * v_h * h - v;
+        if v_h <= 0.0 || l.y <= 0.0 {
+            continue;
         }
+        // D G / (4 n·v n·l) n·l dω_l, and dω_l = 4 v·h dω_h.
+        let g = 1.0 / (1.0 + lambda(v.y) + lambda(l.y));
+        sum += d * g * v_h / v.y * solid_angle * weight(v_h, l);
     }
     sum
+}
+
+/// A field's light from a direction; from one mirrored by the surface.
+fn from(sh: &Sh, l: DVec3) -> f64 {
+    f64::from(sh.radiance(l.as_vec3()).x)
+}
+
+fn from_behind(sh: &Sh, l: DVec3) -> f64 {
+    from(sh, DVec3::new(l.x, -l.y, l.z))
+}
+
+/// What a surface makes of a field's light, seen from a direction.
+type Integral = fn(sh: &Sh, roughness: f64, v: DVec3) -> f64;
+
+/// ∫ f(v, l) L(l) (n·l) dω for a metal of F0 = 1.
+fn of_metal(sh: &Sh, roughness: f64, v: DVec3) -> f64 {
+    over_lobe(roughness, v, |_, l| from(sh, l))
+}
+
+/// Schlick's Fresnel term of glass, by the cosine with the half vector.
+fn of_glass(cosine: f64) -> f64 {
+    0.04 + 0.96 * (1.0 - cosine).powi(5)
+}
+
+fn of_gloss(sh: &Sh, roughness: f64, v: DVec3) -> f64 {
+    over_lobe(roughness, v, |v_h, l| of_glass(v_h) * from(sh, l))
+}
+
+/// Of white plastic: gloss, and a diffuse lobe of which the surface takes what it reflects, on the way in
+/// and out.
+fn of_plastic(sh: &Sh, roughness: f64, v: DVec3) -> f64 {
+    let mut diffuse = 0.0;
+    for (t, phi) in parts() {
+        // Areas of the disc below, and so cosines, are the same for all parts.
+        let (sin, cos) = (t.sqrt(), (1.0 - t).sqrt());
+        let l = DVec3::new(sin * phi.cos(), cos, sin * phi.sin());
+        diffuse += (1.0 - of_glass(cos)) * from(sh, l) / f64::from(STEPS[0] * STEPS[1]);
+    }
+    let mean = 0.04 + 0.96 / 21.0;
+    of_gloss(sh, roughness, v) + diffuse * (1.0 - of_glass(v.y)) / (1.0 - mean)
+}
+
+/// Of a thin clear sheet: gloss, and light from behind by the same lobe mirrored.
+fn of_sheet(sh: &Sh, roughness: f64, v: DVec3) -> f64 {
+    let through = |v_h, l| (1.0 - of_glass(v_h)) * from_behind(sh, l);
+    of_gloss(sh, roughness, v) + over_lobe(roughness, v, through)
 }
 
 /// A bright sky with a brighter side: what a lobe sees depends on how wide it is and where it points.
@@ -163,40 +215,62 @@ fn sky(order: Order) -> Sh {
     sh
 }
 
-/// How far a drawn metal under a sky is from the integral, relative to it, by roughness; seen so many
-/// radians off the normal.
-fn errors_of_metal(order: Order, angle: f32, roughness: &[f32]) -> Vec<f32> {
+/// The largest error of what is drawn of a material, relative to its integral, over roughness; under a sky,
+/// seen so many radians off the normal.
+fn largest_error(
+    renderer: &mut Renderer,
+    material: &Material,
+    integral: Integral,
+    order: Order,
+    angle: f32,
+) -> f32 {
     let sh = sky(order);
-    let light = uniform(&sh);
+    renderer.set_light(&uniform(&sh)).unwrap();
     let toward_eye = Vec3::new(0.0, angle.cos(), angle.sin());
     let view = View::look_at(6.0 * toward_eye, Vec3::ZERO, 0.05).unwrap();
-    let error = |&roughness: &f32| {
-        let scene = floor(Material { metallic: 1.0, roughness, ..Material::default() });
-        let mut renderer = renderer(&scene, &settings());
-        renderer.set_light(&light).unwrap();
+    let error = |roughness: f32| {
+        renderer.set_scene(&floor(Material { roughness, ..material.clone() }));
         let picture = renderer.pictures(&[view], &settings()).unwrap().remove(0);
         let middle = picture[(SIZE.y / 2 * SIZE.x + SIZE.x / 2) as usize].x;
-        let expected = reflected_by_metal(&sh, roughness.into(), toward_eye.as_dvec3()) as f32;
-        middle / expected - 1.0
+        let expected = integral(&sh, roughness.into(), toward_eye.as_dvec3()) as f32;
+        (middle / expected - 1.0).abs()
     };
-    roughness.iter().map(error).collect()
+    [0.1, 0.3, 0.5, 0.7, 0.85, 1.0].map(error).into_iter().fold(0.0, f32::max)
+}
+
+/// Whatever the order and from wherever it is seen, what is drawn is its integral: from straight above
+/// within `above`, from the side within what is given for orders 1 to 4.
+fn check(material: &Material, integral: Integral, above: f32, aside: [f32; 4]) {
+    let mut renderer = renderer(&floor(material.clone()), &settings());
+    for (order, aside) in [Order::L1, Order::L2, Order::L3, Order::L4].into_iter().zip(aside) {
+        for degrees in [0.0_f32, 30.0, 60.0, 80.0] {
+            let angle = degrees.to_radians();
+            let error = largest_error(&mut renderer, material, integral, order, angle);
+            let most = if degrees == 0.0 { above } else { aside };
+            assert!(error < most, "{order:?}, {degrees}°: {error}");
+        }
+    }
 }
 
 /// Seen from straight above, and in light of L1, the lobe about its mean direction leaves out nothing;
 /// seen from the side it is no longer round, which counts the more, the sharper light is.
 #[test]
 fn specular_light_is_the_integral() {
-    const ROUGHNESS: [f32; 6] = [0.1, 0.3, 0.5, 0.7, 0.85, 1.0];
-    for (order, largest) in
-        [(Order::L1, 0.005), (Order::L2, 0.06), (Order::L3, 0.15), (Order::L4, 0.21)]
-    {
-        for degrees in [0.0_f32, 30.0, 60.0, 80.0] {
-            let errors = errors_of_metal(order, degrees.to_radians(), &ROUGHNESS);
-            let largest = if degrees == 0.0 { 0.005 } else { largest };
-            let within = errors.iter().all(|error| error.abs() < largest);
-            assert!(within, "{order:?}, {degrees}°: {errors:.3?}");
-        }
-    }
+    let metal = Material { metallic: 1.0, ..Material::default() };
+    check(&metal, of_metal, 0.005, [0.005, 0.06, 0.15, 0.21]);
+}
+
+/// The diffuse lobe is exact, whatever light is.
+#[test]
+fn light_on_plastic_is_the_integral() {
+    let plastic = Material { metallic: 0.0, ..Material::default() };
+    check(&plastic, of_plastic, 0.003, [0.02, 0.05, 0.05, 0.05]);
+}
+
+#[test]
+fn light_through_a_sheet_is_the_integral() {
+    let sheet = Material { metallic: 0.0, transmission: 1.0, ..Material::default() };
+    check(&sheet, of_sheet, 0.005, [0.04, 0.12, 0.06, 0.11]);
 }
 
 /// In uniform light a white surface that absorbs nothing vanishes; rough metals lose what single
