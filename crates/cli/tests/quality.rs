@@ -43,7 +43,7 @@ fn fields_and_the_baseline_are_judged() {
     )
     .json();
 
-    // Two orders, as gathered and fitted, and the first with a bounce more.
+    // Two orders, as gathered and fitted, and with a bounce more.
     let fields = report["fields"].as_array().expect("rows");
     let names: Vec<_> = fields.iter().map(|row| row["name"].as_str().expect("a name")).collect();
     let expected = [
@@ -52,10 +52,11 @@ fn fields_and_the_baseline_are_judged() {
         "4x4x4 L2 3 bounces",
         "4x4x4 L2 3 bounces, fitted",
         "4x4x4 L1 4 bounces",
+        "4x4x4 L2 4 bounces",
     ];
     assert_eq!(names, expected);
     let psnr = |row| number(&report, &format!("/fields/{row}/whole/psnr"));
-    for row in 0..5 {
+    for row in 0..6 {
         assert!((20.0..40.0).contains(&psnr(row)), "{report}");
     }
     assert!(psnr(3) > psnr(2) + 0.3, "a fit is nearer: {report}");
@@ -90,7 +91,11 @@ fn fields_and_the_baseline_are_judged() {
     let before = film(".indirect.film");
     let again = bench(&arguments).json();
     assert!(before == film(".indirect.film"));
-    assert_eq!(again["reference"], report["reference"]);
+    for told in ["samples", "noise_psnr"] {
+        assert_eq!(again["reference"][told], report["reference"][told], "{told}");
+    }
+    assert!(number(&report, "/reference/sample_seconds") > 0.0);
+    assert_eq!(again["reference"]["sample_seconds"], Value::Null, "nothing was traced");
     assert_eq!(again["fields"][1]["whole"], report["fields"][1]["whole"]);
     assert_eq!(again["baseline"], Value::Array(Vec::new()));
 
@@ -112,7 +117,7 @@ fn shown_in(text: &str) -> Vec<&str> {
 fn what_was_written_is_what_was_measured(report: &Value, folder: &Path) {
     let text = std::fs::read_to_string(folder.join("quality.md")).expect("the tables");
     let shown = shown_in(&text);
-    assert_eq!(shown.len(), 1 + 2 * 7 + 2, "{text}");
+    assert_eq!(shown.len(), 1 + 2 * 8 + 2, "{text}");
     for name in &shown {
         assert!(folder.join(name).is_file(), "{name}");
     }

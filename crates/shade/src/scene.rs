@@ -262,3 +262,135 @@ fn placed(instance: &Instance) -> layout::Instance {
         ..layout::Instance::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use glam::{UVec2, Vec2, Vec4};
+    use lumencast_scene::{AlphaMode, Mesh, MeshId, View};
+    use lumencast_testkit::scenes::Stage as Scenery;
+
+    use super::*;
+    use crate::camera::Camera;
+    use crate::materials;
+
+    /// Balls in a row along x, a metre apart, the k-th at x = k; all of one mesh of two primitives.
+    const BALLS: i32 = 41;
+
+    /// The row, of a solid and a blended material, and walls far behind it that take turns of two other
+    /// solid ones and a masked one.
+    fn snapshot() -> Arc<Snapshot> {
+        let mut scenery = Scenery::default();
+        let of = |alpha_mode| Material { alpha_mode, ..Material::default() };
+        let [one, glass, two, leaf] =
+            [AlphaMode::Opaque, AlphaMode::Blend, AlphaMode::Opaque, AlphaMode::Mask(0.5)]
+                .map(|mode| scenery.material(of(mode)));
+        let mut ball = Scenery::default();
+        ball.sphere(Vec3::ZERO, 0.2, 4, one).sphere(Vec3::ZERO, 0.4, 4, glass);
+        let primitives =
+            ball.snapshot().instances.iter().flat_map(|i| i.mesh.primitives.clone()).collect();
+        let mesh = Arc::new(Mesh { primitives, ..Mesh::default() });
+        for k in 0..BALLS {
+            let place = Affine3A::from_translation(Vec3::X * k as f32);
+            scenery.instance(MeshId(0), mesh.clone(), place);
+        }
+        for k in 0..12 {
+            let corner = Vec3::new(-20.0, -20.0, -30.0 - k as f32);
+            let material = [two, leaf, one][k as usize % 3];
+            scenery.quad(corner, Vec3::X * 80.0, Vec3::Y * 40.0, material);
+        }
+        scenery.snapshot()
+    }
+
+    fn on_a_device() -> GpuScene {
+        let gpu = Gpu::new().expect("an adapter");
+        let layout = materials::group_layout(&gpu.device);
+        let mut scene = GpuScene::new(&gpu, 1);
+        scene.update(&gpu, &mut Commands::new(&gpu), &layout, &snapshot(), Materials::Full);
+        scene
+    }
+
+    /// What one sees from a point through a narrow, square picture.
+    fn frustum(eye: Vec3, target: Vec3) -> Frustum {
+        let view = View::look_at(eye, target, 0.1).expect("two points");
+        Frustum::new(&Camera::new(&view, UVec2::ONE, Vec2::ZERO).clip_from_world)
+    }
+
+    /// However many instances a primitive has, it is drawn by one call, and of them those alone that the
+    /// frustum meets.
+    #[test]
+    fn instances_are_drawn_together_and_only_where_they_may_be_seen() {
+        let scene = on_a_device();
+        let mut visible = vec![7];
+        let across = frustum(Vec3::new(20.0, 0.0, 100.0), Vec3::X * 20.0);
+        let calls = scene.calls(&across, &mut visible, |_| true);
+        assert_eq!(calls.len(), 2 + 12, "{calls:?}");
+        let balls = |calls: &[Call]| -> Vec<usize> {
+            calls.iter().map(|c| c.instances.len()).filter(|n| *n > 1).collect()
+        };
+        let [small, large] = balls(&calls)[..] else { panic!("{calls:?}") };
+        // It is 10 m wide there: so many balls meet it, and a few more may by their boxes.
+        assert!((9..=13).contains(&small) && (small..=13).contains(&large), "{small}, {large}");
+        for call in &calls {
+            let listed = &visible[call.instances.start as usize..call.instances.end as usize];
+            let distinct: HashSet<u32> = listed.iter().copied().collect();
+            assert_eq!(distinct.len(), listed.len(), "each once: {listed:?}");
+            if listed.len() > 1 {
+                assert!(listed.iter().all(|k| (13..=27).contains(k)), "{listed:?}");
+            }
+        }
+        assert_eq!(visible[0], 7, "what stood there before");
+
+        let away = frustum(Vec3::new(20.0, 0.0, 100.0), Vec3::new(20.0, 0.0, 200.0));
+        assert!(scene.calls(&away, &mut visible, |_| true).is_empty());
+    }
+
+    /// Solid surfaces come first, then those with holes, then blended ones; and a material is set once in
+    /// each.
+    #[test]
+    fn materials_are_not_set_more_often_than_there_are_some() {
+        let scene = on_a_device();
+        let mut visible = Vec::new();
+        let all = frustum(Vec3::new(20.0, 0.0, 1e3), Vec3::X * 20.0);
+        let calls = scene.calls(&all, &mut visible, |_| true);
+        let mut set: Vec<_> = calls
+            .iter()
+            .map(|call| (scene.draws[call.draw].surface, scene.draws[call.draw].material))
+            .collect();
+        assert!(set.is_sorted(), "{set:?}");
+        assert_eq!(set.len(), 2 + 12);
+        set.dedup();
+        let expected = [(Surface::Solid, 0), (Surface::Solid, 2), (Surface::Masked, 3)];
+        assert_eq!(set, [&expected[..], &[(Surface::Blended, 1)]].concat());
+        let solid = scene.calls(&all, &mut visible, |surface| surface == Surface::Solid);
+        assert_eq!(solid.len(), 1 + 8);
+    }
+
+    /// One call an instance, the farthest first.
+    #[test]
+    fn blended_surfaces_are_sorted() {
+        let scene = on_a_device();
+        let eye = Vec3::new(12.3, 0.0, 0.0);
+        let mut visible = Vec::new();
+        let along = frustum(eye, eye + Vec3::X);
+        let calls = scene.sorted_calls(&along, eye, &mut visible);
+        let order: Vec<u32> =
+            calls.iter().map(|call| visible[call.instances.start as usize]).collect();
+        // A ball about the eye is not behind it.
+        assert_eq!(order, (12..BALLS as u32).rev().collect::<Vec<_>>());
+        assert!(calls.iter().all(|call| call.instances.len() == 1));
+        assert!(calls.iter().all(|call| scene.draws[call.draw].surface == Surface::Blended));
+    }
+
+    /// A box that no plane cuts off is met, wherever its corners are.
+    #[test]
+    fn a_frustum_meets_what_surrounds_it() {
+        let narrow = frustum(Vec3::ZERO, Vec3::NEG_Z);
+        let around = Aabb { min: Vec3::splat(-9.0), max: Vec3::splat(9.0) };
+        assert!(narrow.meets(&around));
+        assert!(!narrow.meets(&Aabb { min: Vec3::splat(1.0), ..around }), "behind");
+        let nothing = Frustum::new(&glam::Mat4::from_cols(Vec4::X, Vec4::Y, Vec4::ZERO, Vec4::W));
+        assert!(!nothing.meets(&Aabb::EMPTY));
+    }
+}

@@ -41,9 +41,9 @@ Examples:
   lumencast bench quality breakfast.glb --volume 8x4x8 --document docs/results.md
 
 Every --volume is a grid to be measured by itself. A row is a grid and an order, as its light is
-gathered, and, unless --fit is 0, another one fitted to surfaces; the first grid is also measured with as
-many bounces in its probes as the picture has, the second paper's way, where a probe sees one more than a
-camera. Two rows are the baseline: one path a pixel, as it is, and after as many
+gathered, and, unless --fit is 0, another one fitted to surfaces; the first grid is also measured, as
+gathered, with as many bounces in its probes as the picture has, the second paper's way, where a probe
+sees one more than a camera. Two rows are the baseline: one path a pixel, as it is, and after as many
 frames denoised by BMFR (Koskela et al. 2019), whose pictures end at white.
 
 PSNR is of codes v^(1/2.2), clamped, at the reference's exposure. Beside the whole picture's it is
@@ -174,8 +174,9 @@ impl BenchQuality {
         for (number, grid) in grids.iter().enumerate() {
             let each =
                 |&order: &Order| readings.iter().map(move |reading| (order, below, *reading));
+            let in_the_paper = if number == 0 { &self.orders[..] } else { &[] };
             let as_in_the_paper =
-                (number == 0).then_some((self.orders[0], self.picture.bounces, readings[0]));
+                in_the_paper.iter().map(|&order| (order, self.picture.bounces, readings[0]));
             let rows = self.orders.iter().flat_map(each).chain(as_in_the_paper);
             for (order, bounces, reading) in rows {
                 fields.push(self.field(

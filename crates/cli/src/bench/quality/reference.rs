@@ -24,6 +24,8 @@ pub(super) struct Told {
     pub(super) samples: u32,
     /// Of both parts together; nothing where it has no noise.
     pub(super) noise_psnr: Option<f64>,
+    /// What a sample a pixel took, of both parts; nothing where one of them was there already.
+    pub(super) sample_seconds: Option<f64>,
 }
 
 /// What pictures of one size are judged by.
@@ -60,19 +62,22 @@ impl BenchQuality {
     ) -> Result<Reference> {
         // Reads all of the scene's files.
         let key = self.keep.is_some().then(|| self.key(subject)).transpose()?;
-        let direct_film = self.trace(subject, size, key, Parts::Direct, "direct")?;
-        let indirect_film = self.trace(subject, size, key, Parts::Indirect, "indirect")?;
+        let (direct_film, for_direct) = self.trace(subject, size, key, Parts::Direct, "direct")?;
+        let (indirect_film, for_indirect) =
+            self.trace(subject, size, key, Parts::Indirect, "indirect")?;
         let picture = |film: &Film| Picture::new(size.x, size.y, film.picture());
         let (direct, indirect) = (picture(&direct_film)?, picture(&indirect_film)?);
         let own = || lumencast_picture::exposure(&sum(&direct, &indirect));
         let told = Told {
             samples: direct_film.samples().min(indirect_film.samples()),
             noise_psnr: noise_psnr(&direct_film, &indirect_film, exposure.unwrap_or_else(own)),
+            sample_seconds: for_direct.zip(for_indirect).map(|(a, b)| a + b),
         };
         Ok(Reference { direct, indirect, told })
     }
 
-    /// One part of it, which is also the name of its file.
+    /// One part of it, by whose name its file is called, and what a sample a pixel took; nothing where all
+    /// were there already.
     fn trace(
         &self,
         subject: &Subject<'_>,
@@ -80,7 +85,7 @@ impl BenchQuality {
         key: Option<u64>,
         parts: Parts,
         name: &'static str,
-    ) -> Result<Film> {
+    ) -> Result<(Film, Option<f64>)> {
         let scene = subject.scene.name();
         let kept = self.keep.as_ref().zip(key).map(|(folder, key)| {
             let file = format!("{scene}-{}x{}-{key:016x}.{name}.film", size.x, size.y);
@@ -90,8 +95,9 @@ impl BenchQuality {
             Some((path, key)) => film_file::begun(path, *key, size, self.reference_spp),
             None => Film::new(size, self.reference_spp),
         };
-        if film.samples() >= self.reference_spp {
-            return Ok(film);
+        let before = film.samples();
+        if before >= self.reference_spp {
+            return Ok((film, None));
         }
 
         let bounces = if parts == Parts::Direct { 1 } else { self.picture.bounces };
@@ -100,12 +106,15 @@ impl BenchQuality {
         let renderer = Renderer::new(&subject.snapshot, subject.view, settings)
             .context("cannot start the threads that trace")?;
         let bar = output::bar(self.reference_spp.into(), format!("Tracing {name} light"));
-        bar.set_position(film.samples().into());
+        bar.set_position(before.into());
         bar.reset_eta();
         let mut written = Instant::now();
+        let mut seconds = 0.0;
         while film.samples() < self.reference_spp {
+            let start = Instant::now();
             // Never told to stop.
             renderer.pass(&mut film, self.reference_spp, &|_| true);
+            seconds += start.elapsed().as_secs_f64();
             bar.set_position(film.samples().into());
             let done = film.samples() >= self.reference_spp;
             if let Some((path, key)) = &kept
@@ -116,7 +125,8 @@ impl BenchQuality {
             }
         }
         bar.finish_and_clear();
-        Ok(film)
+        let traced = film.samples() - before;
+        Ok((film, Some(seconds / f64::from(traced))))
     }
 
     /// All that a sample of the reference depends on, but the size.

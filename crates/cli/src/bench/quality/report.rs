@@ -169,7 +169,14 @@ impl Report {
             "pictures: {} samples a pixel; light: {} samples a probe; materials: {}  ",
             self.samples, self.probe_samples, self.materials
         );
-        let _ = writeln!(text, "reference: {samples} samples a pixel, noise {noise}  ");
+        let took = reference.sample_seconds.map_or_else(String::new, |one| {
+            format!(
+                ", {:.0} s, of which 4,096 would take {:.0}",
+                one * f64::from(samples),
+                4096.0 * one
+            )
+        });
+        let _ = writeln!(text, "reference: {samples} samples a pixel, noise {noise}{took}  ");
         let (psnr, flip) = (direct.psnr, direct.flip);
         let _ = writeln!(text, "direct light alone: {psnr:.2} dB, FLIP {flip:.4}\n");
         text
