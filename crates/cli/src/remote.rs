@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
+use bytes::Bytes;
 use lumencast_codec::{Catalog, Field, ProbeDecoder, Region, RegionLight, StateFrame, limits};
 use lumencast_light::ProbeVolume;
-use lumencast_transport::{Client, ConnectOptions, ReadOptions};
+use lumencast_transport::{Client, ConnectOptions, ReadOptions, TrackReader};
 
 /// How long a server may take to show its light.
 const PATIENCE: Duration = Duration::from_secs(15);
@@ -23,7 +24,8 @@ pub(crate) struct Seen {
     pub(crate) bytes: u64,
 }
 
-/// Connects to the address of a scene and reads one update of every field.
+/// Connects to the address of a scene and reads one update of every field, not much older than the state: as
+/// far as the server's last snapshot lies back, at most.
 pub(crate) fn look(url: &str) -> Result<Seen> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
@@ -56,7 +58,7 @@ async fn read(client: &Client) -> Result<Seen> {
         let volume = field.dark();
         let volume = volumes.entry(field.id).or_insert(volume);
         for &region in &field.regions {
-            let (light, size) = region_light(client, field, region).await?;
+            let (light, size) = region_light(client, field, region, state.tick).await?;
             bytes += size;
             let probes = region.probes(field.grid.resolution);
             for (probe, sh) in probes.zip(light.coefficients.chunks(field.order.coefficients())) {
@@ -67,25 +69,40 @@ async fn read(client: &Client) -> Result<Seen> {
     Ok(Seen { catalog, volumes: volumes.into_values().collect(), state: Some(state), bytes })
 }
 
-/// The first keyframe of a region: groups of layer 0 begin with one.
+/// A region's light, of this tick or a later one, and the bytes of the frames read. Groups of layer 0 begin
+/// with a keyframe; but of a region that nobody has watched for a while, what comes first is what was seen
+/// when somebody last did.
 async fn region_light(
     client: &Client,
     field: &Field,
     region: Region,
+    since: u64,
 ) -> Result<(RegionLight, u64)> {
     let track = format!("f{}/r{}/l0", field.id, region.id);
-    let frame = first(client, &track).await?;
-    let light = ProbeDecoder::new(region.size, field.order).decode(&frame).context(track)?;
-    Ok((light, frame.len() as u64))
+    let mut decoder = ProbeDecoder::new(region.size, field.order);
+    let mut reader = subscribe(client, &track);
+    let mut bytes = 0;
+    loop {
+        let frame = next(&mut reader, &track).await?;
+        bytes += frame.len() as u64;
+        let light = decoder.decode(&frame).with_context(|| track.clone())?;
+        if light.header.info.tick >= since {
+            return Ok((light, bytes));
+        }
+    }
 }
 
 /// The first frame of a track.
-async fn first(client: &Client, track: &str) -> Result<bytes::Bytes> {
-    let mut reader = client.subscribe(
-        client.scene(),
-        track,
-        ReadOptions::default().with_max_frame(limits::FRAME_BYTES),
-    );
+async fn first(client: &Client, track: &str) -> Result<Bytes> {
+    next(&mut subscribe(client, track), track).await
+}
+
+fn subscribe(client: &Client, track: &str) -> TrackReader {
+    let options = ReadOptions::default().with_max_frame(limits::FRAME_BYTES);
+    client.subscribe(client.scene(), track, options)
+}
+
+async fn next(reader: &mut TrackReader, track: &str) -> Result<Bytes> {
     let frame = reader.next().await?;
     Ok(frame.with_context(|| format!("the server has no track {track}"))?.bytes)
 }

@@ -6,8 +6,9 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use common::{Folder, Program, run};
+use common::{Folder, Program, Serving, run};
 use lumencast_picture::{Loaded, Picture, compare};
+use serde_json::json;
 
 fn linear(path: &Path) -> Picture {
     Loaded::read(path).expect("a picture").linear()
@@ -311,4 +312,93 @@ fn light_of_another_scene_is_drawn_with_a_warning() {
     );
     bake("cornell");
     assert!(!render().contains("warning"));
+}
+
+/// Light of a running server is what it is now, not what somebody saw long ago: lamps that are off at first
+/// and go on while nobody looks are then as bright as in a bake of the same volume. Without a server that is
+/// said.
+#[test]
+fn light_of_a_server_is_drawn() {
+    /// Decibels that a quarter less light would not have.
+    const ENOUGH: f64 = 28.0;
+    /// What the scene has: candela, and cd/m².
+    const LAMP: f32 = 4.0;
+    const CEILING: [f32; 3] = [9.0, 7.2, 5.0];
+    let folder = Folder::new("render-served");
+    let [light, picture] = ["a.light", "a.exr"].map(|name| folder.0.join(name));
+    let volume = ["--volume", "4x4x4"];
+    let bake = ["bake", "cornell", "--samples", "16384", "--fit", "0", "-o", text(&light)];
+    let ran = run(&[&bake[..], &volume].concat());
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let draw = |light: &str| {
+        let size = ["--size", "48x32", "--samples", "1", "--shadow-resolution", "64"];
+        let how = ["--lighting", "indirect", "--exposure", "1", "--light", light, "-o"];
+        let ran = run(&[&["render", "cornell"], &size[..], &how, &[text(&picture)]].concat());
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        assert!(!ran.stderr.contains("warning"), "{ran:?}");
+        Loaded::Linear(linear(&picture))
+    };
+    let baked = draw(text(&light));
+    let lamp = |candela: f32| json!({ "edit": "set_light", "node": 4, "intensity": candela });
+    let ceiling =
+        |radiance: [f32; 3]| json!({ "edit": "set_material", "material": 3, "emissive": radiance });
+    // The scene's sphere would go round.
+    let still = json!({ "edit": "set_animation", "animation": 0, "playing": false });
+    let edits = [
+        (0.0, still),
+        (0.0, lamp(0.0)),
+        (0.0, ceiling([0.0; 3])),
+        (4.0, lamp(LAMP)),
+        (4.0, ceiling(CEILING)),
+    ];
+    let lines = edits.map(|(at, edit)| format!("{}\n", json!({ "at": at, "edit": edit })));
+    let script = folder.0.join("lamps.jsonl");
+    std::fs::write(&script, lines.concat()).expect("written");
+    let how = ["--samples", "256", "--edits", text(&script)];
+    let server = Serving::start("cornell", &[&volume[..], &how].concat());
+    let url = server.url();
+    let nearness = |picture| compare(&baked, &picture, None, 67.0).expect("of one size").psnr;
+    // Dark, unless the machine is slow.
+    draw(&url);
+    // Until the lamps are on and their light has settled, which takes a second or two.
+    thread::sleep(Duration::from_secs(12));
+    let psnr = nearness(draw(&url));
+    assert!(psnr > ENOUGH, "{psnr}");
+    let dimmer = nearness(Loaded::Linear(baked.clone().linear().map(|p| p * 0.75)));
+    assert!(dimmer < ENOUGH, "a quarter less light would be noticed: {dimmer}");
+    drop(server);
+    let out = ["-o", text(&picture)];
+    run(&[&["render", "cornell", "--light", &url][..], &out].concat())
+        .failed_saying(&["cannot connect"]);
+}
+
+/// A window that is wide leaves a field as it is; one that ends at band 1 leaves what is the same from all
+/// sides, so that the room's ceiling and floor have light of one strength where a probe lights both.
+#[test]
+fn a_window_takes_bands_away() {
+    let folder = Folder::new("render-window");
+    let [light, picture] = ["a.light", "a.exr"].map(|name| folder.0.join(name));
+    let volume = ["--volume", "1x1x1@0,1,0:2,2,2", "--samples", "512", "--fit", "0"];
+    let ran = run(&[&["bake", "cornell", "-o", text(&light)][..], &volume].concat());
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let draw = |window: &[&str]| {
+        let size = ["--size", "48x32", "--samples", "1", "--materials", "lambert"];
+        let how = ["--lighting", "indirect", "--exposure", "1", "--light", text(&light)];
+        let all = [&["render", "cornell", "-o", text(&picture)], &size[..], &how, window].concat();
+        let ran = run(&all);
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        linear(&picture)
+    };
+    // Of the box's white parts, which all have one albedo.
+    let spread = |picture: &Picture| {
+        let white = |p: &&glam::Vec3| p.min_element() > 0.5 * p.max_element() && p.x > 1e-3;
+        let white: Vec<f32> = picture.pixels().iter().filter(white).map(|p| p.y).collect();
+        assert!(white.len() > 200, "{}", white.len());
+        let [least, most] = [f32::min, f32::max].map(|of| white.iter().copied().reduce(of));
+        most.expect("white pixels") / least.expect("white pixels")
+    };
+    let [as_it_is, wide, narrow] = [&[][..], &["--window", "1000"], &["--window", "1"]].map(draw);
+    let [as_it_is, wide, narrow] = [as_it_is, wide, narrow].map(|picture| spread(&picture));
+    assert!((wide / as_it_is - 1.0).abs() < 0.01, "{wide}, {as_it_is}");
+    assert!(as_it_is > 1.3 && narrow < 1.05, "{as_it_is}, {narrow}");
 }
