@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use half::f16;
 use lumencast_scene::{Environment, HdrImage, Light, LightKind, PlacedLight, Snapshot};
-use lumencast_shaders::layout;
+use lumencast_shaders::layout::{self, light};
 
 use crate::bindings::{FILTERED, SAMPLER, STORAGE, UNIFORM, entry, texture};
 use crate::environment_brdf::{Reflected, environment_brdf};
@@ -176,9 +176,9 @@ fn of_light(placed: &PlacedLight, first_shadow: u32, shadow_count: u32) -> layou
         _ => (0.0, 1.0),
     };
     let (kind, size) = match kind {
-        LightKind::Point { radius } => (0, radius),
-        LightKind::Spot { radius, .. } => (1, radius),
-        LightKind::Directional { angle } => (2, (0.5 * angle).tan()),
+        LightKind::Point { radius } => (light::POINT, radius),
+        LightKind::Spot { radius, .. } => (light::SPOT, radius),
+        LightKind::Directional { angle } => (light::DIRECTIONAL, (0.5 * angle).tan()),
     };
     layout::Light {
         position: placed.position,

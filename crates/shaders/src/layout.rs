@@ -247,6 +247,16 @@ pub mod parts {
     pub const INDIRECT: u32 = 4;
 }
 
+/// Values of [`Light::kind`].
+pub mod light {
+    /// Shines in all directions.
+    pub const POINT: u32 = 0;
+    /// Shines within a cone.
+    pub const SPOT: u32 = 1;
+    /// Shines from afar.
+    pub const DIRECTIONAL: u32 = 2;
+}
+
 /// Bits of [`Material::flags`].
 pub mod material {
     /// Both sides scatter.

@@ -181,7 +181,7 @@ fn a_moved_member_is_noticed() {
 /// Numbers that shaders and Rust both name.
 #[test]
 fn constants_agree() {
-    use layout::{deform as bits, material, meter as bins, parts, tone};
+    use layout::{deform as bits, light, material, meter as bins, parts, tone};
     let screen = compiled("screen", &screen());
     let forward = compiled("forward", &forward(Shading::Pixels));
     let deform = compiled("deform", &deform());
@@ -207,6 +207,9 @@ fn constants_agree() {
         (&forward, "PART_EMISSION", parts::EMISSION),
         (&forward, "PART_DIRECT", parts::DIRECT),
         (&forward, "PART_INDIRECT", parts::INDIRECT),
+        (&forward, "LIGHT_POINT", light::POINT),
+        (&forward, "LIGHT_SPOT", light::SPOT),
+        (&forward, "LIGHT_DIRECTIONAL", light::DIRECTIONAL),
         (&forward, "MATERIAL_DOUBLE_SIDED", material::DOUBLE_SIDED),
         (&forward, "MATERIAL_UNLIT", material::UNLIT),
         (&forward, "MATERIAL_BLEND", material::BLEND),

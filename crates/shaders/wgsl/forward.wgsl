@@ -297,7 +297,7 @@ fn mean_direction(n: vec3f, v: vec3f, mean: vec2f) -> vec3f {
     return normalize(mean.x * mirrored + mean.y * across * inverseSqrt(max(dot(across, across), 1e-8)));
 }
 
-// The specular lobe's bands; the first is the length of its mean.
+// The specular lobe's bands, of which 1 is the length of its mean.
 fn specular_bands(length_of_mean: f32, table: vec2f) -> Bands {
     let higher = textureSampleLevel(environment_brdf, table_sampler, table + vec2f(0.5, 0.0), 0.0);
     return Bands(1.0, length_of_mean, higher.x, higher.y, higher.z);

@@ -2,7 +2,7 @@
 
 struct Light {
     position: vec3f,
-    // POINT, SPOT or DIRECTIONAL.
+    // One of LIGHT_*.
     kind: u32,
     // Along which it shines, unit.
     direction: vec3f,
@@ -20,9 +20,9 @@ struct Light {
     shadow_count: u32,
 }
 
-const POINT: u32 = 0u;
-const SPOT: u32 = 1u;
-const DIRECTIONAL: u32 = 2u;
+const LIGHT_POINT: u32 = 0u;
+const LIGHT_SPOT: u32 = 1u;
+const LIGHT_DIRECTIONAL: u32 = 2u;
 
 // A shadow map: one layer of the array.
 struct ShadowView {
@@ -97,7 +97,7 @@ struct Incident {
 fn incident(light: u32, at: vec3f) -> Incident {
     let kind = lights[light].kind;
     let intensity = lights[light].intensity;
-    if kind == DIRECTIONAL {
+    if kind == LIGHT_DIRECTIONAL {
         return Incident(-lights[light].direction, 0.0, intensity);
     }
     let to_light = lights[light].position - at;
@@ -108,7 +108,7 @@ fn incident(light: u32, at: vec3f) -> Incident {
     let direction = to_light / distance;
     let square = distance * distance;
     var falloff = saturate(1.0 - square * square * lights[light].window);
-    if kind == SPOT {
+    if kind == LIGHT_SPOT {
         let cosine = dot(direction, -lights[light].direction);
         let t = saturate(cosine * lights[light].cone_scale + lights[light].cone_offset);
         falloff *= t * t;
@@ -129,7 +129,7 @@ fn map_of(light: u32, point: vec3f) -> u32 {
     let kind = lights[light].kind;
     let first = lights[light].first_shadow;
     let count = lights[light].shadow_count;
-    if kind == DIRECTIONAL {
+    if kind == LIGHT_DIRECTIONAL {
         for (var map = first; map < first + count; map++) {
             let clip = shadow_views[map].clip_from_world * vec4f(point, 1.0);
             if all(abs(clip.xy) < shadow_views[map].reach) {
@@ -226,7 +226,7 @@ struct ShadowSample {
 
 // Metres `o` along the plane's axes from where it is known in a map.
 fn sample_of(light: u32, known: u32, plane: PlaneInMap, surface: SurfacePlane, o: vec2f) -> ShadowSample {
-    if lights[light].kind == DIRECTIONAL {
+    if lights[light].kind == LIGHT_DIRECTIONAL {
         return ShadowSample(known, plane, plane.at.xy + plane.axes * o);
     }
     let point = surface.start + o.x * surface.u + o.y * surface.v;
@@ -252,7 +252,7 @@ fn visibility(light: u32, l: vec3f, distance: f32, position: vec3f, normal: vec3
     if map == NO_MAP {
         return 1.0;
     }
-    let parallel = lights[light].kind == DIRECTIONAL;
+    let parallel = lights[light].kind == LIGHT_DIRECTIONAL;
     let facing = dot(normal, l);
     // What lies at the back of a surface is shadowed by it; coarse meshes are lit a little beyond.
     let cosine = max(facing, 0.05);
