@@ -278,8 +278,8 @@ mod tests {
     /// Balls in a row along x, a metre apart, the k-th at x = k; all of one mesh of two primitives.
     const BALLS: i32 = 41;
 
-    /// The row, of a solid and a blended material, and walls far behind it that take turns of two other
-    /// solid ones and a masked one.
+    /// The row, of a solid and a blended material, and walls far behind it that take turns of another
+    /// solid one, a masked one and the row's solid one.
     fn snapshot() -> Arc<Snapshot> {
         let mut scenery = Scenery::default();
         let of = |alpha_mode| Material { alpha_mode, ..Material::default() };

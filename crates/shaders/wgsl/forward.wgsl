@@ -191,7 +191,7 @@ fn radiance_of(in: Varying, p: Point, faces_front: bool, turn: f32) -> vec3f {
     if scatters {
         let n0 = normalize_or_zero(in.normal);
         var object_normal = n0;
-        if material.normal_map.row1.w > 0.5 && !plain && dot(in.tangent.xyz, in.tangent.xyz) > 0.0 {
+        if is_there(material.normal_map) && !plain && dot(in.tangent.xyz, in.tangent.xyz) > 0.0 {
             let bitangent = cross(n0, in.tangent.xyz) * sign(in.tangent.w);
             object_normal = p.tangent_normal.x * in.tangent.xyz + p.tangent_normal.y * bitangent + p.tangent_normal.z * n0;
         }

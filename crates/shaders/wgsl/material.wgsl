@@ -64,6 +64,11 @@ struct Coordinates {
     uv1: vec2f,
 }
 
+// Whether a material has the texture.
+fn is_there(map: Map) -> bool {
+    return map.row1.w > 0.5;
+}
+
 fn mapped(map: Map, at: Coordinates) -> vec2f {
     let uv = select(at.uv0, at.uv1, map.row0.w > 0.5);
     return vec2f(dot(map.row0.xyz, vec3f(uv, 1.0)), dot(map.row1.xyz, vec3f(uv, 1.0)));
@@ -72,7 +77,7 @@ fn mapped(map: Map, at: Coordinates) -> vec2f {
 // What a texture holds at a point, white where a material has none. That is the same for all that a draw
 // shades, so that textures which are not there cost nothing.
 fn sampled(picture: texture_2d<f32>, its_sampler: sampler, map: Map, at: Coordinates) -> vec4f {
-    if map.row1.w > 0.5 {
+    if is_there(map) {
         return textureSample(picture, its_sampler, mapped(map, at));
     }
     return vec4f(1.0);
@@ -84,7 +89,7 @@ fn base_color_at(at: Coordinates, color: vec4f) -> vec4f {
         * sampled(base_color_texture, base_color_sampler, material.base_color_map, at);
 }
 
-// Samples every texture: derivatives want that done by all.
+// Samples every texture that is there: derivatives want that done by all.
 fn substance_at(at: Coordinates, base_color: vec4f) -> Substance {
     let metallic_roughness = sampled(
         metallic_roughness_texture, metallic_roughness_sampler, material.metallic_roughness_map, at);
@@ -117,5 +122,5 @@ fn occlusion_at(at: Coordinates) -> f32 {
 fn mapped_normal(at: Coordinates) -> vec3f {
     let m = 2.0 * sampled(normal_texture, normal_sampler, material.normal_map, at).rgb - 1.0;
     let scaled = vec3f(m.xy * material.normal_scale, m.z);
-    return select(vec3f(0.0, 0.0, 1.0), scaled, material.normal_map.row1.w > 0.5);
+    return select(vec3f(0.0, 0.0, 1.0), scaled, is_there(material.normal_map));
 }
