@@ -155,12 +155,8 @@ impl RayBench {
     }
 
     fn towards_light(&self, from: Vec3, choice: f32, u: Vec2) -> Option<TestRay> {
-        self.world.aim(from, choice, u).map(|(direction, distance)| TestRay {
-            origin: from,
-            direction,
-            // A little short of emitters, so that they do not hide themselves.
-            t_max: distance * 0.999,
-        })
+        let Ray { origin, direction, t_max } = self.world.aim(from, choice, u)?;
+        Some(TestRay { origin, direction, t_max })
     }
 
     /// World-space corners of every triangle.

@@ -11,7 +11,7 @@ use crate::accel::{
 use crate::bsdf::Scatter;
 use crate::lights::emission::EmissionCache;
 use crate::lights::environment::{Sky, SkyCache};
-use crate::lights::punctual::Punctual;
+use crate::lights::punctual::{Candidate, Punctual};
 use crate::lights::{AreaSample, Lights, emitters};
 use crate::sampling::{luminance, mix2, unit};
 use crate::surface::{Frames, MaterialModel, Point, Triangle};
@@ -199,18 +199,20 @@ impl World {
         triangles
     }
 
-    /// Direction (unit) and distance of a source of light, were nothing in between.
-    pub(crate) fn aim(&self, from: Vec3, choice: f32, u: Vec2) -> Option<(Vec3, f32)> {
+    /// A ray that reaches for a source of light.
+    pub(crate) fn aim(&self, from: Vec3, choice: f32, u: Vec2) -> Option<Ray> {
         let facing = |_: Vec3| Scatter { value: Vec3::ONE, pdf: 0.0 };
+        let endless = |direction| Ray { origin: from, direction, t_max: f32::INFINITY };
         if let Some(chosen) = self.lights.punctual.choose(from, choice, u, facing) {
-            return Some((chosen.direction, chosen.distance));
+            let Candidate { direction, distance, .. } = chosen;
+            return Some(match distance == f32::INFINITY {
+                true => endless(direction),
+                false => Ray::reaching(from, distance * direction),
+            });
         }
         match self.lights.sample_area(from, choice, u)? {
-            AreaSample::Sky { direction, .. } => Some((direction, f32::INFINITY)),
-            AreaSample::Emitter(e) => {
-                let to = e.position - from;
-                Some((to.try_normalize()?, to.length()))
-            }
+            AreaSample::Sky { direction, .. } => Some(endless(direction)),
+            AreaSample::Emitter(e) => Some(Ray::reaching(from, e.position - from)),
         }
     }
 

@@ -147,18 +147,31 @@ fn white_sphere_with_a_lamp() {
 #[test]
 fn point_light_over_a_plane() {
     for radius in [0.0, 0.6] {
-        lamp_over_a_plane(Light { kind: LightKind::Point { radius }, ..point_light(50.0) });
+        lamp_over_a_plane(Light { kind: LightKind::Point { radius }, ..point_light(50.0) }, false);
     }
 }
 
-fn lamp_over_a_plane(lamp: Light) {
+/// A black ceiling in whose very plane the lamp lies does not hide it from the floor.
+#[test]
+fn lamp_in_the_plane_of_a_ceiling() {
+    lamp_over_a_plane(point_light(50.0), true);
+    let spot = LightKind::Spot { inner: 1.570, outer: 1.5705, radius: 0.0 };
+    lamp_over_a_plane(Light { kind: spot, ..point_light(50.0) }, true);
+}
+
+fn lamp_over_a_plane(lamp: Light, ceiling: bool) {
     let (albedo, height) = (0.6, 0.7);
     let mut stage = Stage::default();
     let floor = stage.material(lambert(Vec3::splat(albedo), BLACK));
     let side = 4000.0;
     stage.quad(Vec3::new(-side, 0.0, side) * 0.5, Vec3::X * side, Vec3::NEG_Z * side, floor);
     let at = Vec3::new(3.0, height, -2.0);
-    stage.light(lamp, at, Vec3::X);
+    if ceiling {
+        let black = stage.material(lambert(BLACK, BLACK));
+        let corner = at - Vec3::new(30.0, 0.0, 20.0);
+        stage.quad(corner, Vec3::X * 60.0, Vec3::Z * 40.0, black);
+    }
+    stage.light(lamp, at, Vec3::NEG_Y);
     let peak = albedo * lamp.intensity / (PI * height * height);
     // ∫ cosᵏθ cosⁿθ dω = 2π/(n + k + 1) over the hemisphere.
     let moments = |n: f32| {
@@ -166,7 +179,9 @@ fn lamp_over_a_plane(lamp: Light) {
         [Y0 * m(0.0), Y1 * m(1.0), 0.315_391_57 * (3.0 * m(2.0) - m(0.0))]
             .map(|x| Vec3::splat(x * peak))
     };
-    let e = probe(&stage.snapshot(), at, 1);
+    // A probe in the ceiling's plane would see the ceiling.
+    let below = if ceiling { 1e-4 * Vec3::Y } else { BLACK };
+    let e = probe(&stage.snapshot(), at - below, 1);
     check(&e, &zonal(Vec3::NEG_Y, moments(3.0)), &zonal(Vec3::NEG_Y, moments(2.0)), 1e-3);
 }
 

@@ -22,6 +22,7 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 use glam::{Vec2, Vec3};
 use lumencast_scene::{LightKind, PlacedLight};
 
+use crate::accel::Ray;
 use crate::bsdf::{Scatter, frame};
 use crate::sampling::{Table, luminance, power_heuristic, turned};
 
@@ -324,7 +325,8 @@ impl Punctual {
     ) -> Vec3 {
         let light = |(number, source): &(usize, Source)| {
             let disc = source.incident(at)?;
-            let is_met = disc.met(direction).is_some_and(|distance| distance <= end);
+            let before = |distance| Ray::end_before(distance) <= end;
+            let is_met = disc.met(direction).is_some_and(before);
             let weight = || weight(*number) * power_heuristic(pdf, disc.pdf());
             is_met.then(|| weight() * disc.radiance())
         };

@@ -314,13 +314,12 @@ impl Shader<'_, '_> {
                 self.noted.push((self.connections.len() as u32, found));
             }
             let light = self.limited(depth + 1, light);
-            let origin = place.leave(direction);
             let key = path.key(depth) + 1;
             self.connections.push(Connection {
                 path: index,
                 part: Part::after(depth),
                 light,
-                ray: Ray { origin, direction, t_max: distance },
+                ray: place.reach(direction, distance),
                 passing: Passing { ends: [Some(itself(&hit)), None], key },
             });
         }
@@ -361,13 +360,13 @@ impl Shader<'_, '_> {
             }
             let path = &self.paths[index as usize];
             let light = self.limited(depth + 1, path.throughput * light);
-            let origin = self.group.vertices.place(vertex).leave(to.direction);
+            let place = self.group.vertices.place(vertex);
             let key = path.key(depth) + 2;
             self.connections.push(Connection {
                 path: index,
                 part: Part::Indirect,
                 light,
-                ray: Ray { origin, direction: to.direction, t_max: to.distance },
+                ray: place.reach(to.direction, to.distance),
                 passing: Passing { ends: [Some(itself(&hit)), to.target], key },
             });
         }
@@ -398,13 +397,13 @@ impl Shader<'_, '_> {
             let Some(sent) = lit.toward(place.position, direction, pdf, model) else { continue };
             let path = &self.paths[index as usize];
             let light = self.limited(depth + 2, path.throughput * value * sent);
-            let origin = place.leave(direction);
+            let distance = place.position.distance(lit.position());
             let key = path.key(depth) + 3;
             self.connections.push(Connection {
                 path: index,
                 part: Part::Indirect,
                 light,
-                ray: Ray { origin, direction, t_max: origin.distance(lit.position()) },
+                ray: place.reach(direction, distance),
                 passing: Passing { ends: [Some(itself(&hit)), Some(lit.itself)], key },
             });
         }

@@ -1,3 +1,4 @@
+mod in_surfaces;
 mod sized_lights;
 
 use std::f32::consts::PI;

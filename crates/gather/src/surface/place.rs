@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::Frames;
+use crate::accel::Ray;
 
 /// Where on a surface a ray has arrived.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +57,19 @@ impl Place {
     pub(crate) fn leave(&self, direction: Vec3) -> Vec3 {
         let side = 1.0f32.copysign(direction.dot(self.normal));
         self.position + side * self.offset * self.normal
+    }
+
+    /// The ray that reaches from here for what lies so many metres away in a unit direction; infinitely
+    /// many for what has no place. It leads from where it starts, off the surface, to the same point, and
+    /// ends before that by as much as rounding may have moved a surface that the point lies in.
+    #[inline(always)]
+    pub(crate) fn reach(&self, direction: Vec3, distance: f32) -> Ray {
+        let origin = self.leave(direction);
+        if distance == f32::INFINITY {
+            return Ray { origin, direction, t_max: distance };
+        }
+        let ray = Ray::reaching(origin, distance * direction - (origin - self.position));
+        Ray { t_max: (ray.t_max - self.offset).max(0.0), ..ray }
     }
 
     /// The shading normal (unit, world) on the ray's side, which came from `view` (unit).
