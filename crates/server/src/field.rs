@@ -11,7 +11,7 @@ use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
 use crate::surfaces::Surfaces;
-use crate::tick::GatherOptions;
+use crate::tick::{GatherOptions, Moment};
 use crate::walls::Buried;
 
 /// A volume with all that turns sums into frames.
@@ -164,18 +164,17 @@ impl Field {
         }
     }
 
-    /// The frames of the regions that somebody watches.
+    /// The frames of the regions that somebody watches; `shown` is the moment that the light shows.
     pub(crate) fn encode(
         &mut self,
-        tick: u64,
-        scene: &Snapshot,
+        shown: Moment,
         watched: impl Fn(u32) -> bool,
     ) -> Vec<EncodedRegion> {
         let info = UpdateInfo {
             update: self.update,
-            tick,
-            time: scene.time,
-            scene_version: scene.version,
+            tick: shown.tick,
+            time: shown.time,
+            scene_version: shown.version,
         };
         self.update += 1;
         self.encoder.encode(&self.volume, info, watched)

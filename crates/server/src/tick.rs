@@ -126,6 +126,10 @@ pub struct Tick {
     snapshot_bytes: usize,
     /// The tick in which that was measured last.
     measured: Option<u64>,
+    /// Of each field, the moment that its light shows; none before there is any.
+    shown: Vec<Option<Moment>>,
+    /// Of each field, how many of its jobs have failed.
+    failures: Vec<u64>,
     last_now: Option<f64>,
     last: Report,
 }
@@ -151,6 +155,7 @@ impl Tick {
         let told_scales = fields.iter().map(Field::scale_log2).collect();
         let budget = Budget::new(options.period, options.samples);
         let last = Report::default();
+        let (shown, failures) = (vec![None; fields.len()], vec![0; fields.len()]);
         Ok(Self {
             scene,
             gatherer,
@@ -163,6 +168,8 @@ impl Tick {
             next_catalog: 0,
             snapshot_bytes: 0,
             measured: None,
+            shown,
+            failures,
             last_now: None,
             last,
         })
@@ -225,18 +232,15 @@ impl Tick {
         report.seconds[Stage::Publish as usize] = watch.lap();
 
         let gathered = self.gather(&scene);
-        let build = gathered.iter().map(|g| g.build_seconds).fold(0.0, f64::max);
+        let build = gathered.iter().flatten().map(|g| g.build_seconds).fold(0.0, f64::max);
         let gathering = watch.lap();
         report.seconds[Stage::Accelerate as usize] = build.min(gathering);
         report.seconds[Stage::Gather as usize] = gathering - build.min(gathering);
 
-        for (field, gathered) in self.fields.iter_mut().zip(&gathered) {
-            field.blend(gathered);
-            field.publish(FIT_EFFORT);
-        }
+        self.blend(&scene, &gathered);
         report.seconds[Stage::Blend as usize] = watch.lap();
 
-        let frames = self.encode(&scene, outlet);
+        let frames = self.encode(outlet);
         report.seconds[Stage::Encode as usize] = watch.lap();
 
         let watched = !frames.is_empty();
@@ -301,9 +305,11 @@ impl Tick {
         self.snapshot_bytes <= room
     }
 
-    /// Light for every field, all fields' jobs under way at once.
-    fn gather(&mut self, scene: &Arc<Snapshot>) -> Vec<Gathered> {
-        look(&mut self.fields, &mut *self.gatherer, scene);
+    /// Light for every field, all fields' jobs under way at once; none where a job has failed.
+    fn gather(&mut self, scene: &Arc<Snapshot>) -> Vec<Option<Gathered>> {
+        for field in look(&mut self.fields, &mut *self.gatherer, scene) {
+            self.note_failure(field, "its surfaces are those of an earlier moment");
+        }
         let samples = self.budget.samples();
         let previous = self.options.feedback.then(|| Arc::new(self.light()));
         let tickets: Vec<_> = self
@@ -316,15 +322,40 @@ impl Tick {
                 self.gatherer.submit(job)
             })
             .collect();
-        tickets.into_iter().filter_map(|ticket| self.gatherer.wait(ticket)).collect()
+        tickets.into_iter().map(|ticket| self.gatherer.wait(ticket)).collect()
     }
 
-    /// Frames of every field, for the regions that somebody watches.
-    fn encode(&mut self, scene: &Snapshot, outlet: &dyn Outlet) -> Vec<(u32, EncodedRegion)> {
+    /// Takes in what was gathered; a field whose job has failed keeps its light.
+    fn blend(&mut self, scene: &Snapshot, gathered: &[Option<Gathered>]) {
+        for (number, gathered) in gathered.iter().enumerate() {
+            let Some(gathered) = gathered else {
+                self.note_failure(number, "it keeps its light");
+                continue;
+            };
+            self.fields[number].blend(gathered);
+            self.fields[number].publish(FIT_EFFORT);
+            let (tick, time, version) = (self.number, scene.time, scene.version);
+            self.shown[number] = Some(Moment { tick, time, version });
+        }
+    }
+
+    /// Tells that a field's job has failed: the first time, and each time that it has failed twice as
+    /// often.
+    fn note_failure(&mut self, number: usize, outcome: &str) {
+        let (field, failures) = (self.fields[number].id().0, &mut self.failures[number]);
+        *failures += 1;
+        if failures.is_power_of_two() {
+            tracing::warn!(field, failures = *failures, "gathering light has failed: {outcome}");
+        }
+    }
+
+    /// Frames of every field that has light, for the regions that somebody watches.
+    fn encode(&mut self, outlet: &dyn Outlet) -> Vec<(u32, EncodedRegion)> {
         let mut frames = Vec::new();
-        for field in &mut self.fields {
+        for (field, shown) in self.fields.iter_mut().zip(&self.shown) {
+            let Some(moment) = *shown else { continue };
             let id = field.id().0;
-            let encoded = field.encode(self.number, scene, |region| outlet.is_watched(id, region));
+            let encoded = field.encode(moment, |region| outlet.is_watched(id, region));
             frames.extend(encoded.into_iter().map(|frame| (id, frame)));
         }
         frames
@@ -366,7 +397,7 @@ impl Tick {
         now: f64,
         scene: &Snapshot,
         edits: &Edits,
-        gathered: &[Gathered],
+        gathered: &[Option<Gathered>],
         watched: bool,
         mut report: Report,
     ) -> Report {
@@ -374,7 +405,7 @@ impl Tick {
         let buried: usize = self.fields.iter().map(Field::buried_count).sum();
         report.samples_a_probe = self.budget.samples();
         report.samples = probes as u64 * u64::from(report.samples_a_probe);
-        report.rays = gathered.iter().map(|g| g.rays).sum();
+        report.rays = gathered.iter().flatten().map(|g| g.rays).sum();
         report.accepted = edits.accepted.len() as u64;
         report.refused = edits.refused.len() as u64;
         report.probes = probes as u64;
@@ -396,15 +427,35 @@ impl Tick {
     }
 }
 
-/// Lets the fields that want to know find the scene's surfaces.
-pub(crate) fn look(fields: &mut [Field], gatherer: &mut dyn Gather, scene: &Arc<Snapshot>) {
+/// Lets the fields that want to know find the scene's surfaces; returns the numbers of those whose job
+/// has failed, which know what they knew.
+pub(crate) fn look(
+    fields: &mut [Field],
+    gatherer: &mut dyn Gather,
+    scene: &Arc<Snapshot>,
+) -> Vec<usize> {
     let tickets: Vec<_> =
         fields.iter().map(|field| Some(gatherer.submit(field.look(scene)?))).collect();
-    for (field, ticket) in fields.iter_mut().zip(tickets) {
-        if let Some(found) = ticket.and_then(|ticket| gatherer.wait(ticket)) {
-            field.found(&found);
+    let mut failed = Vec::new();
+    for (number, ticket) in tickets.into_iter().enumerate() {
+        let Some(ticket) = ticket else { continue };
+        match gatherer.wait(ticket) {
+            Some(found) => fields[number].found(&found),
+            None => failed.push(number),
         }
     }
+    failed
+}
+
+/// A moment of the scene.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moment {
+    /// The tick in which it was looked at.
+    pub(crate) tick: u64,
+    /// Scene time, seconds.
+    pub(crate) time: f64,
+    /// [`Snapshot::version`].
+    pub(crate) version: u64,
 }
 
 /// Cuts reasons where many edits are refused, so that a frame holds all refusals.

@@ -1,6 +1,6 @@
 //! The tick, stepped by hand: no network, no clock but the test's own.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -253,6 +253,177 @@ impl Gather for Slow {
     fn cancel(&mut self, ticket: Ticket) {
         self.inner.cancel(ticket);
     }
+}
+
+/// A gatherer that loses chosen jobs.
+struct Losing {
+    inner: CpuPathTracer,
+    submitted: u64,
+    lost: HashSet<Ticket>,
+    /// By how many were submitted before.
+    loses: fn(u64) -> bool,
+}
+
+impl Losing {
+    fn new(loses: fn(u64) -> bool) -> Self {
+        let inner = CpuPathTracer::new(Options::default()).expect("threads");
+        Self { inner, submitted: 0, lost: HashSet::new(), loses }
+    }
+}
+
+impl Gather for Losing {
+    fn submit(&mut self, job: Job) -> Ticket {
+        let ticket = self.inner.submit(job);
+        if (self.loses)(self.submitted) {
+            self.inner.cancel(ticket);
+            self.lost.insert(ticket);
+        }
+        self.submitted += 1;
+        ticket
+    }
+
+    fn poll(&mut self, ticket: Ticket) -> Progress {
+        self.inner.poll(ticket)
+    }
+
+    fn wait(&mut self, ticket: Ticket) -> Option<Gathered> {
+        if self.lost.contains(&ticket) { None } else { self.inner.wait(ticket) }
+    }
+
+    fn cancel(&mut self, ticket: Ticket) {
+        self.inner.cancel(ticket);
+    }
+}
+
+/// Three fields, each of other numbers of probes.
+fn three_fields() -> TickOptions {
+    let mut three = options();
+    let volume = three.volumes[0];
+    let of = |n| {
+        let mut volume = volume;
+        volume.grid.resolution = glam::UVec3::splat(n);
+        volume
+    };
+    three.volumes = vec![of(3), of(2), of(3)];
+    three.samples = SampleRange::fixed(16);
+    three
+}
+
+#[test]
+fn a_field_whose_job_fails_keeps_its_light() {
+    let volumes = |stepped: &Stepped| stepped.tick.volumes().cloned().collect::<Vec<_>>();
+    let [mut sound, mut losing] = [0, 1].map(|n| {
+        // Of the third tick the first field's job, of the fourth the second's.
+        let loses: fn(u64) -> bool = if n == 0 { |_| false } else { |n| n == 6 || n == 10 };
+        Stepped::with(three_fields(), Box::new(Losing::new(loses)))
+    });
+    sound.steps(2);
+    losing.steps(2);
+    let before = volumes(&losing);
+    assert_eq!(before, volumes(&sound));
+
+    let lamp = sound.node("lamp");
+    sound.step(mail(1, dim(lamp, 300.0)));
+    losing.step(mail(1, dim(lamp, 300.0)));
+    let (expected, kept) = (volumes(&sound), volumes(&losing));
+    assert_eq!(kept[0], before[0], "it keeps its light");
+    assert_ne!(expected[0], before[0]);
+    assert_eq!(kept[1..], expected[1..], "the others have theirs");
+
+    // Clients learn which moment each shows.
+    let told = |field| {
+        let (_, frame) = losing.kept.frames.iter().rfind(|(f, _)| *f == field).expect("light");
+        let info = lumencast_codec::ProbeHeader::read(&frame.bytes).expect("a header").info;
+        (info.tick, info.scene_version)
+    };
+    let versions: Vec<u64> = losing.kept.states.iter().map(|state| state.version).collect();
+    assert_eq!(told(0), (1, versions[1]));
+    assert_eq!(told(1), (2, versions[2]));
+    assert!(versions[1] < versions[2]);
+
+    let before = volumes(&losing);
+    sound.steps(1);
+    losing.steps(1);
+    let (expected, kept) = (volumes(&sound), volumes(&losing));
+    assert_eq!(kept[1], before[1]);
+    assert_eq!(kept[2], expected[2]);
+    assert_ne!(kept[0], before[0], "the next job counts");
+}
+
+/// Surfaces that could not be looked for are looked for again.
+#[test]
+fn a_field_whose_look_fails_looks_again() {
+    let fit = Some(lumencast_server::FitOptions { points: 8 });
+    let with = |loses| {
+        let mut options = three_fields();
+        options.gather.fit = fit;
+        options.volumes.truncate(2);
+        Stepped::with(options, Box::new(Losing::new(loses)))
+    };
+    // The first tick's jobs: two looks, then the light.
+    let (mut sound, mut losing) = (with(|_| false), with(|n| n == 0));
+    sound.steps(1);
+    losing.steps(1);
+    let volumes = |stepped: &Stepped| stepped.tick.volumes().cloned().collect::<Vec<_>>();
+    assert_ne!(volumes(&losing)[0], volumes(&sound)[0], "fitted to nothing");
+    assert_eq!(volumes(&losing)[1], volumes(&sound)[1]);
+    sound.steps(60);
+    losing.steps(60);
+    let [a, b] = [&losing, &sound].map(Stepped::mean_c0);
+    assert!((a / b - 1.0).abs() < 0.05, "{a} {b}");
+}
+
+/// Counts warnings that name a field.
+#[derive(Clone, Default)]
+struct Warnings(Arc<Mutex<Vec<u64>>>);
+
+impl tracing::Subscriber for Warnings {
+    fn enabled(&self, metadata: &tracing::Metadata<'_>) -> bool {
+        *metadata.level() == tracing::Level::WARN
+    }
+
+    fn new_span(&self, _: &tracing::span::Attributes<'_>) -> tracing::span::Id {
+        tracing::span::Id::from_u64(1)
+    }
+
+    fn record(&self, _: &tracing::span::Id, _: &tracing::span::Record<'_>) {}
+
+    fn record_follows_from(&self, _: &tracing::span::Id, _: &tracing::span::Id) {}
+
+    fn event(&self, event: &tracing::Event<'_>) {
+        struct FieldNumber(Option<u64>);
+        impl tracing::field::Visit for FieldNumber {
+            fn record_u64(&mut self, field: &tracing::field::Field, value: u64) {
+                if field.name() == "field" {
+                    self.0 = Some(value);
+                }
+            }
+
+            fn record_debug(&mut self, _: &tracing::field::Field, _: &dyn std::fmt::Debug) {}
+        }
+        let mut number = FieldNumber(None);
+        event.record(&mut number);
+        self.0.lock().expect("no panic").extend(number.0);
+    }
+
+    fn enter(&self, _: &tracing::span::Id) {}
+
+    fn exit(&self, _: &tracing::span::Id) {}
+}
+
+#[test]
+fn failing_jobs_are_told_and_do_not_flood() {
+    let warnings = Warnings::default();
+    tracing::subscriber::with_default(warnings.clone(), || {
+        // The second field's jobs, all of them.
+        let mut options = three_fields();
+        options.samples = SampleRange::fixed(1);
+        let mut losing = Stepped::with(options, Box::new(Losing::new(|n| n % 3 == 1)));
+        losing.steps(100);
+        assert!(losing.kept.frames.iter().all(|(field, _)| *field != 1), "it has no light");
+    });
+    // After 1, 2, 4, … 64 failures.
+    assert_eq!(*warnings.0.lock().expect("no panic"), [1; 7]);
 }
 
 #[test]
