@@ -2,6 +2,7 @@
 
 pub mod embree;
 mod link;
+pub mod mapped;
 pub mod scenes;
 pub mod vectors;
 

@@ -89,7 +89,7 @@ fn read_primitive(
         && let Some(map) = map
     {
         accessors.budget.geometry::<Vec4>(primitive.vertices.positions.len())?;
-        tangents::generate(&mut primitive, map.tex_coord);
+        tangents::generate(&mut primitive, map);
     }
     Ok(Some(primitive))
 }

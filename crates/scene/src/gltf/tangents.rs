@@ -3,19 +3,23 @@
 //! At each vertex the directions in which u grows over its triangles are averaged, weighted by the
 //! angle (as MikkTSpace does), then made orthogonal to the normal. A vertex between triangles whose
 //! texture is mirrored and ones where it is not is split in two.
+//!
+//! Texture coordinates are those that the normal map is read at: of its own set, and transformed
+//! (KHR_texture_transform). A primitive has one material, so one normal map, and tangents of its own.
 
 use glam::{Vec2, Vec3, Vec4};
 
 use super::mesh::select_vertices;
+use crate::material::TextureRef;
 use crate::mesh::Primitive;
 
-/// Fills in the tangents of a primitive for a normal map on this set of texture coordinates.
-pub(super) fn generate(primitive: &mut Primitive, set: usize) {
-    if primitive.uv[set].is_empty() {
+/// Fills in the tangents of a primitive for a normal map.
+pub(super) fn generate(primitive: &mut Primitive, map: &TextureRef) {
+    if primitive.uv[map.tex_coord].is_empty() {
         return;
     }
-    split_mirrored(primitive, set);
-    let (vertices, uv) = (&primitive.vertices, &primitive.uv[set]);
+    split_mirrored(primitive, map);
+    let (vertices, uv) = (&primitive.vertices, &turned_uv(primitive, map));
     let mut sums = vec![Vec3::ZERO; vertices.positions.len()];
     let mut mirrored = vec![false; vertices.positions.len()];
     for &triangle in &primitive.triangles {
@@ -35,6 +39,12 @@ pub(super) fn generate(primitive: &mut Primitive, set: usize) {
         .zip(mirrored)
         .map(|((sum, normal), mirrored)| tangent(sum, *normal, mirrored))
         .collect();
+}
+
+/// Texture coordinates of a map, but for where they begin.
+fn turned_uv(primitive: &Primitive, map: &TextureRef) -> Vec<Vec2> {
+    let uv = primitive.uv[map.tex_coord].iter();
+    uv.map(|uv| map.texture_from_mesh.transform_vector2(*uv)).collect()
 }
 
 fn tangent(sum: Vec3, normal: Vec3, mirrored: bool) -> Vec4 {
@@ -72,8 +82,8 @@ fn angle_at(corners: [Vec3; 3], k: usize) -> f32 {
 }
 
 /// Gives triangles with a mirrored texture vertices of their own where others share them.
-fn split_mirrored(primitive: &mut Primitive, set: usize) {
-    let uv = &primitive.uv[set];
+fn split_mirrored(primitive: &mut Primitive, map: &TextureRef) {
+    let uv = turned_uv(primitive, map);
     let mirrored: Vec<bool> =
         primitive.triangles.iter().map(|t| is_mirrored(t.map(|i| uv[i as usize]))).collect();
     let count = primitive.vertices.positions.len();

@@ -186,6 +186,43 @@ fn tangents_follow_the_texture_and_its_mirroring() {
     }
 }
 
+/// Primitives that share vertices have tangents of their own where their normal maps lie otherwise.
+#[test]
+fn tangents_are_of_a_primitive_and_its_normal_map() {
+    let mut w = Writer::default();
+    let uv: Vec<f32> = vec![0.0, 1.0, 1.0, 1.0, 0.0, 0.0];
+    let attributes = json!({
+        "POSITION": w.floats("VEC3", &TRIANGLE), "NORMAL": w.vectors(&[Vec3::Z; 3]),
+        "TEXCOORD_0": w.floats("VEC2", &uv),
+    });
+    w.add("images", json!({ "uri": TEXEL }));
+    w.add("textures", json!({ "source": 0 }));
+    let half_pi = std::f32::consts::FRAC_PI_2;
+    let transforms = [
+        json!({}),
+        // The image is turned clockwise, its u down the shape.
+        json!({ "rotation": half_pi }),
+        json!({ "scale": [-2.0, 2.0] }),
+        json!({ "scale": [2.0, -2.0], "rotation": half_pi, "offset": [1e6, 3.0] }),
+    ];
+    let mut primitives = Vec::new();
+    for transform in transforms {
+        let extensions = json!({ "KHR_texture_transform": transform });
+        let map = json!({ "index": 0, "extensions": extensions });
+        let material = w.add("materials", json!({ "normalTexture": map }));
+        primitives.push(json!({ "attributes": attributes, "material": material }));
+    }
+    w.add("meshes", json!({ "primitives": primitives }));
+    w.node(json!({ "mesh": 0 }));
+    let scene = load(w);
+    let tangents = scene.meshes()[0].primitives.iter().map(|p| p.vertices.tangents.clone());
+    let expected = [[1., 0., 1.], [0., -1., 1.], [-1., 0., -1.], [0., 1., -1.]];
+    for (found, [x, y, w]) in tangents.zip(expected) {
+        let expected = Vec4::new(x, y, 0.0, w);
+        assert!(found.iter().all(|t| t.distance(expected) < 1e-5), "{found:?}, not {expected}");
+    }
+}
+
 #[test]
 fn materials_with_their_extensions() {
     let mut w = triangle();
