@@ -13,3 +13,4 @@ mod materials;
 mod occlusion;
 mod screen;
 mod shadows;
+mod texture_transforms;
