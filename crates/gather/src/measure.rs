@@ -35,7 +35,7 @@ const CHUNK: usize = 1024;
 /// As many paths as rays are wanted are tried at most so often, since in open scenes many leave.
 const ROUNDS: usize = 8;
 
-/// A ray to be measured with.
+/// A ray to be measured with, relative to the snapshot's origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TestRay {
     /// Metres.
@@ -102,7 +102,7 @@ impl RayBench {
         });
         let first_triangle = first_triangle.collect();
         let mut bench = Self { world, pool, first_triangle, closest: Vec::new(), any: Vec::new() };
-        bench.find_rays(view, count);
+        bench.find_rays(view.relative_to(scene.origin), count);
         Ok(bench)
     }
 

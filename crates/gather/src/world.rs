@@ -56,7 +56,9 @@ impl LightBufferCache {
 /// Directional lights that have a light buffer at most; rays towards others are traced like any.
 const LIGHT_BUFFERS: usize = 4;
 
-/// A snapshot with its acceleration structure and tables of lights.
+/// A snapshot with its acceleration structure and tables of lights. All places are relative to the
+/// snapshot's origin; receivers, cameras and fields, which have theirs in the world, are brought here by
+/// those who ask.
 #[derive(Debug)]
 pub(crate) struct World {
     snapshot: Arc<Snapshot>,
@@ -219,6 +221,11 @@ impl World {
     /// The punctual lights.
     pub(crate) fn placed_lights(&self) -> &[PlacedLight] {
         &self.snapshot.lights
+    }
+
+    /// The point of the world, metres, that places in here are relative to.
+    pub(crate) fn origin(&self) -> Vec3 {
+        self.snapshot.origin
     }
 
     /// Version of the snapshot.

@@ -38,6 +38,7 @@ mod light;
 mod limits;
 mod material;
 mod mesh;
+mod origin;
 mod scene;
 mod script;
 mod settings;

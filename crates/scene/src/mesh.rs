@@ -1,8 +1,8 @@
 //! Geometry: triangle lists with their vertex attributes.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
-use crate::MaterialId;
+use crate::{Aabb, MaterialId};
 
 /// A glTF mesh: one or more triangle lists, each with one material.
 #[derive(Clone, Debug, Default)]
@@ -13,9 +13,20 @@ pub struct Mesh {
     pub primitives: Vec<Primitive>,
     /// Morph weights at rest, one a target.
     pub morph_weights: Vec<f32>,
+    /// The point of the file's mesh that vertices are relative to, metres: zero unless that lies far
+    /// from its own origin.
+    pub origin: Vec3,
 }
 
 impl Mesh {
+    /// The box around its vertices at rest, as the file has them.
+    pub(crate) fn bounds(&self) -> [DVec3; 2] {
+        let mut bounds = Aabb::EMPTY;
+        let positions = self.primitives.iter().flat_map(|p| &p.vertices.positions);
+        positions.for_each(|position| bounds.grow(*position));
+        [bounds.min, bounds.max].map(|corner| corner.as_dvec3() + self.origin.as_dvec3())
+    }
+
     /// Number of triangles in all primitives.
     pub fn triangle_count(&self) -> usize {
         self.primitives.iter().map(|p| p.triangles.len()).sum()

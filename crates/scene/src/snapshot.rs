@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Affine3A;
+use glam::{Affine3A, Vec3};
 
 use crate::{Deformation, Environment, Material, Mesh, MeshId, NodeId, PlacedLight, Vertices};
 
@@ -14,6 +14,10 @@ pub struct Snapshot {
     pub version: u64,
     /// Scene time in seconds.
     pub time: f64,
+    /// The point of the world, metres, that places in here are relative to, those of instances and of
+    /// lights: zero unless the scene lies far away ([`View::relative_to`](crate::View::relative_to)).
+    /// Whatever else has a place, receivers, cameras, volumes, has it in the world.
+    pub origin: Vec3,
     /// Placed meshes.
     pub instances: Vec<Instance>,
     /// Indexed by [`crate::MaterialId`].
@@ -36,7 +40,7 @@ pub struct Instance {
     /// How it is skinned and morphed; absent for rigid meshes. A skinned mesh's vertices are in the
     /// space of `world_from_object` like any other's. Equal pointers are equal vertices.
     pub deformation: Option<Arc<Deformation>>,
-    /// Affine, invertible; a negative determinant mirrors and flips the winding.
+    /// To the world, moved to the snapshot's origin. Affine, invertible; a negative determinant mirrors and flips the winding.
     pub world_from_object: Affine3A,
 }
 

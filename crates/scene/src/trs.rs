@@ -1,26 +1,33 @@
 //! Translation, rotation and scale of a node.
 
-use glam::{Affine3A, Mat4, Quat, Vec3};
+use glam::{Affine3A, DAffine3, DMat4, DVec3, Quat, Vec3};
 
 use crate::Transform;
 
 /// parent_from_node = translation · rotation · scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Trs {
-    pub(crate) translation: Vec3,
+    pub(crate) translation: DVec3,
     pub(crate) rotation: Quat,
     pub(crate) scale: Vec3,
 }
 
 impl Default for Trs {
     fn default() -> Self {
-        Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::ONE }
+        Self { translation: DVec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::ONE }
     }
 }
 
 impl Trs {
     pub(crate) fn affine(&self) -> Affine3A {
-        Affine3A::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
+        self.precise().as_affine3a()
+    }
+
+    /// The transform with all its digits.
+    pub(crate) fn precise(&self) -> DAffine3 {
+        let rotation = self.rotation.as_dquat().normalize();
+        let scale = self.scale.as_dvec3();
+        DAffine3::from_scale_rotation_translation(scale, rotation, self.translation)
     }
 
     pub(crate) fn is_finite(&self) -> bool {
@@ -29,25 +36,25 @@ impl Trs {
 
     /// Takes a matrix apart as three.js does: a mirroring one gets a negative x scale. The flag
     /// tells whether the parts make up the matrix again; they do not where it shears.
-    pub(crate) fn from_matrix(matrix: Mat4) -> (Self, bool) {
-        let affine = Affine3A::from_mat4(matrix);
+    pub(crate) fn from_matrix(matrix: DMat4) -> (Self, bool) {
+        let affine = Affine3A::from_mat4(matrix.as_mat4());
+        let (m, translation) = (affine.matrix3, matrix.w_axis.truncate());
         let trs = if is_invertible(&affine) {
-            let (scale, rotation, translation) = affine.to_scale_rotation_translation();
+            let (scale, rotation, _) = affine.to_scale_rotation_translation();
             Self { translation, rotation: rotation.normalize(), scale }
         } else {
-            let m = affine.matrix3;
             let scale = Vec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length());
-            Self { translation: affine.translation.into(), rotation: Quat::IDENTITY, scale }
+            Self { translation, rotation: Quat::IDENTITY, scale }
         };
-        let size = matrix.to_cols_array().into_iter().map(f32::abs).fold(0.0, f32::max);
-        let same = Mat4::from(trs.affine()).abs_diff_eq(matrix, 1e-3 * size);
+        let size = m.to_cols_array().into_iter().map(f32::abs).fold(0.0, f32::max);
+        let same = trs.affine().matrix3.abs_diff_eq(m, 1e-3 * size);
         (trs, same)
     }
 
     /// This, with the parts of an edit put in; their rotation is normalised.
     pub(crate) fn with(self, edit: &Transform) -> Self {
         Self {
-            translation: edit.translation.unwrap_or(self.translation),
+            translation: edit.translation.map_or(self.translation, |t| t.as_dvec3()),
             rotation: edit.rotation.map_or(self.rotation, normalize),
             scale: edit.scale.unwrap_or(self.scale),
         }

@@ -65,6 +65,14 @@ impl View {
         })
     }
 
+    /// The same view where places are relative to a point of the world, as a snapshot's are.
+    #[must_use]
+    pub fn relative_to(&self, origin: Vec3) -> Self {
+        let mut view = *self;
+        view.world_from_camera.translation -= glam::Vec3A::from(origin);
+        view
+    }
+
     /// Origin and unit direction of the ray through a point of the picture: (0, 0) is its upper
     /// left corner, (1, 1) its lower right. `aspect` is width by height.
     #[inline]

@@ -4,8 +4,8 @@
 //! adapter's textures are not deep enough, in columns side by side. Reading clamps to the outermost
 //! probes, so that filtering never reaches a neighbour.
 
-use glam::{Affine3A, Mat3, UVec3};
-use lumencast_light::{Atlas, LightField, ProbeVolume, ScaleRule, atlas_size, texels};
+use glam::{Affine3A, Mat3, UVec3, Vec3};
+use lumencast_light::{Atlas, Grid, LightField, ProbeVolume, ScaleRule, atlas_size, texels};
 use lumencast_shaders::layout;
 
 use crate::ShadeError;
@@ -23,6 +23,10 @@ pub(crate) struct GpuField {
     origins: Vec<UVec3>,
     atlas: wgpu::Texture,
     scales: Vec<ScaleRule>,
+    /// The volumes, and how they are described.
+    placed: Vec<(Grid, layout::Volume)>,
+    /// The point of the world that places are relative to.
+    about: Vec3,
 }
 
 /// The bindings of group 2.
@@ -50,7 +54,34 @@ impl GpuField {
         });
         let atlas = texture(gpu, UVec3::ONE);
         let group = group(gpu, &layout, &sampler, &atlas, &[]);
-        Self { layout, sampler, group, sizes: vec![], origins: vec![], atlas, scales: vec![] }
+        Self {
+            layout,
+            sampler,
+            group,
+            sizes: vec![],
+            origins: vec![],
+            atlas,
+            scales: vec![],
+            placed: vec![],
+            about: Vec3::ZERO,
+        }
+    }
+
+    /// Makes places relative to this point of the world.
+    pub(crate) fn place_about(&mut self, gpu: &Gpu, origin: Vec3) {
+        if self.about != origin {
+            self.about = origin;
+            self.describe(gpu);
+        }
+    }
+
+    /// Tells the shaders of the volumes.
+    fn describe(&mut self, gpu: &Gpu) {
+        for (grid, volume) in &mut self.placed {
+            volume.cell_from_world = cell_from_world(grid, self.about);
+        }
+        let volumes: Vec<_> = self.placed.iter().map(|(_, volume)| *volume).collect();
+        self.group = group(gpu, &self.layout, &self.sampler, &self.atlas, &volumes);
     }
 
     /// Takes in other light. Where the volumes are as large as before, the texture stays.
@@ -66,13 +97,13 @@ impl GpuField {
             self.scales = vec![ScaleRule::default(); sizes.len()];
             (self.sizes, self.origins) = (sizes, origins);
         }
-        let mut placed = Vec::with_capacity(volumes.len());
+        self.placed.clear();
         for ((volume, &origin), rule) in volumes.iter().zip(&self.origins).zip(&mut self.scales) {
             let packed = Atlas::pack(volume, rule.update(&volume.coefficients));
             write(gpu, &self.atlas, origin, &packed);
-            placed.push(of_volume(volume, origin, packed.scale_log2));
+            self.placed.push((volume.grid, of_volume(volume, origin, packed.scale_log2)));
         }
-        self.group = group(gpu, &self.layout, &self.sampler, &self.atlas, &placed);
+        self.describe(gpu);
         Ok(())
     }
 }
@@ -94,18 +125,22 @@ fn arrange(sizes: &[UVec3], limit: u32) -> Option<(UVec3, Vec<UVec3>)> {
     (size.max_element() <= limit).then_some((size, origins))
 }
 
-fn of_volume(volume: &ProbeVolume, origin: UVec3, scale_log2: i8) -> layout::Volume {
-    let grid = &volume.grid;
+/// From places relative to an origin: cell = (R⁻¹ (p − centre) / size + ½) · resolution − ½.
+fn cell_from_world(grid: &Grid, origin: Vec3) -> layout::Rows {
     let resolution = grid.resolution.as_vec3();
-    // cell = (R⁻¹ (p − centre) / size + ½) · resolution − ½
     let linear =
         Mat3::from_diagonal(resolution / grid.size) * Mat3::from_quat(grid.rotation.inverse());
-    let translation = 0.5 * resolution - 0.5 - linear * grid.center;
+    let translation = 0.5 * resolution - 0.5 - linear * (grid.center - origin);
+    layout::rows(&Affine3A::from_mat3_translation(linear, translation))
+}
+
+fn of_volume(volume: &ProbeVolume, origin: UVec3, scale_log2: i8) -> layout::Volume {
+    let grid = &volume.grid;
     layout::Volume {
-        cell_from_world: layout::rows(&Affine3A::from_mat3_translation(linear, translation)),
+        cell_from_world: cell_from_world(grid, Vec3::ZERO),
         spacing: grid.spacing(),
         scale: f32::from(scale_log2).exp2(),
-        resolution,
+        resolution: grid.resolution.as_vec3(),
         texels: texels(volume.order) as u32,
         origin: origin.as_vec3(),
         _pad0: 0.0,
@@ -174,8 +209,8 @@ fn group(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{Quat, Vec3, Vec4};
-    use lumencast_light::{Grid, Order, VolumeId};
+    use glam::{Quat, Vec4};
+    use lumencast_light::{Order, VolumeId};
 
     #[test]
     fn volumes_do_not_overlap() {
@@ -199,6 +234,10 @@ mod tests {
         for p in [Vec3::ZERO, Vec3::new(2.0, -1.5, 3.0)] {
             let h: Vec4 = p.extend(1.0);
             let cell = Vec3::from(volume.cell_from_world.map(|row| row.dot(h)));
+            assert!((cell - grid.cell_from_world(p)).length() < 1e-5);
+            let origin = Vec3::new(2.0, 5.0, -1.0);
+            let h = (p - origin).extend(1.0);
+            let cell = Vec3::from(cell_from_world(&grid, origin).map(|row| row.dot(h)));
             assert!((cell - grid.cell_from_world(p)).length() < 1e-5);
         }
         assert_eq!((volume.texels, volume.scale), (12, 0.125));

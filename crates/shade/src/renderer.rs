@@ -182,7 +182,9 @@ impl Renderer {
         let weight = 1.0 / (settings.pre_exposure * frames as f32);
         let mut drawn = Drawn { frames, samples, ..Drawn::default() };
         let Some(snapshot) = self.snapshot() else { return Ok((pictures, drawn)) };
-        let camera = |view: &View, moved| Camera::new(view, settings.size, moved);
+        let camera = |view: &View, moved| {
+            Camera::new(&view.relative_to(snapshot.origin), settings.size, moved)
+        };
         // The same for all frames, so that its maps are drawn once.
         let still: Vec<Camera> = views.iter().map(|view| camera(view, Vec2::ZERO)).collect();
         let plan = self.shadow_plan(&snapshot, &still, settings);
@@ -228,7 +230,8 @@ impl Renderer {
         self.prepare(settings, samples, &mut commands);
         let mut drawn = Drawn { frames: 1, samples, ..Drawn::default() };
         let Some(snapshot) = self.snapshot() else { return Ok(drawn) };
-        let cameras = [Camera::new(view, settings.size, Vec2::ZERO)];
+        let view = view.relative_to(snapshot.origin);
+        let cameras = [Camera::new(&view, settings.size, Vec2::ZERO)];
         let plan = self.shadow_plan(&snapshot, &cameras, settings);
         drawn.of_plan(&plan);
 
@@ -272,6 +275,7 @@ impl Renderer {
             self.occluder.prepare(&self.gpu, &self.layouts.pass, settings.size);
         }
         let Some(wanted) = &self.wanted else { return };
+        self.field.place_about(&self.gpu, wanted.origin);
         let is_shown = |(shown, model): &(Arc<Snapshot>, Materials)| {
             Arc::ptr_eq(shown, wanted) && *model == settings.materials
         };

@@ -3,6 +3,7 @@
 pub mod embree;
 mod link;
 pub mod mapped;
+pub mod rooms;
 pub mod scenes;
 pub mod vectors;
 

@@ -143,7 +143,7 @@ impl MappedFloor {
 }
 
 /// A .glb of JSON and a binary chunk, four-byte aligned.
-fn container(mut json: Vec<u8>, binary: &[u8]) -> Vec<u8> {
+pub(crate) fn container(mut json: Vec<u8>, binary: &[u8]) -> Vec<u8> {
     json.resize(json.len().next_multiple_of(4), b' ');
     let mut glb = b"glTF".to_vec();
     let length = 12 + 8 + json.len() + 8 + binary.len();

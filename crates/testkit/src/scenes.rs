@@ -104,6 +104,7 @@ impl Stage {
         Arc::new(Snapshot {
             version: 1,
             time: 0.0,
+            origin: Vec3::ZERO,
             instances: self.instances.clone(),
             materials: self.materials.clone().into(),
             lights: self.lights.clone(),

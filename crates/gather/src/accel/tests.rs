@@ -344,6 +344,7 @@ fn snapshot(instances: Vec<Instance>) -> Arc<Snapshot> {
     Arc::new(Snapshot {
         version: 0,
         time: 0.0,
+        origin: Vec3::ZERO,
         instances,
         materials: Arc::new([]),
         lights: vec![],
@@ -449,6 +450,7 @@ fn surfaces_do_not_shade_themselves() {
         let snapshot = Arc::new(Snapshot {
             version: 0,
             time: 0.0,
+            origin: Vec3::ZERO,
             instances: vec![instance],
             materials: Arc::new([]),
             lights: vec![],

@@ -38,18 +38,22 @@ enum Prepared {
 }
 
 impl Aim {
-    /// `extent` is the scene's largest coordinate, metres: where surfaces are is known to some ulps
-    /// of it only.
+    /// `extent` is the scene's largest coordinate, metres, from its origin: where surfaces are is known
+    /// to some ulps of it only, and where receivers are to one of their coordinates in the world.
     pub(super) fn new(job: &Job, receiver: u32, extent: f32) -> Self {
-        let seed = job.seed;
+        let (seed, origin) = (job.seed, job.scene.origin);
         let place = match job.receivers[receiver as usize].place {
             Place::Probe { position } => {
-                Prepared::Probe { order: job.order, position, turn: lattice::turn(seed, receiver) }
+                let (position, turn) = (position - origin, lattice::turn(seed, receiver));
+                Prepared::Probe { order: job.order, position, turn }
             }
             Place::Lumel { position, normal, footprint } => {
                 let normal = normal.normalize_or(Vec3::Y);
                 let size = footprint[0].length().max(footprint[1].length());
-                let lift = LIFT * size + gamma(16.0) * extent.max(position.abs().max_element());
+                let position = position - origin;
+                let lift = LIFT * size
+                    + gamma(16.0) * extent.max(position.abs().max_element())
+                    + gamma(2.0) * origin.abs().dot(normal.abs());
                 Prepared::Lumel {
                     position: position + lift * normal,
                     footprint,

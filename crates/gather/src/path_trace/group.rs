@@ -465,9 +465,8 @@ impl Shader<'_, '_> {
             let vertices = &self.group.vertices;
             let normal = Vec3::from(vertices.normals.get(vertex));
             let side = normal * 1.0f32.copysign(normal.dot(direction));
-            let Some(arriving) = field.sample(vertices.place(vertex).position, side) else {
-                continue;
-            };
+            let at = vertices.place(vertex).position + self.world.origin();
+            let Some(arriving) = field.sample(at, side) else { continue };
             let path = &self.paths[index as usize];
             let light = path.throughput * (weight * arriving.radiance(direction));
             let light = self.limited(self.depth + 1, light);

@@ -151,7 +151,7 @@ fn sum(job: &Job, tile: &Tile, aim: &Aim, seen: &mut impl Iterator<Item = Seen>)
         if job.surfaces {
             let Look { origin, direction, .. } = aim.look(sample);
             t.surfaces.push((seen.normal != Vec3::ZERO).then(|| SurfacePoint {
-                position: origin + seen.distance * direction,
+                position: origin + seen.distance * direction + job.scene.origin,
                 normal: seen.normal,
                 front: seen.front,
             }));

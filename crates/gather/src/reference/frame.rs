@@ -82,7 +82,7 @@ fn met(world: &World, direction: Vec3, hit: Option<Hit>) -> Sample {
     };
     let Some(point) = world.point(&hit, direction) else { return Sample::default() };
     let surface = point.shading_normal(world.model).map(|normal| Surface {
-        position: point.place.position,
+        position: point.place.position + world.origin(),
         normal,
         base_color: point.spot.base_color(),
     });

@@ -110,6 +110,7 @@ pub struct Traced {
 #[derive(Debug)]
 pub struct Renderer {
     pub(super) world: World,
+    /// In the world's places, which are relative to the snapshot's origin.
     view: View,
     pub(super) settings: PictureSettings,
     /// Found when the first paths are to be followed.
@@ -143,7 +144,7 @@ impl Renderer {
                 &mut WorldCache::new(Levels::One),
             )
         };
-        let world = pool.install(build);
+        let (world, view) = (pool.install(build), view.relative_to(scene.origin));
         Ok(Self { world, view, settings, beam: OnceLock::new(), items: OnceLock::new(), pool })
     }
 

@@ -386,8 +386,8 @@ pub(super) struct Primitive {
 pub(super) struct Node {
     pub(super) name: String,
     pub(super) children: Vec<usize>,
-    pub(super) matrix: Option<[f32; 16]>,
-    pub(super) translation: Option<[f32; 3]>,
+    pub(super) matrix: Option<[f64; 16]>,
+    pub(super) translation: Option<[f64; 3]>,
     pub(super) rotation: Option<[f32; 4]>,
     pub(super) scale: Option<[f32; 3]>,
     pub(super) mesh: Option<usize>,

@@ -12,7 +12,7 @@ use super::accessor::Accessors;
 use super::{json, tangents};
 use crate::error::{At, Fault, invalid};
 use crate::mesh::{Mesh, MorphTarget, Primitive};
-use crate::{Material, MaterialId};
+use crate::{Material, MaterialId, origin};
 
 /// What reading meshes leaves besides them.
 #[derive(Debug, Default)]
@@ -51,7 +51,8 @@ pub(super) fn read(
         return Err(invalid("a morph weight is not finite").at(&place));
     }
     morph_weights.resize(targets, 0.0);
-    Ok((Mesh { name: json.name.clone(), primitives, morph_weights }, notes))
+    let origin = origin::centre(&mut primitives);
+    Ok((Mesh { name: json.name.clone(), primitives, morph_weights, origin }, notes))
 }
 
 pub(super) fn describe(index: usize, name: &str) -> String {

@@ -1,6 +1,6 @@
 //! Nodes, lights, cameras and skins of a glTF.
 
-use glam::{Affine3A, Mat4, Quat, Vec3};
+use glam::{Affine3A, DMat4, DVec3, Mat4, Quat, Vec3};
 
 use super::accessor::Accessors;
 use super::json;
@@ -40,8 +40,9 @@ fn describe(index: usize, name: &str) -> String {
 
 fn transform(json: &json::Node) -> Result<(Trs, bool), Fault> {
     if let Some(matrix) = json.matrix {
-        let matrix = Mat4::from_cols_array(&matrix);
-        if !matrix.is_finite() || matrix.to_cols_array().iter().any(|v| v.abs() > limits::EXTENT) {
+        let matrix = DMat4::from_cols_array(&matrix);
+        let extent = f64::from(limits::EXTENT);
+        if !matrix.is_finite() || matrix.to_cols_array().iter().any(|v| v.abs() > extent) {
             return Err(invalid("its matrix is not finite"));
         }
         return Ok(Trs::from_matrix(matrix));
@@ -57,12 +58,12 @@ fn transform(json: &json::Node) -> Result<(Trs, bool), Fault> {
         }
     };
     let trs = Trs {
-        translation: json.translation.map_or(Vec3::ZERO, Vec3::from),
+        translation: json.translation.map_or(DVec3::ZERO, DVec3::from),
         rotation,
         scale: json.scale.map_or(Vec3::ONE, Vec3::from),
     };
-    let largest = trs.translation.abs().max(trs.scale.abs()).max_element();
-    match trs.is_finite() && largest <= limits::EXTENT {
+    let largest = trs.translation.abs().max(trs.scale.as_dvec3().abs()).max_element();
+    match trs.is_finite() && largest <= f64::from(limits::EXTENT) {
         true => Ok((trs, true)),
         false => Err(invalid(format!("its transform is not finite or over {:e}", limits::EXTENT))),
     }

@@ -159,7 +159,8 @@ impl Scene {
         if !is_invertible(&local) && is_invertible(&before.affine()) {
             return Err(self.senseless(id, "its transform would flatten it"));
         }
-        let lost = self.nodes.placed_from(id).into_iter().find(|(_, _, world)| !is_in_world(world));
+        let mut placed = self.nodes.placed_from(id).into_iter();
+        let lost = placed.find(|(_, _, place)| !is_in_world(&place.as_affine3a()));
         match lost {
             None => Ok(()),
             Some((lost, _, _)) => {
@@ -189,7 +190,9 @@ impl Scene {
         let trs = Trs::default().with(transform);
         let world_from_parent = match parent {
             None => Affine3A::IDENTITY,
-            Some(parent) if self.nodes.contains(parent) => self.nodes.world_from_node(parent),
+            Some(parent) if self.nodes.contains(parent) => {
+                self.nodes.place_of(parent).as_affine3a()
+            }
             Some(parent) => return Err(EditError::UnknownNode(parent)),
         };
         let world = world_from_parent * trs.affine();

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::{Affine3A, Mat3A, Vec3, Vec3A};
+use glam::{Affine3A, DAffine3, Mat3A, Vec3, Vec3A};
 
 use super::Scene;
 use super::nodes::{Node, PlacedSkin};
@@ -52,14 +52,14 @@ impl Scene {
         let mut lights = self.lights();
         lights.retain(|l| l.light.intensity > 0.0 && l.light.color != Vec3::ZERO);
         let environment = self.environment.clone();
-        let (version, time) = (self.version, self.time);
-        Snapshot { version, time, instances, materials, lights, environment }
+        let (version, time, origin) = (self.version, self.time, self.nodes.origin());
+        Snapshot { version, time, origin, instances, materials, lights, environment }
     }
 
     pub(super) fn instances(&self, deformations: &mut Deformations) -> Vec<Instance> {
         let placed = self.nodes.placed().into_iter();
         placed
-            .filter_map(|(id, node, world)| self.instance(id, node, world, deformations))
+            .filter_map(|(id, node, place)| self.instance(id, node, &place, deformations))
             .collect()
     }
 
@@ -68,11 +68,13 @@ impl Scene {
         &self,
         id: NodeId,
         node: &Node,
-        world_from_node: Affine3A,
+        place: &DAffine3,
         deformations: &mut Deformations,
     ) -> Option<Instance> {
         let mesh_id = node.mesh?;
         let mesh = self.meshes.get(mesh_id.0 as usize).filter(|m| m.triangle_count() > 0)?.clone();
+        let origin = DAffine3::from_translation(mesh.origin.as_dvec3());
+        let world_from_node = (*place * origin).as_affine3a();
         let world_from_rest =
             node.skin.as_ref().map(|skin| self.world_from_rest(skin, world_from_node));
         if let Some(joints) = &world_from_rest {
@@ -104,7 +106,7 @@ impl Scene {
         let world_from_rest = |(joint, joint_from_rest): &(u32, Affine3A)| {
             let joint = NodeId(placed.first_node.saturating_add(*joint));
             if self.nodes.contains(joint) {
-                self.nodes.world_from_node(joint) * *joint_from_rest
+                self.nodes.place_of(joint).as_affine3a() * *joint_from_rest
             } else {
                 world_from_node
             }
@@ -112,10 +114,11 @@ impl Scene {
         placed.skin.joints.iter().map(world_from_rest).collect()
     }
 
-    /// Every punctual light that is in the scene, also those without intensity.
+    /// Every punctual light that is in the scene, also those without intensity; as in a snapshot, their
+    /// places are relative to [`Snapshot::origin`].
     pub fn lights(&self) -> Vec<PlacedLight> {
-        let placed = self.nodes.placed();
-        placed.into_iter().filter_map(|(id, node, world)| place_light(id, node, &world)).collect()
+        let placed = self.nodes.placed().into_iter();
+        placed.filter_map(|(id, node, place)| place_light(id, node, &place.as_affine3a())).collect()
     }
 }
 

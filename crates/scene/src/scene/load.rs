@@ -1,10 +1,10 @@
 //! From a file to a scene.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::Affine3A;
+use glam::{Affine3A, DAffine3};
 
 use super::capture::Deformations;
 use super::nodes::{Node, Nodes, PlacedSkin};
@@ -15,6 +15,7 @@ use crate::builtin;
 use crate::error::Fault;
 use crate::gltf::{self, source::Folder};
 use crate::limits::{self, Budget};
+use crate::origin::{self, Lump};
 use crate::settings::{self, Settings};
 use crate::trs::{Trs, is_in_world};
 use crate::{Environment, HdrImage, MaterialId, MeshId, NodeId, SceneError, hdr};
@@ -115,7 +116,34 @@ impl Scene {
         scene.environment = settings.environment.unwrap_or_default();
         scene.volumes = settings.volumes;
         scene.play();
+        scene.choose_origin();
         scene
+    }
+
+    /// Makes places relative to the scene's own middle, and warns of what is lost all the same.
+    fn choose_origin(&mut self) {
+        let mut boxes = HashMap::new();
+        let lump = |(_, node, place): (NodeId, &Node, DAffine3)| {
+            let mesh = &self.meshes[node.mesh?.0 as usize];
+            let lump = match &node.skin {
+                None => {
+                    Lump::placed(boxes.entry(node.mesh).or_insert_with(|| mesh.bounds()), &place)
+                }
+                Some(skin) => self.lump_of_joints(skin),
+            };
+            let lump = Lump { triangles: mesh.triangle_count(), ..lump };
+            (lump.min.is_finite() && lump.max.is_finite()).then_some(lump)
+        };
+        let lumps: Vec<_> = self.nodes.placed().into_iter().filter_map(lump).collect();
+        let origin = origin::of_scene(&lumps);
+        self.nodes.set_origin(origin);
+        self.warnings.extend(origin::warnings(&lumps, origin));
+    }
+
+    /// A skinned mesh is where its joints are.
+    fn lump_of_joints(&self, PlacedSkin { skin, first_node }: &PlacedSkin) -> Lump {
+        let joints = skin.joints.iter().map(|(joint, _)| NodeId(first_node + joint));
+        Lump::around(joints.map(|joint| self.nodes.place_of(joint).translation))
     }
 
     fn empty(name: String, folder: Option<Folder>, budget: Budget) -> Self {
@@ -312,6 +340,7 @@ impl Scene {
         main.asset.roots.iter().for_each(|root| scene.nodes.add_root(NodeId(*root)));
         scene.environment = main.asset.settings.environment.clone().unwrap_or_default();
         scene.volumes.clone_from(&self.volumes);
+        scene.nodes.set_origin(self.nodes.origin());
         scene.time = time;
         scene.play();
         scene

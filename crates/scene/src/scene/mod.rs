@@ -10,7 +10,7 @@ mod replay;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::{Affine3A, Quat, Vec3};
+use glam::{Affine3A, DAffine3, Quat, Vec3};
 
 pub use apply::EditError;
 use capture::Deformations;
@@ -185,7 +185,11 @@ impl Scene {
                 add(&instance.world_from_object, &instance.vertices(primitive).positions);
             }
         }
-        if bounds.is_empty() { Aabb { min: Vec3::ZERO, max: Vec3::ZERO } } else { bounds }
+        if bounds.is_empty() {
+            return Aabb { min: Vec3::ZERO, max: Vec3::ZERO };
+        }
+        let origin = self.nodes.origin();
+        Aabb { min: bounds.min + origin, max: bounds.max + origin }
     }
 
     /// All nodes, also those that are not drawn.
@@ -197,7 +201,7 @@ impl Scene {
                 name: &node.name,
                 parent: node.parent,
                 transform: Transform {
-                    translation: Some(translation),
+                    translation: Some(translation.as_vec3()),
                     rotation: Some(rotation),
                     scale: Some(scale),
                 },
@@ -210,7 +214,9 @@ impl Scene {
     /// The cameras, in the order of the scene's tree.
     pub fn cameras(&self) -> Vec<PlacedCamera<'_>> {
         let placed = self.nodes.placed().into_iter();
-        let camera = placed.filter_map(|(node, n, world_from_camera)| {
+        let world = DAffine3::from_translation(self.nodes.origin().as_dvec3());
+        let camera = placed.filter_map(|(node, n, place)| {
+            let world_from_camera = (world * place).as_affine3a();
             let (model, camera) = n.camera?;
             let camera = self.models.get(model)?.asset.cameras.get(camera as usize)?;
             Some(PlacedCamera { node, node_name: &n.name, camera, world_from_camera })
@@ -326,7 +332,9 @@ impl Scene {
                 let Some(node) = self.nodes.get_mut(id) else { continue };
                 let trs = &mut node.parent_from_node;
                 moved |= match channel.curve.property {
-                    Property::Translation => set(&mut trs.translation, Vec3::from_slice(&value)),
+                    Property::Translation => {
+                        set(&mut trs.translation, Vec3::from_slice(&value).as_dvec3())
+                    }
                     Property::Scale => set(&mut trs.scale, Vec3::from_slice(&value)),
                     Property::Rotation => set(&mut trs.rotation, Quat::from_slice(&value)),
                     Property::Weights => set(&mut node.weights, value.clone()),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::Affine3A;
+use glam::{DAffine3, Vec3};
 
 use crate::asset::Skin;
 use crate::trs::Trs;
@@ -41,6 +41,8 @@ pub(crate) struct Nodes {
     roots: Vec<NodeId>,
     /// The next free number; numbers are never used twice.
     next: u32,
+    /// The point of the world that places are relative to.
+    origin: Vec3,
 }
 
 impl Nodes {
@@ -50,6 +52,20 @@ impl Nodes {
 
     pub(crate) fn next(&self) -> u32 {
         self.next
+    }
+
+    pub(crate) fn origin(&self) -> Vec3 {
+        self.origin
+    }
+
+    /// Makes places relative to this point of the world.
+    pub(crate) fn set_origin(&mut self, origin: Vec3) {
+        self.origin = origin;
+    }
+
+    /// The world's place.
+    fn place_of_world(&self) -> DAffine3 {
+        DAffine3::from_translation(-self.origin.as_dvec3())
     }
 
     pub(crate) fn get(&self, id: NodeId) -> Option<&Node> {
@@ -114,40 +130,41 @@ impl Nodes {
         }
     }
 
-    pub(crate) fn world_from_node(&self, id: NodeId) -> Affine3A {
-        let mut world = Affine3A::IDENTITY;
+    /// A node's place, relative to the origin like all places.
+    pub(crate) fn place_of(&self, id: NodeId) -> DAffine3 {
+        let mut place = DAffine3::IDENTITY;
         let mut at = Some(id);
         while let Some(node) = at.and_then(|id| self.nodes.get(&id)) {
-            world = node.parent_from_node.affine() * world;
+            place = node.parent_from_node.precise() * place;
             at = node.parent;
         }
-        world
+        self.place_of_world() * place
     }
 
-    /// Nodes that are drawn, parents first, with their place in the world.
-    pub(crate) fn placed(&self) -> Vec<(NodeId, &Node, Affine3A)> {
-        self.placed_below(self.roots.iter().map(|root| (*root, Affine3A::IDENTITY)))
+    /// Nodes that are drawn, parents first, with their places.
+    pub(crate) fn placed(&self) -> Vec<(NodeId, &Node, DAffine3)> {
+        self.placed_below(self.roots.iter().map(|root| (*root, self.place_of_world())))
     }
 
-    /// A node and all below it, parents first, with their place in the world.
-    pub(crate) fn placed_from(&self, id: NodeId) -> Vec<(NodeId, &Node, Affine3A)> {
+    /// A node and all below it, parents first, with their places.
+    pub(crate) fn placed_from(&self, id: NodeId) -> Vec<(NodeId, &Node, DAffine3)> {
         let parent = self.nodes.get(&id).and_then(|n| n.parent);
-        let world = parent.map_or(Affine3A::IDENTITY, |parent| self.world_from_node(parent));
-        self.placed_below([(id, world)].into_iter())
+        let place = parent.map_or(self.place_of_world(), |parent| self.place_of(parent));
+        self.placed_below([(id, place)].into_iter())
     }
 
     fn placed_below(
         &self,
-        tops: impl Iterator<Item = (NodeId, Affine3A)>,
-    ) -> Vec<(NodeId, &Node, Affine3A)> {
+        tops: impl Iterator<Item = (NodeId, DAffine3)>,
+    ) -> Vec<(NodeId, &Node, DAffine3)> {
         let mut placed = Vec::with_capacity(self.nodes.len());
         let mut open: Vec<_> = tops.collect();
         open.reverse();
-        while let Some((id, world_from_parent)) = open.pop() {
+        while let Some((id, parent)) = open.pop() {
             let Some(node) = self.nodes.get(&id) else { continue };
-            let world = world_from_parent * node.parent_from_node.affine();
-            placed.push((id, node, world));
-            open.extend(node.children.iter().rev().map(|child| (*child, world)));
+            let place = parent * node.parent_from_node.precise();
+            placed.push((id, node, place));
+            open.extend(node.children.iter().rev().map(|child| (*child, place)));
         }
         placed
     }

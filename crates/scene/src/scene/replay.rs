@@ -148,7 +148,7 @@ fn source_of(model: &Model) -> InstanceSource {
 
 fn whole(trs: Trs) -> Transform {
     Transform {
-        translation: Some(trs.translation),
+        translation: Some(trs.translation.as_vec3()),
         rotation: Some(trs.rotation),
         scale: Some(trs.scale),
     }
@@ -161,7 +161,7 @@ fn differing<T: PartialEq>(old: T, new: T) -> Option<T> {
 
 fn moved(node: NodeId, old: Trs, new: Trs) -> Option<Edit> {
     let transform = Transform {
-        translation: differing(old.translation, new.translation),
+        translation: differing(old.translation, new.translation).map(|t| t.as_vec3()),
         rotation: differing(old.rotation, new.rotation),
         scale: differing(old.scale, new.scale),
     };

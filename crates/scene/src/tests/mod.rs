@@ -3,6 +3,7 @@
 mod bad_input;
 mod deforming;
 mod edits;
+mod far;
 mod files;
 mod geometry;
 mod replay;

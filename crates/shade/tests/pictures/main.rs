@@ -8,6 +8,7 @@ mod committed;
 mod common;
 mod direct_light;
 mod environments;
+mod far;
 mod indirect_light;
 mod materials;
 mod occlusion;

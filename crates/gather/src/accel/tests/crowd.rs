@@ -13,6 +13,7 @@ pub(super) fn snapshot(placed: Vec<(Affine3A, Arc<Mesh>)>) -> Arc<Snapshot> {
     Arc::new(Snapshot {
         version: 0,
         time: 0.0,
+        origin: Vec3::ZERO,
         instances: placed.into_iter().map(instance).collect(),
         materials: Arc::new([]),
         lights: vec![],
