@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use lumencast_codec::{Catalog, EncodedRegion, Epoch, ProbeDecoder, StateFrame};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Gathered, Job, Progress, Ticket};
@@ -15,6 +15,7 @@ use lumencast_scene::{
 use lumencast_server::{
     GatherOptions, Inbox, Limits, Mail, Outlet, Received, Report, SampleRange, Tick, TickOptions,
 };
+use lumencast_testkit::rooms::{Placed, Rooms};
 
 const PERIOD: f64 = 0.04;
 
@@ -191,6 +192,39 @@ fn a_refused_edit_changes_nothing() {
     assert!(state.refused[0].reason.contains("999"), "{}", state.refused[0].reason);
     assert_eq!(edited.volume(), untouched.volume());
     assert_eq!(state.version, untouched.kept.states[3].version);
+}
+
+/// In map coordinates, too, light stays in its room, at probes and fitted to surfaces.
+#[test]
+fn far_rooms_are_lit_as_near_ones() {
+    let rooms = Rooms { at: DVec3::ZERO, placed: Placed::Flat, emission: 0.0 };
+    let far = DVec3::new(1e6 + 0.37, 120.3, -1.3e6);
+    for fit in [None, Some(lumencast_server::FitOptions { points: 16 })] {
+        let [near, far] = [DVec3::ZERO, far].map(|at| {
+            let rooms = Rooms { at, ..rooms };
+            let volume = |x: f32| {
+                let mut volume = options().volumes[0];
+                volume.grid.center = rooms.world(Vec3::new(x, 1.5, 0.0));
+                volume.grid.size = Vec3::new(3.6, 2.6, 3.6);
+                volume
+            };
+            let mut options = TickOptions { volumes: vec![volume(-2.0), volume(2.0)], ..options() };
+            options.gather.fit = fit;
+            let tracer = Box::new(CpuPathTracer::new(Options::default()).expect("threads"));
+            let tick = Tick::new(rooms.scene(), tracer, options, Epoch(7)).expect("a tick");
+            let mut stepped = Stepped { tick, kept: Kept::default(), now: 0.0 };
+            stepped.steps(30);
+            let mean = |volume: &ProbeVolume| {
+                let sum: Vec3 = (0..volume.grid.probe_count()).map(|i| volume.probe(i)[0]).sum();
+                sum.x / volume.grid.probe_count() as f32
+            };
+            let center = stepped.tick.catalog().fields[1].grid.center;
+            assert_eq!(center, rooms.world(Vec3::new(2.0, 1.5, 0.0)), "clients know the world's");
+            stepped.tick.volumes().map(mean).collect::<Vec<f32>>()
+        });
+        assert!((far[0] / near[0] - 1.0).abs() < 0.05, "{fit:?}: {far:?} {near:?}");
+        assert_eq!((far[1], near[1]), (0.0, 0.0), "{fit:?}: light in the dark");
+    }
 }
 
 #[test]
