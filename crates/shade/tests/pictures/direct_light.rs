@@ -80,7 +80,37 @@ fn every_light_on_every_material() {
     }
 }
 
-/// The comparison above notices light that is a fiftieth too bright, shadows that are missing, edges of
+/// A lamp in the very plane of a ceiling lights what is below as without the ceiling, in both renderers.
+#[test]
+fn lamps_in_the_plane_of_a_ceiling() {
+    let spot = LightKind::Spot { inner: 0.6, outer: 1.2, radius: 0.0 };
+    for (name, kind) in [("point in a ceiling", POINT), ("spot in a ceiling", spot)] {
+        let scene = |ceiling: bool| {
+            stage(|stage| {
+                ball(stage, lambert(Vec3::splat(0.7), Vec3::ZERO));
+                let at = Vec3::new(1.5, 4.1, 3.0);
+                if ceiling {
+                    let black = stage.material(lambert(Vec3::ZERO, Vec3::ZERO));
+                    stage.quad(at - Vec3::new(5.0, 0.0, 6.0), Vec3::X * 9.0, Vec3::Z * 8.0, black);
+                }
+                stage.light(light(kind, 60.0), at, Vec3::NEG_Y);
+            })
+        };
+        let (below, open) = (scene(true), scene(false));
+        let reference = traced(&open, view(), &settings(), Parts::Direct, 64);
+        for (name, picture) in [
+            (name, drawn(&below, view(), &settings())),
+            (&format!("{name}, traced"), traced(&below, view(), &settings(), Parts::Direct, 64)),
+        ] {
+            let found = difference(name, &picture, &reference, 0.01);
+            assert!(found.off < 0.001, "{name}: {found:?}");
+            assert!(found.edges < 0.3 && found.rms_at_edges < 0.03, "{name}: {found:?}");
+            assert!(found.mean_at_edges.abs() < 0.002, "{name}: {found:?}");
+        }
+    }
+}
+
+/// These comparisons notice light that is a fiftieth too bright, shadows that are missing, edges of
 /// shadows that are coarse, and a light that is a tenth of a metre from its place.
 #[test]
 fn planted_faults_are_noticed() {
