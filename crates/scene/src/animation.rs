@@ -26,7 +26,8 @@ pub(crate) struct Curve {
     pub(crate) interpolation: Interpolation,
     /// Numbers in a value: 3, 4 for rotations, or the number of morph targets.
     pub(crate) width: usize,
-    /// Times of the keys, seconds: at least one, growing.
+    /// Times of the keys, seconds: at least one, none less than the one before. At the time of several
+    /// the value jumps from the first's to the last's.
     pub(crate) times: Vec<f32>,
     /// `width` numbers a key; of cubic splines three times that: in-tangent, value, out-tangent.
     pub(crate) values: Vec<f32>,

@@ -37,9 +37,13 @@ pub(crate) struct AssetNode {
     pub(crate) children: Vec<u32>,
     pub(crate) parent_from_node: Trs,
     pub(crate) mesh: Option<u32>,
+    /// Where the mesh is shown, relative to the node; once, at the node, where absent.
+    pub(crate) instances: Option<Arc<[Affine3A]>>,
     pub(crate) skin: Option<u32>,
     pub(crate) camera: Option<u32>,
     pub(crate) light: Option<Light>,
+    /// It and all below it are neither drawn nor give light.
+    pub(crate) hidden: bool,
     /// Morph weights; the mesh's own where empty.
     pub(crate) weights: Vec<f32>,
 }

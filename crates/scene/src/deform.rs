@@ -124,12 +124,14 @@ fn unit(tangent: Vec3, rest: Vec4) -> Vec4 {
 }
 
 fn skin(primitive: &Primitive, vertices: &mut Vertices, pose: &Pose) {
+    let is_loose = primitive.joints.is_empty();
     let blended = |vertex: usize| {
-        let Some(names) = primitive.joints.get(vertex) else { return pose.rigid };
-        let weights = primitive.weights[vertex].to_array();
+        if is_loose {
+            return pose.rigid;
+        }
         let mut matrix = Affine3A::from_mat3_translation(glam::Mat3::ZERO, Vec3::ZERO);
-        for (joint, weight) in names.iter().zip(weights).filter(|(_, w)| *w > 0.0) {
-            let joint = pose.of(Some((*joint).into()));
+        for (joint, weight) in primitive.influences(vertex) {
+            let joint = pose.of(Some(joint.into()));
             matrix.matrix3 += joint.matrix3 * weight;
             matrix.translation += joint.translation * weight;
         }

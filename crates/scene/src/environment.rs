@@ -50,6 +50,31 @@ impl Environment {
     /// No light.
     pub const BLACK: Self = Self::Constant { radiance: Vec3::ZERO };
 
+    /// A clear sky that gives level ground so many lux.
+    pub fn clear_sky(lux: f32) -> Self {
+        const ZENITH: Vec3 = Vec3::new(0.45, 0.65, 1.0);
+        const HORIZON: Vec3 = Vec3::new(0.85, 0.93, 1.0);
+        const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
+        /// Of what the horizon gives, what the ground below it sends back up.
+        const GROUND: f32 = 0.3;
+        // ∫ L cos over the upper half, for L linear in the sine of the elevation.
+        let unit = std::f32::consts::PI * (HORIZON / 3.0 + 2.0 * ZENITH / 3.0).dot(LUMINANCE);
+        let scale = lux / unit;
+        let (zenith, horizon) = (scale * ZENITH, scale * HORIZON);
+        Self::Sky { zenith, horizon, ground: GROUND * horizon }
+    }
+
+    /// Whether any light comes from it, a picture's texels aside.
+    pub(crate) fn shines(&self) -> bool {
+        match self {
+            Self::Constant { radiance } => *radiance != Vec3::ZERO,
+            Self::Sky { zenith, horizon, ground } => {
+                [zenith, horizon, ground].into_iter().any(|radiance| *radiance != Vec3::ZERO)
+            }
+            Self::Image { intensity, .. } => *intensity != 0.0,
+        }
+    }
+
     /// Whether it makes sense; the reason when it does not.
     pub fn check(&self) -> Result<(), String> {
         let is_light = |v: Vec3| v.cmpge(Vec3::ZERO).all() && v.max_element() <= limits::LIGHT;
@@ -84,4 +109,43 @@ pub struct HdrImage {
     pub height: u32,
     /// Linear Rec. 709, finite, ≥ 0; `width * height` texels.
     pub texels: Vec<Vec3>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sky_gives_its_lux() {
+        let Environment::Sky { zenith, horizon, .. } = Environment::clear_sky(1000.0) else {
+            panic!("no sky")
+        };
+        // Midpoint rule over rings of equal sin² of the elevation, each of cosine weight π/n.
+        let n = 1000;
+        let irradiance: Vec3 = (0..n)
+            .map(|i| ((i as f32 + 0.5) / n as f32).sqrt())
+            .map(|up| horizon.lerp(zenith, up) * std::f32::consts::PI / n as f32)
+            .sum();
+        let lux = irradiance.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+        assert!((lux / 1000.0 - 1.0).abs() < 1e-3, "{lux}");
+    }
+
+    /// The page offers the same sky.
+    #[test]
+    fn the_recorded_sky() {
+        let recorded: serde_json::Value =
+            serde_json::from_str(include_str!("../../../vectors/sky.json")).expect("JSON");
+        let recorded: Environment =
+            serde_json::from_value(recorded["environment"].clone()).expect("an environment");
+        let (
+            Environment::Sky { zenith, horizon, ground },
+            Environment::Sky { zenith: z, horizon: h, ground: g },
+        ) = (recorded, Environment::clear_sky(1000.0))
+        else {
+            panic!("no skies")
+        };
+        for (recorded, found) in [(zenith, z), (horizon, h), (ground, g)] {
+            assert!(recorded.abs_diff_eq(found, 1e-3), "{recorded} {found}");
+        }
+    }
 }

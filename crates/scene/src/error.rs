@@ -39,6 +39,14 @@ pub enum Fault {
         /// As the scene names it.
         uri: String,
     },
+    /// A URI that can be no file's name.
+    #[error("refers to {uri:?}, {why}")]
+    Name {
+        /// As the scene names it.
+        uri: String,
+        /// What is wrong with it.
+        why: &'static str,
+    },
     /// Not JSON, or not of glTF's form.
     #[error("is not valid glTF: {0}")]
     Json(serde_json::Error),
@@ -55,7 +63,7 @@ pub enum Fault {
     )]
     UnknownExtension(String),
     /// Nothing to draw.
-    #[error("has no triangles in its scene; points and lines are not drawn")]
+    #[error("has no triangles in its scene; points, lines and hidden nodes are not drawn")]
     NoTriangles,
     /// More than a server should hold.
     #[error("{what} exceed the limit of {limit}")]

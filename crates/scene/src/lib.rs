@@ -56,6 +56,7 @@ pub use deform::{Deformation, Pose};
 pub use edit::{Edit, InstanceSource, LightSpec, MaterialChange, Playback, Transform};
 pub use environment::{Environment, HdrImage};
 pub use error::{Fault, SceneError};
+pub use gltf::source::file_name;
 pub use light::{Light, LightKind, PlacedLight};
 pub use material::{AlphaMode, Filter, Image, Material, TextureRef, Wrap};
 pub use mesh::{Mesh, MorphTarget, Primitive, Vertices};

@@ -30,6 +30,11 @@ pub struct Light {
 }
 
 impl Light {
+    /// Whether any light comes from it.
+    pub(crate) fn shines(&self) -> bool {
+        self.intensity > 0.0 && self.color != Vec3::ZERO
+    }
+
     /// Whether it makes sense; the reason when it does not.
     pub fn check(&self) -> Result<(), String> {
         let Self { kind, color, intensity, range } = *self;

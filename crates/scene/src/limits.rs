@@ -19,7 +19,7 @@ pub(crate) const TEXELS: u64 = 512 << 20;
 pub(crate) const IMAGE_SIDE: u32 = 16_384;
 /// Elements of an accessor that no buffer stands behind (all zeros, or sparse).
 pub(crate) const ZERO_ELEMENTS: u64 = 1 << 24;
-/// Nodes at a time.
+/// Nodes at a time, and their instances.
 pub(crate) const NODES: usize = 1_000_000;
 /// glTF files that edits add.
 pub(crate) const FILES: usize = 1_024;

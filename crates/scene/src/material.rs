@@ -103,7 +103,7 @@ pub enum AlphaMode {
 pub struct TextureRef {
     /// Pixels.
     pub image: Arc<Image>,
-    /// Which set of texture coordinates, 0 or 1.
+    /// Which of the two sets of texture coordinates that [`Primitive::uv`](crate::Primitive) holds.
     pub tex_coord: usize,
     /// KHR_texture_transform; identity unless said otherwise.
     pub texture_from_mesh: Affine2,

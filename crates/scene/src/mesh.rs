@@ -41,13 +41,15 @@ pub struct Primitive {
     pub triangles: Vec<[u32; 3]>,
     /// Vertices at rest, in object space.
     pub vertices: Vertices,
-    /// Texture coordinates 0 and 1; empty where the file has none, else one a vertex.
+    /// The two sets of texture coordinates that its material reads, TEXCOORD_0 and 1 unless it asks for
+    /// others; empty where the file has none, else one a vertex.
     pub uv: [Vec<Vec2>; 2],
     /// Vertex colours (linear, multiplied into the base colour); empty or one a vertex.
     pub colors: Vec<Vec4>,
-    /// Joint indices into the skin of the node, four a vertex; empty where the mesh is not skinned.
+    /// Joint indices into the skin of the node; empty where the mesh is not skinned. Each vertex has
+    /// as many fours as any needs, one after the other: see [`Self::influence_sets`].
     pub joints: Vec<[u16; 4]>,
-    /// Weights of the joints, normalised to sum 1.
+    /// Weights of the joints, four by four; those of a vertex sum to 1.
     pub weights: Vec<Vec4>,
     /// Morph targets (displacements).
     pub morph_targets: Vec<MorphTarget>,
@@ -56,6 +58,23 @@ pub struct Primitive {
     pub flat: bool,
     /// Material; the default material of glTF has a number of its own.
     pub material: MaterialId,
+}
+
+impl Primitive {
+    /// Fours of joints a vertex hangs on; 0 where the mesh is not skinned.
+    pub fn influence_sets(&self) -> usize {
+        self.joints.len() / self.vertices.positions.len().max(1)
+    }
+
+    /// The joints that a vertex hangs on, and with which weight.
+    pub fn influences(&self, vertex: usize) -> impl Iterator<Item = (u16, f32)> {
+        let sets = self.influence_sets();
+        let of_vertex = vertex * sets..(vertex + 1) * sets;
+        let fours = self.joints[of_vertex.clone()].iter().zip(&self.weights[of_vertex]);
+        let pairs =
+            fours.flat_map(|(names, weights)| names.iter().copied().zip(weights.to_array()));
+        pairs.filter(|(_, weight)| *weight > 0.0)
+    }
 }
 
 /// The vertex attributes that deformation changes.

@@ -31,7 +31,8 @@ pub struct Snapshot {
 /// A mesh at its place.
 #[derive(Clone, Debug)]
 pub struct Instance {
-    /// The node that carries it.
+    /// The node that carries it. Several where that has instances (EXT_mesh_gpu_instancing), which
+    /// share a deformation.
     pub node: NodeId,
     /// Which mesh: equal ids have equal `mesh` pointers, so acceleration structures can be kept.
     pub mesh_id: MeshId,

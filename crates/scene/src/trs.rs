@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, DAffine3, DMat4, DVec3, Quat, Vec3};
 
-use crate::Transform;
+use crate::{Transform, limits};
 
 /// parent_from_node = translation · rotation · scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,8 +30,11 @@ impl Trs {
         DAffine3::from_scale_rotation_translation(scale, rotation, self.translation)
     }
 
-    pub(crate) fn is_finite(&self) -> bool {
-        self.translation.is_finite() && self.rotation.is_finite() && self.scale.is_finite()
+    pub(crate) fn is_within_limits(&self) -> bool {
+        let largest = self.translation.abs().max(self.scale.abs()).max_element();
+        let is_finite =
+            self.translation.is_finite() && self.rotation.is_finite() && self.scale.is_finite();
+        is_finite && largest <= limits::EXTENT
     }
 
     /// Takes a matrix apart as three.js does: a mirroring one gets a negative x scale. The flag

@@ -22,6 +22,8 @@ pub(crate) struct Deformable {
     influences: wgpu::Buffer,
     displacements: wgpu::Buffer,
     vertices: u32,
+    /// Of four joints, a vertex.
+    influences_each: u32,
     flat: bool,
     reach: Reach,
 }
@@ -33,7 +35,9 @@ impl Deformable {
         let floats = vertices * primitive.morph_targets.len() * DISPLACEMENT;
         let limits = gpu.device.limits();
         let shapes = (vertices * geometry::SHAPE_SIZE) as u64;
-        let most = shapes.max((floats * size_of::<f32>()) as u64);
+        let sets = primitive.influence_sets().max(1);
+        let influences = (vertices * sets * size_of::<layout::Influence>()) as u64;
+        let most = shapes.max(influences).max((floats * size_of::<f32>()) as u64);
         if most > limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) {
             return None;
         }
@@ -42,9 +46,10 @@ impl Deformable {
             displacements.extend((0..vertices).flat_map(|i| displacement(primitive, target, i)));
         }
         Some(Self {
-            influences: storage(gpu, "influences", &influences(primitive)),
+            influences: storage(gpu, "influences", &self::influences(primitive)),
             displacements: storage(gpu, "displacements", &displacements),
             vertices: vertices as u32,
+            influences_each: primitive.influence_sets().max(1) as u32,
             flat: primitive.flat,
             reach: Reach::new(primitive),
         })
@@ -109,6 +114,7 @@ impl Deformer {
             // In ascending order; a primitive may have fewer targets than there are weights.
             morphs: cause.morphs.partition_point(|morph| morph.number < targets) as u32,
             joints: pose.map_or(0, |pose| pose.joints.len() as u32),
+            influences: deformable.influences_each,
             flags: flag(pose.is_some(), layout::deform::SKINNED)
                 | flag(deformable.flat, layout::deform::FLAT),
         };
@@ -157,14 +163,15 @@ impl Reach {
         let positions = &primitive.vertices.positions;
         let greatest = primitive.joints.iter().flatten().max();
         let mut joints = vec![Aabb::EMPTY; greatest.map_or(0, |joint| usize::from(*joint) + 1)];
-        let weights = primitive.weights.iter().map(Vec4::to_array);
-        for ((names, weights), position) in primitive.joints.iter().zip(weights).zip(positions) {
-            for (name, _) in names.iter().zip(weights).filter(|(_, weight)| *weight > 0.0) {
-                joints[usize::from(*name)].grow(*position);
+        let mut loose = Aabb::EMPTY;
+        for (vertex, position) in positions.iter().enumerate() {
+            if primitive.joints.is_empty() {
+                loose.grow(*position);
+            }
+            for (joint, _) in primitive.influences(vertex) {
+                joints[usize::from(joint)].grow(*position);
             }
         }
-        let mut loose = Aabb::EMPTY;
-        positions.iter().skip(primitive.joints.len()).for_each(|p| loose.grow(*p));
         let box_of = |target: &MorphTarget| {
             let mut displacements = Aabb::EMPTY;
             target.positions.iter().for_each(|d| displacements.grow(*d));
@@ -202,17 +209,17 @@ impl Reach {
 }
 
 fn influences(primitive: &Primitive) -> Vec<layout::Influence> {
-    let influence = |vertex: usize| {
-        let (joints, weights) = match primitive.joints.get(vertex) {
-            Some(joints) => (*joints, primitive.weights[vertex].max(Vec4::ZERO)),
-            // A joint that there is not.
-            None => ([u16::MAX; 4], Vec4::X),
-        };
+    let influence = |joints: [u16; 4], weights: Vec4| {
         let pair = |a: u16, b: u16| u32::from(a) | u32::from(b) << 16;
         let joints = [pair(joints[0], joints[1]), pair(joints[2], joints[3])];
         layout::Influence { weights, joints, ..layout::Influence::default() }
     };
-    (0..primitive.vertices.positions.len()).map(influence).collect()
+    if primitive.joints.is_empty() {
+        // A joint that there is not.
+        return vec![influence([u16::MAX; 4], Vec4::X); primitive.vertices.positions.len()];
+    }
+    let fours = primitive.joints.iter().zip(&primitive.weights);
+    fours.map(|(joints, weights)| influence(*joints, weights.max(Vec4::ZERO))).collect()
 }
 
 fn displacement(primitive: &Primitive, target: &MorphTarget, vertex: usize) -> [f32; DISPLACEMENT] {
@@ -305,6 +312,20 @@ mod tests {
         }
     }
 
+    /// Each vertex hangs on two fours of joints.
+    fn of_eight_joints(seed: u32) -> Primitive {
+        let [first, second] = [skinned(seed), skinned(seed + 40_000)];
+        fn in_turn<T: Copy>(a: &[T], b: &[T]) -> Vec<T> {
+            a.iter().zip(b).flat_map(|(a, b)| [*a, *b]).collect()
+        }
+        let weights = in_turn(&first.weights, &second.weights);
+        Primitive {
+            joints: in_turn(&first.joints, &second.joints),
+            weights: weights.into_iter().map(|four| 0.5 * four).collect(),
+            ..first
+        }
+    }
+
     fn mesh() -> Arc<Mesh> {
         let flat = Primitive { flat: true, ..soup(300) };
         let bare = Primitive { morph_targets: Vec::new(), ..soup(600) };
@@ -312,7 +333,7 @@ mod tests {
             vertices: Vertices { tangents: Vec::new(), ..skinned(900).vertices },
             ..skinned(900)
         };
-        let primitives = vec![soup(0), skinned(1200), flat, bare, plain];
+        let primitives = vec![soup(0), skinned(1200), flat, bare, plain, of_eight_joints(1500)];
         Arc::new(Mesh { primitives, ..Mesh::default() })
     }
 

@@ -86,7 +86,7 @@ impl GpuScene {
         self.instances = instance_buffer(gpu, &placed);
         self.deform(gpu, commands, snapshot);
         self.draws.clear();
-        let mut rigid: HashMap<(usize, usize), usize> = HashMap::new();
+        let mut known: HashMap<(usize, usize), usize> = HashMap::new();
         for (instance, number) in snapshot.instances.iter().zip(0..) {
             let own = self.deformed.get(&instance.node);
             for primitive in 0..instance.mesh.primitives.len() {
@@ -99,9 +99,11 @@ impl GpuScene {
                 }
                 let place = |corner| instance.world_from_object.transform_point3(corner);
                 let bounds = part.bounds.transformed(place);
-                let key = (Arc::as_ptr(&instance.mesh).addr(), primitive);
-                let known = if own.is_none() { rigid.get(&key).copied() } else { None };
-                let draw = known.unwrap_or_else(|| {
+                let shape = match &instance.deformation {
+                    Some(deformation) => Arc::as_ptr(deformation).addr(),
+                    None => Arc::as_ptr(&instance.mesh).addr(),
+                };
+                let draw = *known.entry((shape, primitive)).or_insert_with(|| {
                     let material = instance.mesh.primitives[primitive].material.0 as usize;
                     // Past the last one lies glTF's default material.
                     let material = material.min(self.materials.len() - 1);
@@ -110,9 +112,6 @@ impl GpuScene {
                     self.draws.push(Draw { part, material, surface, placed: Vec::new() });
                     self.draws.len() - 1
                 });
-                if own.is_none() {
-                    rigid.insert(key, draw);
-                }
                 self.draws[draw].placed.push((number, bounds));
             }
         }
@@ -139,6 +138,11 @@ impl GpuScene {
         });
         for instance in &snapshot.instances {
             let Some(deformation) = &instance.deformation else { continue };
+            // Instances of a node share theirs.
+            let known = self.deformed.get(&instance.node);
+            if known.is_some_and(|known| Arc::ptr_eq(&known.by, deformation)) {
+                continue;
+            }
             let kept = before.remove(&instance.node);
             let deformed = match kept {
                 Some(kept) if Arc::ptr_eq(&kept.by, deformation) => kept,
@@ -344,6 +348,31 @@ mod tests {
 
         let away = frustum(Vec3::new(20.0, 0.0, 100.0), Vec3::new(20.0, 0.0, 200.0));
         assert!(scene.calls(&away, &mut visible, |_| true).is_empty());
+    }
+
+    /// Instances of a node deform as one: its vertices once, and one call a primitive.
+    #[test]
+    fn instances_of_a_node_share_what_is_deformed() {
+        let gpu = Gpu::new().expect("an adapter");
+        let layout = materials::group_layout(&gpu.device);
+        let mut scene = GpuScene::new(&gpu, 1);
+        let mut snapshot = Snapshot::clone(&snapshot());
+        snapshot.instances.truncate(3);
+        let mesh = snapshot.instances[0].mesh.clone();
+        let deformation = |weight| Arc::new(Deformation::new(mesh.clone(), vec![weight], None));
+        let (shared, other) = (deformation(0.5), deformation(1.0));
+        for (instance, node) in snapshot.instances.iter_mut().zip([0, 0, 1]) {
+            instance.node = NodeId(node);
+            let own = if node == 0 { &shared } else { &other };
+            instance.deformation = Some(own.clone());
+        }
+        for _ in 0..2 {
+            let mut commands = Commands::new(&gpu);
+            scene.update(&gpu, &mut commands, &layout, &snapshot, Materials::Full);
+            let mut placed: Vec<_> = scene.draws.iter().map(|draw| draw.placed.len()).collect();
+            placed.sort_unstable();
+            assert_eq!((placed, scene.deformed.len()), (vec![1, 1, 2, 2], 2));
+        }
     }
 
     /// Solid surfaces come first, then those with holes, then blended ones; and a material is set once in

@@ -165,10 +165,11 @@ pub struct Deform {
     pub vertices: u32,
     pub morphs: u32,
     pub joints: u32,
+    pub influences: u32,
     pub flags: u32,
 }
 
-/// The joints that a vertex hangs on. Group 0, binding 2 of [`crate::deform`].
+/// Four of the joints that a vertex hangs on. Group 0, binding 2 of [`crate::deform`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Influence {

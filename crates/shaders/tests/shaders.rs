@@ -132,7 +132,7 @@ fn layouts_agree() {
     same!(m, Field { count });
     volumes_agree(m);
     same!(m, Map { row0, row1 });
-    same!(m, Deform { vertices, morphs, joints, flags });
+    same!(m, Deform { vertices, morphs, joints, influences, flags });
     same!(m, Influence { weights, joints, _pad });
     same!(m, Morph { number, weight });
     same!(m, Occlusion { radius, directions, steps, _pad });

@@ -7,6 +7,8 @@ struct Deform {
     morphs: u32,
     // Joints of the skin. One transform more is in `pose`, for whatever has no joint.
     joints: u32,
+    // Of each vertex, one after the other.
+    influences: u32,
     flags: u32,
 }
 
@@ -14,7 +16,7 @@ const DEFORM_SKINNED: u32 = 1u;
 // Each triangle has three vertices of its own, and its normal.
 const DEFORM_FLAT: u32 = 2u;
 
-// The joints that a vertex hangs on.
+// Four of the joints that a vertex hangs on.
 struct Influence {
     weights: vec4f,
     // Four numbers of 16 bits, the first in the lower half of x.
@@ -86,13 +88,15 @@ fn morphed(vertex: u32) -> Shape {
 
 // The transforms of a vertex's joints, in the proportion of their weights.
 fn blended(vertex: u32) -> array<vec4f, 3> {
-    let influence = influences[vertex];
     var rows: array<vec4f, 3>;
-    for (var i = 0u; i < 4u; i++) {
-        let number = (influence.joints[i / 2u] >> (16u * (i % 2u))) & 0xffffu;
-        let joint = min(number, deform.joints);
-        for (var row = 0u; row < 3u; row++) {
-            rows[row] += influence.weights[i] * pose[joint][row];
+    for (var four = 0u; four < deform.influences; four++) {
+        let influence = influences[vertex * deform.influences + four];
+        for (var i = 0u; i < 4u; i++) {
+            let number = (influence.joints[i / 2u] >> (16u * (i % 2u))) & 0xffffu;
+            let joint = min(number, deform.joints);
+            for (var row = 0u; row < 3u; row++) {
+                rows[row] += influence.weights[i] * pose[joint][row];
+            }
         }
     }
     return rows;

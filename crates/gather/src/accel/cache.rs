@@ -157,7 +157,11 @@ fn copies_are_few(instances: &[Instance]) -> bool {
     for instance in instances {
         let count = instance.mesh.triangle_count();
         all += count;
-        if instance.deformation.is_some() || seen.insert(address(&instance.mesh)) {
+        let shape = match &instance.deformation {
+            Some(deformation) => Arc::as_ptr(deformation).addr(),
+            None => address(&instance.mesh),
+        };
+        if seen.insert(shape) {
             distinct += count;
         }
     }

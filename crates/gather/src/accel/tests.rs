@@ -375,6 +375,12 @@ fn cache_keeps_what_has_not_changed() {
     assert_eq!(update(&both), first);
     let moved = snapshot(vec![instance(0, None), instance(2, deformation())]);
     assert_eq!(update(&moved)[0], first[0]);
+    let shared = deformation();
+    let [a, b] = update(&snapshot(vec![instance(2, shared.clone()), instance(2, shared)]))[..]
+    else {
+        panic!("two instances")
+    };
+    assert_eq!(a, b, "instances of a node share its hierarchy");
     update(&snapshot(vec![]));
     assert!(cache.rigid.is_empty() && cache.deforming.is_empty());
 }

@@ -35,7 +35,11 @@ pub(super) fn read(
         };
         let width = || width(property, node, nodes, meshes);
         let curve = || read_curve(accessors, json, channel.sampler, property, width()?);
-        let curve = curve().at(|| format!("{place}, channel {c}"))?;
+        let here = || format!("{place}, channel {c}");
+        let curve = curve().at(here)?;
+        if curve.times.windows(2).any(|w| w[0] == w[1]) {
+            warnings.push(format!("{}: keys of one time are a jump", here()));
+        }
         channels.push(Channel { node: node as u32, curve });
     }
     let last = channels.iter().filter_map(|c| c.curve.times.last()).copied().fold(0.0, f32::max);
@@ -83,8 +87,8 @@ fn read_curve(
     let times = accessors.floats::<1>(json.input).at(|| "times of the keys".into())?;
     let times: Vec<f32> = times.into_iter().map(|[t]| t).collect();
     let finite = times.iter().all(|t| t.is_finite() && *t >= 0.0);
-    if times.is_empty() || !finite || times.windows(2).any(|w| w[0] >= w[1]) {
-        return Err(invalid("the times of its keys are not finite and growing"));
+    if times.is_empty() || !finite || times.windows(2).any(|w| w[0] > w[1]) {
+        return Err(invalid("the times of its keys are not finite, or fall"));
     }
     let values: Vec<f32> = match property {
         Property::Translation | Property::Scale => {

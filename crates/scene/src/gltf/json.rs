@@ -28,6 +28,30 @@ pub(super) struct Root {
     pub(super) extensions: RootExtensions,
 }
 
+impl Root {
+    /// Takes the NULs off the ends of names and URIs that were written from buffers of a fixed length;
+    /// true where there were any.
+    pub(super) fn trim_padding(&mut self) -> bool {
+        let names = self.animations.iter_mut().map(|a| &mut a.name);
+        let names = names.chain(self.cameras.iter_mut().map(|c| &mut c.name));
+        let names = names.chain(self.materials.iter_mut().map(|m| &mut m.name));
+        let names = names.chain(self.meshes.iter_mut().map(|m| &mut m.name));
+        let names = names.chain(self.nodes.iter_mut().map(|n| &mut n.name));
+        let images = self.images.iter_mut();
+        let of_images = images.flat_map(|i| [Some(&mut i.name), i.uri.as_mut()]).flatten();
+        let uris = self.buffers.iter_mut().filter_map(|b| b.uri.as_mut());
+        let texts = names.chain(of_images).chain(uris);
+        texts.map(trim).fold(false, |any, is_padded| any | is_padded)
+    }
+}
+
+fn trim(text: &mut String) -> bool {
+    let length = text.trim_end_matches('\0').len();
+    let is_padded = length < text.len();
+    text.truncate(length);
+    is_padded
+}
+
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Asset {
@@ -321,6 +345,13 @@ pub(super) struct TextureInfo {
     pub(super) extensions: TextureInfoExtensions,
 }
 
+impl TextureInfo {
+    /// The set of texture coordinates that it reads.
+    pub(super) fn uv_set(&self) -> usize {
+        self.extensions.transform.as_ref().and_then(|t| t.tex_coord).unwrap_or(self.tex_coord)
+    }
+}
+
 #[derive(Debug, Deserialize)]
 pub(super) struct NormalTexture {
     #[serde(flatten)]
@@ -402,6 +433,22 @@ pub(super) struct Node {
 pub(super) struct NodeExtensions {
     #[serde(rename = "KHR_lights_punctual")]
     pub(super) light: Option<LightRef>,
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    pub(super) instancing: Option<Instancing>,
+    #[serde(rename = "KHR_node_visibility")]
+    pub(super) visibility: Option<Visibility>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Instancing {
+    pub(super) attributes: BTreeMap<String, usize>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Visibility {
+    #[serde(default = "yes")]
+    pub(super) visible: bool,
 }
 
 #[derive(Debug, Deserialize)]
@@ -466,4 +513,8 @@ fn ior() -> f32 {
 
 fn triangles() -> u32 {
     4
+}
+
+fn yes() -> bool {
+    true
 }

@@ -38,6 +38,40 @@ fn textures(m: &json::Material) -> impl Iterator<Item = &json::TextureInfo> {
     .flatten()
 }
 
+/// Which sets of texture coordinates a material reads, as many as vertices hold: TEXCOORD_0 and 1
+/// unless it asks for a later one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct UvSets([usize; 2]);
+
+impl UvSets {
+    pub(super) fn of(material: Option<&json::Material>) -> Self {
+        let mut sets = Vec::new();
+        for info in material.into_iter().flat_map(textures) {
+            if !sets.contains(&info.uv_set()) {
+                sets.push(info.uv_set());
+            }
+        }
+        if sets.iter().all(|set| *set < 2) {
+            return Self([0, 1]);
+        }
+        // Those of textures that count for more come first.
+        sets.truncate(2);
+        sets.sort_unstable();
+        let first = sets[0];
+        Self([first, sets.get(1).copied().unwrap_or(if first == 0 { 1 } else { 0 })])
+    }
+
+    /// By place among a vertex's coordinates.
+    pub(super) fn numbers(self) -> [usize; 2] {
+        self.0
+    }
+
+    /// The place of a set.
+    pub(super) fn place(self, set: usize) -> Option<usize> {
+        self.0.iter().position(|here| *here == set)
+    }
+}
+
 /// The file's materials, and after them glTF's default material.
 pub(super) fn read(
     root: &json::Root,
@@ -67,8 +101,9 @@ fn read_material(
 ) -> Result<Material, Fault> {
     let pbr = &json.pbr_metallic_roughness;
     let extensions = &json.extensions;
+    let sets = UvSets::of(Some(json));
     let mut texture = |info: Option<&json::TextureInfo>| match info {
-        Some(info) => images.texture(root, info, warnings),
+        Some(info) => images.texture(root, info, sets, warnings),
         None => Ok(None),
     };
     let mut material = Material {

@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::accessor::Accessors;
-use super::{json, tangents};
+use super::material::UvSets;
+use super::{json, skin, tangents};
 use crate::error::{At, Fault, invalid};
 use crate::mesh::{Mesh, MorphTarget, Primitive};
 use crate::{Material, MaterialId, origin};
@@ -42,7 +43,9 @@ pub(super) fn read(
             notes.warnings.push(format!("{}: points and lines are not drawn", here()));
             continue;
         }
+        let first = notes.warnings.len();
         let read = read_primitive(accessors, primitive, materials, &mut notes).at(here)?;
+        notes.warnings[first..].iter_mut().for_each(|w| *w = format!("{}: {w}", here()));
         primitives.extend(read);
     }
     let targets = targets.unwrap_or(0);
@@ -66,16 +69,17 @@ fn read_primitive(
     notes: &mut Notes,
 ) -> Result<Option<Primitive>, Fault> {
     let Some(&position) = json.attributes.get("POSITION") else {
-        notes.warnings.push("a primitive without positions is not drawn".into());
+        notes.warnings.push("without positions it is not drawn".into());
         return Ok(None);
     };
     if accessors.count(position)? > u64::from(u32::MAX) {
         return Err(invalid("more vertices than 32-bit indices can name"));
     }
     let mut primitive = read_attributes(accessors, json, position, notes)?;
-    primitive.morph_targets = read_morph_targets(accessors, json, &primitive)?;
+    primitive.morph_targets = read_morph_targets(accessors, json, &primitive, notes)?;
     primitive.material = material(json, materials)?;
     primitive.triangles = read_triangles(accessors, json, primitive.vertices.positions.len())?;
+    check_positions(&mut primitive, notes)?;
     drop_degenerate(&mut primitive);
     if primitive.triangles.is_empty() {
         return Ok(None);
@@ -110,7 +114,7 @@ fn read_attributes(
     position: usize,
     notes: &mut Notes,
 ) -> Result<Primitive, Fault> {
-    let positions = vec3s(accessors, position, "POSITION")?;
+    let positions: Vec<Vec3> = vec3s(accessors, position, "POSITION")?;
     let count = positions.len();
     let attribute = |name: &str| json.attributes.get(name).copied();
     let check = |name: &str, length: usize| match length == count {
@@ -121,6 +125,8 @@ fn read_attributes(
     primitive.vertices.positions = positions;
     if let Some(index) = attribute("NORMAL") {
         primitive.vertices.normals = vec3s(accessors, index, "NORMAL")?;
+        // They get the mean of their triangles.
+        mend("NORMAL", &mut primitive.vertices.normals, Vec3::ZERO, notes);
         check("NORMAL", primitive.vertices.normals.len())?;
         if let Some(index) = attribute("TANGENT") {
             let tangents = accessors.floats::<4>(index).at(|| "TANGENT".into())?;
@@ -128,69 +134,85 @@ fn read_attributes(
             primitive.vertices.tangents = tangents.into_iter().map(unit_tangent).collect();
         }
     }
-    for (set, name) in ["TEXCOORD_0", "TEXCOORD_1"].into_iter().enumerate() {
-        if let Some(index) = attribute(name) {
-            let uv = accessors.floats::<2>(index).at(|| name.into())?;
-            check(name, uv.len())?;
-            finite(name, uv.iter().flatten())?;
-            primitive.uv[set] = uv.into_iter().map(Vec2::from).collect();
+    let sets = UvSets::of(json.material.and_then(|index| accessors.root.materials.get(index)));
+    for (uv, set) in primitive.uv.iter_mut().zip(sets.numbers()) {
+        let name = format!("TEXCOORD_{set}");
+        if let Some(index) = attribute(&name) {
+            let read = accessors.floats::<2>(index).at(|| name.clone())?;
+            check(&name, read.len())?;
+            *uv = read.into_iter().map(Vec2::from).collect();
+            mend(&name, uv, Vec2::ZERO, notes);
         }
     }
     if let Some(index) = attribute("COLOR_0") {
-        primitive.colors = read_colors(accessors, index).at(|| "COLOR_0".into())?;
+        primitive.colors = read_colors(accessors, index, notes).at(|| "COLOR_0".into())?;
         check("COLOR_0", primitive.colors.len())?;
     }
-    if let (Some(joints), Some(weights)) = (attribute("JOINTS_0"), attribute("WEIGHTS_0")) {
-        let weights = accessors.floats::<4>(weights).at(|| "WEIGHTS_0".into())?;
-        let joints = accessors.integers::<4>(joints).at(|| "JOINTS_0".into())?;
-        check("WEIGHTS_0", weights.len())?;
-        check("JOINTS_0", joints.len())?;
-        finite("WEIGHTS_0", weights.iter().flatten())?;
-        (primitive.joints, primitive.weights) =
-            joints.into_iter().zip(weights).map(influence).collect::<Result<_, _>>()?;
-    }
-    if json.attributes.contains_key("JOINTS_1") {
-        notes.warnings.push("of more than four joints a vertex, the first four are used".into());
-    }
+    (primitive.joints, primitive.weights) = skin::read(accessors, json, count, notes)?;
     Ok(primitive)
 }
 
-/// Joints and weights with sum 1; a joint without weight becomes 0.
-fn influence((joints, weights): ([u32; 4], [f32; 4])) -> Result<([u16; 4], Vec4), Fault> {
-    let weights = Vec4::from(weights).max(Vec4::ZERO);
-    let sum = weights.element_sum();
-    let weights = if sum > 0.0 && sum.is_finite() { weights / sum } else { Vec4::X };
-    let mut narrow = [0; 4];
-    for (i, joint) in joints.into_iter().enumerate() {
-        if weights[i] > 0.0 {
-            narrow[i] = u16::try_from(joint)
-                .map_err(|_| invalid(format!("JOINTS_0 names joint {joint}")))?;
-        }
-    }
-    Ok((narrow, weights))
-}
-
-fn read_colors(accessors: Accessors<'_>, index: usize) -> Result<Vec<Vec4>, Fault> {
-    let colors: Vec<Vec4> = if accessors.components(index)? == 3 {
+fn read_colors(
+    accessors: Accessors<'_>,
+    index: usize,
+    notes: &mut Notes,
+) -> Result<Vec<Vec4>, Fault> {
+    let mut colors: Vec<Vec4> = if accessors.components(index)? == 3 {
         accessors.floats::<3>(index)?.into_iter().map(|c| Vec3::from(c).extend(1.0)).collect()
     } else {
         accessors.floats::<4>(index)?.into_iter().map(Vec4::from).collect()
     };
-    finite("a colour", colors.iter().flat_map(|c| c.as_ref()))?;
+    mend("COLOR_0", &mut colors, Vec4::ONE, notes);
     Ok(colors.into_iter().map(|c| c.clamp(Vec4::ZERO, Vec4::ONE)).collect())
 }
 
 fn vec3s(accessors: Accessors<'_>, index: usize, name: &str) -> Result<Vec<Vec3>, Fault> {
     let values = accessors.floats::<3>(index).at(|| name.into())?;
-    finite(name, values.iter().flatten())?;
     Ok(values.into_iter().map(Vec3::from).collect())
 }
 
-fn finite<'a>(name: &str, mut values: impl Iterator<Item = &'a f32>) -> Result<(), Fault> {
-    match values.all(|v| v.is_finite() && v.abs() < 1e18) {
-        true => Ok(()),
-        false => Err(invalid(format!("{name} holds a number that is not finite or over 1e18"))),
+/// An element of an attribute.
+pub(super) trait Element: Copy {
+    /// Whether its numbers are finite and at most 1e18.
+    fn is_sound(&self) -> bool;
+}
+
+macro_rules! element {
+    ($($vector:ty),*) => {$(
+        impl Element for $vector {
+            fn is_sound(&self) -> bool {
+                self.abs().cmple(Self::splat(1e18)).all()
+            }
+        }
+    )*};
+}
+
+element!(Vec2, Vec3, Vec4);
+
+/// Puts something harmless in the place of elements that cannot be reckoned with.
+pub(super) fn mend<T: Element>(name: &str, values: &mut [T], harmless: T, notes: &mut Notes) {
+    let mut count = 0;
+    for value in values.iter_mut().filter(|value| !value.is_sound()) {
+        *value = harmless;
+        count += 1;
     }
+    if count > 0 {
+        notes.warnings.push(format!(
+            "{name}: {count} of its elements are passed over, as they are not finite or over 1e18"
+        ));
+    }
+}
+
+/// Refuses triangles whose corners have no place; puts vertices of no triangle where another is.
+fn check_positions(primitive: &mut Primitive, notes: &mut Notes) -> Result<(), Fault> {
+    let positions = &mut primitive.vertices.positions;
+    let is_nowhere = |i: &u32| !positions[*i as usize].is_sound();
+    if primitive.triangles.iter().flatten().any(is_nowhere) {
+        return Err(invalid("POSITION holds a number that is not finite or over 1e18"));
+    }
+    let somewhere = primitive.triangles.first().map_or(Vec3::ZERO, |t| positions[t[0] as usize]);
+    mend("POSITION", positions, somewhere, notes);
+    Ok(())
 }
 
 fn unit_tangent(t: [f32; 4]) -> Vec4 {
@@ -202,12 +224,20 @@ fn read_morph_targets(
     accessors: Accessors<'_>,
     json: &json::Primitive,
     primitive: &Primitive,
+    notes: &mut Notes,
 ) -> Result<Vec<MorphTarget>, Fault> {
     let count = primitive.vertices.positions.len();
-    let read = |target: &BTreeMap<String, usize>, name: &str| match target.get(name) {
+    let mut read = |target: &BTreeMap<String, usize>, name: &str| match target.get(name) {
         None => Ok(Vec::new()),
         Some(&index) => {
-            let values = vec3s(accessors, index, name)?;
+            let mut values = vec3s(accessors, index, name)?;
+            if name != "POSITION" {
+                mend(name, &mut values, Vec3::ZERO, notes);
+            } else if !values.iter().all(Element::is_sound) {
+                return Err(invalid(format!(
+                    "{name} holds a number that is not finite or over 1e18"
+                )));
+            }
             if values.len() == count {
                 return Ok(values);
             }
@@ -217,7 +247,7 @@ fn read_morph_targets(
     let targets = json.targets.iter().enumerate();
     targets
         .map(|(t, target)| {
-            let read = || {
+            let mut read = || {
                 Ok(MorphTarget {
                     positions: read(target, "POSITION")?,
                     normals: read(target, "NORMAL")?,
@@ -292,7 +322,7 @@ fn make_flat(primitive: &mut Primitive, accessors: Accessors<'_>) -> Result<(), 
     let a_vertex = size_of::<[f32; 6]>()
         + primitive.uv.iter().filter(|uv| !uv.is_empty()).count() * size_of::<Vec2>()
         + if primitive.colors.is_empty() { 0 } else { size_of::<Vec4>() }
-        + if primitive.joints.is_empty() { 0 } else { size_of::<[f32; 6]>() }
+        + primitive.influence_sets() * size_of::<[f32; 6]>()
         + primitive.morph_targets.len() * size_of::<[Vec3; 3]>();
     accessors.budget.geometry::<u8>(corners.saturating_mul(a_vertex))?;
     let order: Vec<u32> = primitive.triangles.iter().flatten().copied().collect();
@@ -312,13 +342,17 @@ pub(super) fn select_vertices(primitive: &mut Primitive, order: &[u32]) {
             *values = order.iter().map(|i| values[*i as usize]).collect();
         }
     }
+    let sets = primitive.influence_sets() as u32;
     select(&mut primitive.vertices.positions, order);
     select(&mut primitive.vertices.normals, order);
     select(&mut primitive.vertices.tangents, order);
     primitive.uv.iter_mut().for_each(|uv| select(uv, order));
     select(&mut primitive.colors, order);
-    select(&mut primitive.joints, order);
-    select(&mut primitive.weights, order);
+    if sets > 0 {
+        let order: Vec<u32> = order.iter().flat_map(|i| i * sets..(i + 1) * sets).collect();
+        select(&mut primitive.joints, &order);
+        select(&mut primitive.weights, &order);
+    }
     for target in &mut primitive.morph_targets {
         select(&mut target.positions, order);
         select(&mut target.normals, order);

@@ -5,10 +5,12 @@
 
 mod accessor;
 mod animation;
+mod instancing;
 mod json;
 mod material;
 mod mesh;
 mod node;
+mod skin;
 pub(crate) mod source;
 mod tangents;
 mod texture;
@@ -29,6 +31,7 @@ use crate::settings::Settings;
 
 /// Extensions that are understood.
 const KNOWN: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
@@ -36,6 +39,7 @@ const KNOWN: &[&str] = &[
     "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
+    "KHR_node_visibility",
     "KHR_texture_transform",
     "EXT_texture_webp",
 ];
@@ -64,8 +68,14 @@ pub(crate) fn read_bytes(name: &str, bytes: Arc<[u8]>, budget: &Budget) -> Resul
 
 fn read(bytes: Vec<u8>, folder: Option<&Folder>, budget: &Budget) -> Result<Asset, Fault> {
     let container = Container::open(bytes)?;
-    let root: json::Root = serde_json::from_slice(&container.json).map_err(Fault::Json)?;
+    let mut root: json::Root = serde_json::from_slice(&container.json).map_err(Fault::Json)?;
     let mut warnings = check_version_and_extensions(&root)?;
+    if container.is_padded {
+        warnings.push("NUL characters after its JSON are left out".into());
+    }
+    if root.trim_padding() {
+        warnings.push("NUL characters at the end of names are left out".into());
+    }
     let mut files = Vec::new();
     let buffers = read_buffers(&root, container.binary, folder, &mut files)?;
     let accessors = Accessors { root: &root, buffers: &buffers, budget };
@@ -74,9 +84,10 @@ fn read(bytes: Vec<u8>, folder: Option<&Folder>, budget: &Budget) -> Result<Asse
     let materials = material::read(&root, &images, &mut warnings)?;
     let meshes = read_meshes(accessors, &materials, &mut warnings)?;
     let lights = node::lights(&root, &mut warnings)?;
-    let nodes = node::read(&root, &lights, &mut warnings)?;
+    let mut nodes = node::read(&root, &lights, &mut warnings)?;
+    instancing::read(accessors, &mut nodes, &mut warnings)?;
     let skins = (0..root.skins.len())
-        .map(|index| node::skin(accessors, index).map(Arc::new))
+        .map(|index| skin::read_skin(accessors, index).map(Arc::new))
         .collect::<Result<Vec<_>, _>>()?;
     node::check_meshes(&nodes, &meshes, &skins)?;
     let animations = (0..root.animations.len())
@@ -94,7 +105,7 @@ fn read(bytes: Vec<u8>, folder: Option<&Folder>, budget: &Budget) -> Result<Asse
         materials,
         skins,
         animations,
-        cameras: node::cameras(&root)?,
+        cameras: node::cameras(&root, &mut warnings)?,
         settings: settings(&root)?,
         warnings,
         files: files.into_iter().map(file).collect(),

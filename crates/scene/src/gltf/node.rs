@@ -1,8 +1,7 @@
-//! Nodes, lights, cameras and skins of a glTF.
+//! Nodes, lights and cameras of a glTF.
 
-use glam::{Affine3A, DMat4, DVec3, Mat4, Quat, Vec3};
+use glam::{Mat4, Quat, Vec3};
 
-use super::accessor::Accessors;
 use super::json;
 use crate::asset::{AssetNode, Camera, Projection, Skin};
 use crate::error::{At, Fault, invalid};
@@ -34,7 +33,7 @@ pub(super) fn read(
     Ok(nodes)
 }
 
-fn describe(index: usize, name: &str) -> String {
+pub(super) fn describe(index: usize, name: &str) -> String {
     if name.is_empty() { format!("node {index}") } else { format!("node {index} {name:?}") }
 }
 
@@ -62,8 +61,7 @@ fn transform(json: &json::Node) -> Result<(Trs, bool), Fault> {
         rotation,
         scale: json.scale.map_or(Vec3::ONE, Vec3::from),
     };
-    let largest = trs.translation.abs().max(trs.scale.as_dvec3().abs()).max_element();
-    match trs.is_finite() && largest <= f64::from(limits::EXTENT) {
+    match trs.is_within_limits() {
         true => Ok((trs, true)),
         false => Err(invalid(format!("its transform is not finite or over {:e}", limits::EXTENT))),
     }
@@ -89,6 +87,7 @@ fn references(root: &json::Root, json: &json::Node, lights: &[Light]) -> Result<
         skin: check("skin", json.skin, root.skins.len())?,
         camera: check("camera", json.camera, root.cameras.len())?,
         light: light.map(|l| lights[l as usize]),
+        hidden: json.extensions.visibility.as_ref().is_some_and(|v| !v.visible),
         weights: json.weights.clone(),
         ..AssetNode::default()
     })
@@ -182,24 +181,43 @@ fn read_light(
         kind.resize(radius, angle).map_err(invalid)?;
     }
     let (color, intensity) = (Vec3::from(json.color), json.intensity);
-    let light = Light { kind, color, intensity, range: json.range };
+    if json.range == Some(0.0) {
+        warnings.push(format!("light {index}: its range of 0 is taken for none"));
+    }
+    let range = json.range.filter(|range| *range != 0.0);
+    let light = Light { kind, color, intensity, range };
     light.check().map_err(invalid)?;
     Ok(light)
 }
 
 /// Reads the cameras.
-pub(super) fn cameras(root: &json::Root) -> Result<Vec<Camera>, Fault> {
+pub(super) fn cameras(root: &json::Root, warnings: &mut Vec<String>) -> Result<Vec<Camera>, Fault> {
     let read = |(index, json): (usize, &json::Camera)| {
-        read_camera(json).at(|| format!("camera {index} {:?}", json.name))
+        let place = || format!("camera {index} {:?}", json.name);
+        let (camera, has_no_near) = read_camera(json).at(place)?;
+        if has_no_near {
+            warnings.push(format!("{}: its near plane at 0 is put before what it sees", place()));
+        }
+        Ok(camera)
     };
     root.cameras.iter().enumerate().map(read).collect()
 }
 
-fn read_camera(json: &json::Camera) -> Result<Camera, Fault> {
+/// Where the near plane of a perspective is put that has none, metres, and as a share of the far one's
+/// distance at most.
+const NEAR: f32 = 0.01;
+
+/// A camera, and whether its near plane had to be put somewhere.
+fn read_camera(json: &json::Camera) -> Result<(Camera, bool), Fault> {
+    let has_no_near = json.perspective.as_ref().is_some_and(|p| p.znear == 0.0);
     let positive = |v: f32| v > 0.0 && v.is_finite();
     let (projection, is_valid) = match (&json.perspective, &json.orthographic) {
         (Some(p), _) => {
-            let (yfov, aspect_ratio, near, far) = (p.yfov, p.aspect_ratio, p.znear, p.zfar);
+            let (yfov, aspect_ratio, far) = (p.yfov, p.aspect_ratio, p.zfar);
+            let near = match has_no_near {
+                true => far.map_or(NEAR, |far| NEAR.min(NEAR * far)),
+                false => p.znear,
+            };
             let is_valid = positive(yfov)
                 && yfov < std::f32::consts::PI
                 && aspect_ratio.is_none_or(positive)
@@ -218,35 +236,9 @@ fn read_camera(json: &json::Camera) -> Result<Camera, Fault> {
         (None, None) => return Err(invalid("it is neither perspective nor orthographic")),
     };
     match is_valid {
-        true => Ok(Camera { name: json.name.clone(), projection }),
+        true => Ok((Camera { name: json.name.clone(), projection }, has_no_near)),
         false => Err(invalid("its projection is out of range")),
     }
-}
-
-/// Reads a skin.
-pub(super) fn skin(accessors: Accessors<'_>, index: usize) -> Result<Skin, Fault> {
-    let json = &accessors.root.skins[index];
-    let read = || {
-        let matrices = match json.inverse_bind_matrices {
-            None => vec![Affine3A::IDENTITY; json.joints.len()],
-            Some(accessor) => accessors
-                .floats::<16>(accessor)?
-                .iter()
-                .map(|m| Affine3A::from_mat4(Mat4::from_cols_array(m)))
-                .collect(),
-        };
-        if matrices.len() < json.joints.len() {
-            return Err(invalid("it has fewer inverse bind matrices than joints"));
-        }
-        if matrices.iter().any(|m| !m.is_finite()) {
-            return Err(invalid("an inverse bind matrix is not finite"));
-        }
-        if let Some(joint) = json.joints.iter().find(|j| **j >= accessors.root.nodes.len()) {
-            return Err(invalid(format!("joint node {joint} does not exist")));
-        }
-        Ok(Skin { joints: json.joints.iter().map(|j| *j as u32).zip(matrices).collect() })
-    };
-    read().at(|| format!("skin {index}"))
 }
 
 /// Checks that every joint that a skinned mesh names is one of the skin's, and weights of nodes.

@@ -63,8 +63,14 @@ impl Folder {
     /// Name within the scene's folder and place on disk of a URI.
     pub(crate) fn resolve(&self, uri: &str) -> Result<(String, PathBuf), Fault> {
         let outside = || Fault::Outside { uri: shorten(uri) };
-        let decoded = percent_decode(uri).ok_or_else(outside)?;
-        let name = plain_name(&decoded).ok_or_else(outside)?;
+        let faulty = |why| Fault::Name { uri: shorten(uri), why };
+        let decoded = percent_decode(uri).ok_or_else(|| {
+            faulty("which is not UTF-8 once decoded: rename the file, and write its name in UTF-8")
+        })?;
+        if decoded.contains('\0') {
+            return Err(faulty("which holds a NUL character: correct the name in the scene"));
+        }
+        let name = file_name(&decoded).ok_or_else(outside)?;
         let name = format!("{}{name}", self.prefix);
         let path = self.given.join(&name);
         let missing = |source| Fault::Missing { uri: shorten(uri), source };
@@ -83,20 +89,18 @@ impl Folder {
     }
 }
 
-/// A relative path without `..`, with its `.` parts left out.
-fn plain_name(uri: &str) -> Option<String> {
-    let has_scheme = uri.split('/').next().is_some_and(|first| first.contains(':'));
-    if has_scheme || uri.contains(['\\', '\0']) {
+/// The one name of a file that a path within the scene's folder leads to: `/` between its parts, also
+/// where the path has `\` as Windows does, doubled slashes or `.`. `None` where it leads elsewhere: an
+/// absolute path, another machine's, one with `..`.
+pub fn file_name(path: &str) -> Option<String> {
+    let mut parts = path.split(['/', '\\']);
+    let first = parts.next()?;
+    let leads_elsewhere = first.is_empty() || first.contains(':');
+    if leads_elsewhere || path.contains('\0') || path.split(['/', '\\']).any(|part| part == "..") {
         return None;
     }
-    let mut parts = Vec::new();
-    for part in uri.split('/') {
-        match part {
-            "." => {}
-            "" | ".." => return None,
-            part => parts.push(part),
-        }
-    }
+    let parts: Vec<_> =
+        [first].into_iter().chain(parts).filter(|part| !matches!(*part, "" | ".")).collect();
     (!parts.is_empty()).then(|| parts.join("/"))
 }
 
@@ -172,9 +176,13 @@ impl std::ops::Deref for Bytes {
 pub(super) struct Container {
     pub(super) json: Bytes,
     pub(super) binary: Option<Bytes>,
+    /// The JSON was padded with NUL characters, which are left out.
+    pub(super) is_padded: bool,
 }
 
 const MAGIC: &[u8] = b"glTF";
+/// Of UTF-8.
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 const JSON_CHUNK: u32 = u32::from_le_bytes(*b"JSON");
 const BINARY_CHUNK: u32 = u32::from_le_bytes(*b"BIN\0");
 
@@ -182,7 +190,7 @@ impl Container {
     /// Takes a .glb apart, or passes a .gltf on; told apart by their first bytes.
     pub(super) fn open(bytes: Vec<u8>) -> Result<Self, Fault> {
         if !bytes.starts_with(MAGIC) {
-            return check_json(Self { json: bytes.into(), binary: None });
+            return Self::of(bytes.into(), None);
         }
         let whole = Bytes::from(bytes);
         let word = |at: usize| whole.get(at..at + 4).and_then(|b| b.try_into().ok());
@@ -212,15 +220,26 @@ impl Container {
             at = end.next_multiple_of(4);
         }
         let json = json.ok_or_else(|| invalid("the .glb file has no JSON chunk"))?;
-        check_json(Self { json, binary })
+        Self::of(json, binary)
     }
-}
 
-fn check_json(container: Container) -> Result<Container, Fault> {
-    if container.json.len() as u64 > limits::JSON_BYTES {
-        return Err(Fault::TooLarge { what: "bytes of JSON".into(), limit: limits::JSON_BYTES });
+    /// Leaves out what some programs put around JSON: a byte-order mark before it, NULs after it.
+    fn of(mut json: Bytes, binary: Option<Bytes>) -> Result<Self, Fault> {
+        if json.len() as u64 > limits::JSON_BYTES {
+            return Err(Fault::TooLarge {
+                what: "bytes of JSON".into(),
+                limit: limits::JSON_BYTES,
+            });
+        }
+        if json.starts_with(BYTE_ORDER_MARK) {
+            json.range.start += BYTE_ORDER_MARK.len();
+        }
+        let is_blank = |byte: &&u8| **byte == 0 || byte.is_ascii_whitespace();
+        let blank = json.iter().rev().take_while(is_blank).count();
+        let is_padded = json[json.len() - blank..].contains(&0);
+        json.range.end -= blank;
+        Ok(Self { json, binary, is_padded })
     }
-    Ok(container)
 }
 
 #[cfg(test)]
@@ -229,13 +248,33 @@ mod tests {
 
     #[test]
     fn names_stay_in_the_folder() {
-        for (uri, name) in [("a.png", "a.png"), ("./a/./b.png", "a/b.png"), ("..a", "..a")] {
-            assert_eq!(plain_name(uri).as_deref(), Some(name), "{uri}");
+        for (uri, name) in [
+            ("a.png", "a.png"),
+            ("./a/./b.png", "a/b.png"),
+            ("..a", "..a"),
+            ("a//b", "a/b"),
+            ("a\\b.png", "a/b.png"),
+            (".\\a\\/b", "a/b"),
+        ] {
+            assert_eq!(file_name(uri).as_deref(), Some(name), "{uri}");
         }
-        for uri in
-            ["", ".", "..", "../a", "a/../../b", "/etc/passwd", "a//b", "file:a", "\\a", "a\0"]
-        {
-            assert_eq!(plain_name(uri), None, "{uri:?}");
+        for uri in [
+            "",
+            ".",
+            "..",
+            "../a",
+            "a/../../b",
+            "/etc/passwd",
+            "//host/a",
+            "file:a",
+            "C:\\a",
+            "\\a",
+            "\\\\host\\a",
+            "..\\a",
+            "a\\..\\..\\b",
+            "a\0",
+        ] {
+            assert_eq!(file_name(uri), None, "{uri:?}");
         }
     }
 

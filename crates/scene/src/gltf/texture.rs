@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::accessor::Accessors;
 use super::json;
+use super::material::UvSets;
 use super::source::{Folder, data_uri, shorten};
 use crate::error::{At, Fault, invalid};
 use crate::limits;
@@ -131,6 +132,7 @@ impl Images {
         &self,
         root: &json::Root,
         info: &json::TextureInfo,
+        sets: UvSets,
         warnings: &mut Vec<String>,
     ) -> Result<Option<TextureRef>, Fault> {
         let index = info.index;
@@ -139,11 +141,13 @@ impl Images {
             return Ok(None);
         };
         let transform = info.extensions.transform.as_ref();
-        let tex_coord = transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord);
-        if tex_coord > 1 {
-            warnings.push(format!("texture {index} is left out: it uses TEXCOORD_{tex_coord}"));
+        let set = info.uv_set();
+        let Some(tex_coord) = sets.place(set) else {
+            warnings.push(format!(
+                "texture {index} is left out: it uses TEXCOORD_{set}, a third set of its material"
+            ));
             return Ok(None);
-        }
+        };
         let sampler =
             match root.textures[index].sampler {
                 None => None,

@@ -56,7 +56,7 @@ pub enum EditError {
         fault: Fault,
     },
     /// The scene would have too many nodes.
-    #[error("a scene has at most {} nodes", limits::NODES)]
+    #[error("a scene has at most {} nodes and instances of nodes", limits::NODES)]
     TooMany,
 }
 
@@ -169,10 +169,11 @@ impl Scene {
         }
     }
 
-    fn check_room(&self, id: NodeId, nodes: usize) -> Result<(), EditError> {
+    /// Whether there is room for so many nodes, and for nodes and instances together.
+    fn check_room(&self, id: NodeId, nodes: usize, size: usize) -> Result<(), EditError> {
         let there_are_numbers =
             u32::try_from(nodes).is_ok_and(|n| id.0.checked_add(n).is_some_and(|n| n < u32::MAX));
-        match there_are_numbers && self.nodes.len() + nodes <= limits::NODES {
+        match there_are_numbers && self.nodes.size() + size <= limits::NODES {
             true => Ok(()),
             false => Err(EditError::TooMany),
         }
@@ -213,7 +214,7 @@ impl Scene {
         transform: &Transform,
     ) -> Result<(), EditError> {
         let (trs, world) = self.check_addition("the instance", parent, transform)?;
-        self.check_room(id, 1)?;
+        self.check_room(id, 1, 1)?;
         match source {
             InstanceSource::Mesh(mesh) => {
                 let Some(m) = self.meshes.get(mesh.0 as usize) else {
@@ -227,7 +228,7 @@ impl Scene {
                 let fail = |fault| EditError::File { file: file.clone(), fault };
                 let found = self.find_model(file).map_err(fail)?;
                 let asset = self.asset(&found);
-                self.check_room(id, asset.nodes.len() + 1)?;
+                self.check_room(id, asset.nodes.len() + 1, asset.size() + 1)?;
                 if !asset.fits(world) {
                     let (what, why) =
                         ("the instance".into(), "it would be out of the world".into());
@@ -250,7 +251,7 @@ impl Scene {
     ) -> Result<(), EditError> {
         let (trs, _) = self.check_addition("the light", parent, transform)?;
         light.check().map_err(|why| EditError::Senseless { what: "the light".into(), why })?;
-        self.check_room(id, 1)?;
+        self.check_room(id, 1, 1)?;
         let light = Some(light);
         self.nodes.attach(id, Node { parent, parent_from_node: trs, light, ..Node::default() });
         Ok(())

@@ -7,7 +7,7 @@ use glam::{Affine3A, DAffine3, Mat3A, Vec3, Vec3A};
 
 use super::Scene;
 use super::nodes::{Node, PlacedSkin};
-use crate::trs::is_invertible;
+use crate::trs::{is_in_world, is_invertible};
 use crate::{Deformation, Instance, Mesh, NodeId, PlacedLight, Pose, Snapshot};
 
 /// Deformations by node, kept while they stay as they are.
@@ -50,20 +50,29 @@ impl Scene {
         deformations.0.retain(|_, kept| kept.used);
         self.deformations = deformations;
         let mut lights = self.lights();
-        lights.retain(|l| l.light.intensity > 0.0 && l.light.color != Vec3::ZERO);
+        lights.retain(|l| l.light.shines());
         let environment = self.environment.clone();
         let (version, time, origin) = (self.version, self.time, self.nodes.origin());
         Snapshot { version, time, origin, instances, materials, lights, environment }
     }
 
     pub(super) fn instances(&self, deformations: &mut Deformations) -> Vec<Instance> {
-        let placed = self.nodes.placed().into_iter();
-        placed
-            .filter_map(|(id, node, place)| self.instance(id, node, &place, deformations))
-            .collect()
+        let mut instances = Vec::new();
+        for (id, node, world) in self.nodes.shown() {
+            match &node.instances {
+                None => instances.extend(self.instance(id, node, world, deformations)),
+                Some(places) => {
+                    let worlds = places.iter().map(|place| world * *place).filter(is_in_world);
+                    let of_world = |world| self.instance(id, node, world, deformations);
+                    instances.extend(worlds.filter_map(of_world));
+                }
+            }
+        }
+        instances
     }
 
-    /// The mesh of a node; `None` where it has none or has shrunk to nothing.
+    /// The mesh of a node, or of one of its instances; `None` where it has none or has shrunk to
+    /// nothing.
     fn instance(
         &self,
         id: NodeId,
@@ -114,11 +123,10 @@ impl Scene {
         placed.skin.joints.iter().map(world_from_rest).collect()
     }
 
-    /// Every punctual light that is in the scene, also those without intensity; as in a snapshot, their
-    /// places are relative to [`Snapshot::origin`].
+    /// Every punctual light that is shown in the scene, also those without intensity.
     pub fn lights(&self) -> Vec<PlacedLight> {
-        let placed = self.nodes.placed().into_iter();
-        placed.filter_map(|(id, node, place)| place_light(id, node, &place.as_affine3a())).collect()
+        let shown = self.nodes.shown();
+        shown.into_iter().filter_map(|(id, node, world)| place_light(id, node, &world)).collect()
     }
 }
 

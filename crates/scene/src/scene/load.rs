@@ -62,7 +62,6 @@ impl Scene {
         }
         let environment = scene.environment.clone();
         scene.environment = scene.load_picture(environment).map_err(|fault| fault.of(path))?;
-        scene.warn_if_dark();
         Ok(scene)
     }
 
@@ -79,7 +78,6 @@ impl Scene {
             scene.check()?;
             let environment = scene.environment.clone();
             scene.environment = scene.load_picture(environment)?;
-            scene.warn_if_dark();
             Ok(scene)
         };
         read().map_err(|fault: Fault| fault.of(&file))
@@ -106,7 +104,9 @@ impl Scene {
     ) -> Self {
         let asset = Arc::new(asset);
         let mut scene = Self::empty(name, folder, budget);
-        scene.warnings = asset.warnings.clone();
+        let mut said = std::collections::BTreeSet::new();
+        let warnings = asset.warnings.iter().filter(|warning| said.insert(*warning));
+        scene.warnings = warnings.cloned().collect();
         scene.register(file, asset.clone(), None);
         scene.place(0, 0);
         for root in &asset.roots {
@@ -173,16 +173,8 @@ impl Scene {
     fn check(&self) -> Result<(), Fault> {
         let drawn =
             |node: &Node| node.mesh.map_or(0, |m| self.meshes[m.0 as usize].triangle_count());
-        let triangles: usize = self.nodes.placed().iter().map(|(_, node, _)| drawn(node)).sum();
+        let triangles: usize = self.nodes.shown().iter().map(|(_, node, _)| drawn(node)).sum();
         if triangles == 0 { Err(Fault::NoTriangles) } else { Ok(()) }
-    }
-
-    fn warn_if_dark(&mut self) {
-        let shines = self.environment != Environment::BLACK
-            || self.materials.iter().any(|m| m.emissive != glam::Vec3::ZERO);
-        if !shines && self.lights().is_empty() {
-            self.warnings.push("nothing gives light: no lamps, no emission, no environment".into());
-        }
     }
 
     /// Takes over what a file beside the scene says.
@@ -292,11 +284,13 @@ impl Scene {
                 children: json.children.iter().map(|c| NodeId(first + c)).collect(),
                 parent_from_node: json.parent_from_node,
                 mesh: json.mesh.map(|m| MeshId(first_mesh + m)),
+                instances: json.instances.clone(),
                 skin: skin
                     .filter(|_| is_skinned(asset, json))
                     .map(|skin| PlacedSkin { skin, first_node: first }),
                 light: json.light,
                 camera: json.camera.map(|camera| (model, camera)),
+                hidden: json.hidden,
                 weights: weights(asset, json),
             };
             self.nodes.insert(NodeId(first + index), node);
@@ -368,6 +362,12 @@ fn weights(asset: &Asset, node: &AssetNode) -> Vec<f32> {
 }
 
 impl Asset {
+    /// How many nodes it has, and their instances.
+    pub(super) fn size(&self) -> usize {
+        let instances = self.nodes.iter().filter_map(|node| node.instances.as_ref());
+        self.nodes.len() + instances.map(|instances| instances.len()).sum::<usize>()
+    }
+
     /// Whether all its nodes have a finite place in the world when its roots are placed so.
     pub(super) fn fits(&self, world_from_roots: Affine3A) -> bool {
         let mut open: Vec<_> = self.roots.iter().map(|r| (*r, world_from_roots)).collect();

@@ -14,7 +14,7 @@ use glam::{Affine3A, DAffine3, Quat, Vec3};
 
 pub use apply::EditError;
 use capture::Deformations;
-use nodes::Nodes;
+use nodes::{Node, Nodes};
 use playback::Clock;
 
 use crate::animation::Property;
@@ -88,6 +88,24 @@ pub struct NodeInfo<'a> {
     pub light: Option<Light>,
 }
 
+impl<'a> NodeInfo<'a> {
+    fn of(id: NodeId, node: &'a Node) -> Self {
+        let Trs { translation, rotation, scale } = node.parent_from_node;
+        Self {
+            id,
+            name: &node.name,
+            parent: node.parent,
+            transform: Transform {
+                translation: Some(translation),
+                rotation: Some(rotation),
+                scale: Some(scale),
+            },
+            mesh: node.mesh,
+            light: node.light,
+        }
+    }
+}
+
 /// An animation and how it stands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AnimationInfo<'a> {
@@ -146,9 +164,23 @@ impl Scene {
         self.version
     }
 
-    /// What was found odd while loading: extensions left out, no lights, and the like.
+    /// What was found odd while loading: extensions left out, faults that were mended, and the like.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// Whether all that is drawn is black: no lamp shines, nothing emits light, none comes from afar.
+    pub fn is_dark(&self) -> bool {
+        let shines = |mesh: MeshId| {
+            let primitives = &self.meshes[mesh.0 as usize].primitives;
+            primitives.iter().any(|primitive| {
+                let material = &self.materials[primitive.material.0 as usize];
+                material.unlit || material.emissive != Vec3::ZERO
+            })
+        };
+        !self.environment.shines()
+            && self.lights().iter().all(|placed| !placed.light.shines())
+            && !self.drawn_nodes().filter_map(|node| node.mesh).any(shines)
     }
 
     /// The volumes that the scene asks for, or one around all of it with at most 512 probes.
@@ -194,21 +226,14 @@ impl Scene {
 
     /// All nodes, also those that are not drawn.
     pub fn nodes(&self) -> impl Iterator<Item = NodeInfo<'_>> {
-        self.nodes.iter().map(|(id, node)| {
-            let Trs { translation, rotation, scale } = node.parent_from_node;
-            NodeInfo {
-                id,
-                name: &node.name,
-                parent: node.parent,
-                transform: Transform {
-                    translation: Some(translation.as_vec3()),
-                    rotation: Some(rotation),
-                    scale: Some(scale),
-                },
-                mesh: node.mesh,
-                light: node.light,
-            }
-        })
+        self.nodes.iter().map(|(id, node)| NodeInfo::of(id, node))
+    }
+
+    /// Those of the scene that the file names, without what it hides, by number.
+    pub fn drawn_nodes(&self) -> impl Iterator<Item = NodeInfo<'_>> {
+        let mut drawn = self.nodes.shown();
+        drawn.sort_by_key(|(id, _, _)| *id);
+        drawn.into_iter().map(|(id, node, _)| NodeInfo::of(id, node))
     }
 
     /// The cameras, in the order of the scene's tree.

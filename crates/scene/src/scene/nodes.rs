@@ -17,10 +17,14 @@ pub(crate) struct Node {
     pub(crate) children: Vec<NodeId>,
     pub(crate) parent_from_node: Trs,
     pub(crate) mesh: Option<MeshId>,
+    /// Where the mesh is shown, relative to the node; once, at the node, where absent.
+    pub(crate) instances: Option<Arc<[Affine3A]>>,
     pub(crate) skin: Option<PlacedSkin>,
     pub(crate) light: Option<Light>,
     /// Model and index of its camera.
     pub(crate) camera: Option<(usize, u32)>,
+    /// It and all below it are neither drawn nor give light.
+    pub(crate) hidden: bool,
     /// Morph weights, one a target of the mesh.
     pub(crate) weights: Vec<f32>,
 }
@@ -41,13 +45,20 @@ pub(crate) struct Nodes {
     roots: Vec<NodeId>,
     /// The next free number; numbers are never used twice.
     next: u32,
-    /// The point of the world that places are relative to.
-    origin: Vec3,
+    /// Of all nodes that have a list of them.
+    instances: usize,
+}
+
+impl Node {
+    fn instance_count(&self) -> usize {
+        self.instances.as_ref().map_or(0, |instances| instances.len())
+    }
 }
 
 impl Nodes {
-    pub(crate) fn len(&self) -> usize {
-        self.nodes.len()
+    /// How many there are, and their instances.
+    pub(crate) fn size(&self) -> usize {
+        self.nodes.len() + self.instances
     }
 
     pub(crate) fn next(&self) -> u32 {
@@ -88,6 +99,7 @@ impl Nodes {
     /// Puts a node in, with its parent and children as it names them.
     pub(crate) fn insert(&mut self, id: NodeId, node: Node) {
         self.next = self.next.max(id.0.saturating_add(1));
+        self.instances += node.instance_count();
         self.nodes.insert(id, node);
     }
 
@@ -126,7 +138,8 @@ impl Nodes {
         };
         siblings.retain(|sibling| *sibling != id);
         for node in self.subtree(id) {
-            self.nodes.remove(&node);
+            let removed = self.nodes.remove(&node);
+            self.instances -= removed.map_or(0, |node| node.instance_count());
         }
     }
 
@@ -141,30 +154,38 @@ impl Nodes {
         self.place_of_world() * place
     }
 
-    /// Nodes that are drawn, parents first, with their places.
-    pub(crate) fn placed(&self) -> Vec<(NodeId, &Node, DAffine3)> {
-        self.placed_below(self.roots.iter().map(|root| (*root, self.place_of_world())))
+    /// Nodes of the scene, parents first, with their place in the world.
+    pub(crate) fn placed(&self) -> Vec<(NodeId, &Node, Affine3A)> {
+        let roots = self.roots.iter().map(|root| (*root, Affine3A::IDENTITY));
+        self.placed_below(roots, |_| true)
+    }
+
+    /// Those of them that are neither hidden nor below a hidden node.
+    pub(crate) fn shown(&self) -> Vec<(NodeId, &Node, Affine3A)> {
+        let roots = self.roots.iter().map(|root| (*root, Affine3A::IDENTITY));
+        self.placed_below(roots, |node| !node.hidden)
     }
 
     /// A node and all below it, parents first, with their places.
     pub(crate) fn placed_from(&self, id: NodeId) -> Vec<(NodeId, &Node, DAffine3)> {
         let parent = self.nodes.get(&id).and_then(|n| n.parent);
-        let place = parent.map_or(self.place_of_world(), |parent| self.place_of(parent));
-        self.placed_below([(id, place)].into_iter())
+        let world = parent.map_or(Affine3A::IDENTITY, |parent| self.world_from_node(parent));
+        self.placed_below([(id, world)].into_iter(), |_| true)
     }
 
     fn placed_below(
         &self,
-        tops: impl Iterator<Item = (NodeId, DAffine3)>,
-    ) -> Vec<(NodeId, &Node, DAffine3)> {
+        tops: impl Iterator<Item = (NodeId, Affine3A)>,
+        wanted: impl Fn(&Node) -> bool,
+    ) -> Vec<(NodeId, &Node, Affine3A)> {
         let mut placed = Vec::with_capacity(self.nodes.len());
         let mut open: Vec<_> = tops.collect();
         open.reverse();
-        while let Some((id, parent)) = open.pop() {
-            let Some(node) = self.nodes.get(&id) else { continue };
-            let place = parent * node.parent_from_node.precise();
-            placed.push((id, node, place));
-            open.extend(node.children.iter().rev().map(|child| (*child, place)));
+        while let Some((id, world_from_parent)) = open.pop() {
+            let Some(node) = self.nodes.get(&id).filter(|node| wanted(node)) else { continue };
+            let world = world_from_parent * node.parent_from_node.affine();
+            placed.push((id, node, world));
+            open.extend(node.children.iter().rev().map(|child| (*child, world)));
         }
         placed
     }

@@ -46,6 +46,58 @@ fn a_gltf_with_its_files() {
     assert_eq!(std::fs::read(on_disk).expect("readable"), triangle_bytes());
 }
 
+/// Each of these leads to the one file, and clients are told its one name.
+#[test]
+fn uris_as_programs_write_them() {
+    let folder = Folder::new("uris");
+    folder.write("data/café 50%.bin", triangle_bytes());
+    for uri in [
+        "data/caf%C3%A9%2050%25.bin",
+        "data/café 50%.bin",
+        "data\\caf%C3%A9%2050%25.bin",
+        "data//café%2050%25.bin",
+        ".\\data\\\\café 50%.bin",
+        "data%5Ccaf%c3%a9 50%25.bin",
+        "data/café 50%.bin\0\0",
+    ] {
+        let scene = Scene::load(&folder.write("scene.gltf", gltf(uri))).expect(uri);
+        let names: Vec<_> = scene.files().into_iter().map(|f| f.name).collect();
+        assert_eq!(names, ["scene.gltf", "data/café 50%.bin"], "{uri}");
+    }
+    let marked = [&b"\xEF\xBB\xBF"[..], gltf("data/café 50%.bin").as_bytes()].concat();
+    Scene::load(&folder.write("marked.gltf", marked)).expect("a byte-order mark");
+}
+
+/// What is wrong is the name, not where it leads.
+#[test]
+fn names_that_no_file_has() {
+    let folder = Folder::new("names");
+    for (uri, reason) in
+        [("caf%E9.bin", "is not UTF-8 once decoded"), ("a%00b.bin", "holds a NUL character")]
+    {
+        let path = folder.write("scene.gltf", gltf(uri));
+        let error = Scene::load(&path).expect_err(uri).to_string();
+        assert!(error.contains(reason) && error.contains(uri), "{error}");
+    }
+}
+
+/// The scene's own file may be called anything.
+#[cfg(unix)]
+#[test]
+fn a_scene_whose_name_is_not_utf8() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let folder = Folder::new("latin");
+    let path = folder.0.join(std::ffi::OsStr::from_bytes(b"caf\xE9.glb"));
+    if std::fs::write(&path, triangle().finish(Value::Null)).is_err() {
+        // Some file systems take UTF-8 alone.
+        return;
+    }
+    let scene = Scene::load(&path).expect("the scene");
+    assert_eq!((scene.name(), scene.root_file()), ("caf-", "caf\u{fffd}.glb"));
+    let FileContents::Path(on_disk) = &scene.files()[0].contents else { panic!("not on disk") };
+    assert!(on_disk.exists());
+}
+
 #[test]
 fn only_files_in_the_scenes_folder_are_read() {
     let folder = Folder::new("escape");
@@ -60,9 +112,17 @@ fn only_files_in_the_scenes_folder_are_read() {
         assert!(error.contains("only files in the scene's own folder"), "{error}");
     }
     let absolute = folder.0.join("secret.bin").display().to_string();
-    for uri in
-        ["../secret.bin", "..%2fsecret.bin", "a/../../secret.bin", &absolute, "http://a/b.bin"]
-    {
+    for uri in [
+        "../secret.bin",
+        "..%2fsecret.bin",
+        "a/../../secret.bin",
+        "..\\secret.bin",
+        "a%5C..%5C..%5Csecret.bin",
+        "//host/secret.bin",
+        "C:\\secret.bin",
+        &absolute,
+        "http://a/b.bin",
+    ] {
         let error = Scene::load(&path(uri)).expect_err(uri).to_string();
         assert!(error.contains("only files in the scene's own folder"), "{uri}: {error}");
     }

@@ -3,9 +3,10 @@
 mod bad_input;
 mod deforming;
 mod edits;
-mod far;
+mod exporters;
 mod files;
 mod geometry;
+mod mended;
 mod replay;
 
 use serde_json::{Value, json};
