@@ -36,7 +36,10 @@ impl FileSet {
             for entry in std::fs::read_dir(folder)? {
                 let entry = entry?;
                 let kind = entry.file_type()?;
-                let Ok(name) = entry.file_name().into_string() else { continue };
+                let Ok(name) = entry.file_name().into_string() else {
+                    tracing::warn!(path = %entry.path().display(), "not served: its name is not UTF-8");
+                    continue;
+                };
                 let name = format!("{prefix}{name}");
                 if kind.is_dir() {
                     folders.push((entry.path(), name + "/"));

@@ -100,7 +100,10 @@ async fn page_file(State(shared): State<Arc<Shared>>, Path(name): Path<String>) 
     response
 }
 
+/// A scene's files have one name each; pages ask by what stands in the glTF.
 async fn scene_file(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Response {
+    let padded = name.trim_end_matches('\0');
+    let Some(name) = lumencast_scene::file_name(padded) else { return respond("", None).await };
     let contents = {
         let files = shared.scene_files.read().unwrap_or_else(PoisonError::into_inner);
         files.get(&name).cloned()

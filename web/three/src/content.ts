@@ -1,13 +1,16 @@
 import {
   type AnimationClip,
   type Camera,
+  FileLoader,
   Group,
+  LoaderUtils,
   type Material,
   Mesh,
   type Object3D,
   type Texture,
 } from 'three';
 import { type GLTF, GLTFLoader, type GLTFReference } from 'three/addons/loaders/GLTFLoader.js';
+import { blankPadding, completeNodes } from './exported.js';
 import { isPunctualLight, type PunctualLight } from './lights.js';
 import { copyParts } from './materials.js';
 import { materialsOf } from './patch.js';
@@ -31,6 +34,7 @@ export class Content {
 
   /** Takes in a file, or another copy of one, whose first node, material and animation have these numbers. */
   add(gltf: GLTF, first: { node: number; material: number; animation: number }): void {
+    completeNodes(gltf);
     for (const [thing, numbers] of associationsOf(gltf)) {
       const { nodes, materials } = numbers ?? {};
       if (nodes !== undefined && 'isObject3D' in thing) this.setNode(first.node + nodes, thing);
@@ -162,9 +166,11 @@ export async function loadGltf(
   url: string,
   progress?: (loaded: number, total: number | undefined) => void,
 ): Promise<GLTF> {
-  const gltf = await new GLTFLoader().loadAsync(url, (event) =>
-    progress?.(event.loaded, event.lengthComputable ? event.total : undefined),
-  );
+  const file = await new FileLoader()
+    .setResponseType('arraybuffer')
+    .loadAsync(url, (event) => progress?.(event.loaded, event.lengthComputable ? event.total : undefined));
+  const folder = LoaderUtils.extractUrlBase(url);
+  const gltf = await new GLTFLoader().parseAsync(blankPadding(file as ArrayBuffer), folder);
   if (gltf.scenes.length > 1) await nameNodes(gltf);
   // Matrices decompose into what edits set.
   gltf.scene.traverse((object) => void (object.matrixAutoUpdate = true));

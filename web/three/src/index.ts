@@ -17,6 +17,7 @@ export type { AttachOptions, LightSession, LumencastLight, Shown } from './light
 export type { ConnectOptions } from './connect.js';
 export { Content, loadGltf } from './content.js';
 export type { ProbeGrid } from './platform.js';
+export { isHidden } from './exported.js';
 export { createLight, isPunctualLight, lightSpec, type PunctualLight } from './lights.js';
 export type { ShadowOptions } from './shadows.js';
 

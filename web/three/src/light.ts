@@ -1,4 +1,4 @@
-import type { AcceptedEdit, Edit, Field, Session } from '@lumencast/client';
+import type { AcceptedEdit, Edit, Environment, Field, Session } from '@lumencast/client';
 import { type Camera, type Light, type Object3D, type Scene, Vector3 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import type { Content } from './content.js';
@@ -33,7 +33,18 @@ export type Shown = 'both' | 'direct' | 'indirect';
 /** Edits of one object that may be under way at once: more would only queue on a slow link. */
 const MAX_UNDER_WAY = 4;
 
-/** The address of a file of a server's scene. */
+/** The name of the file that a URI stands for; what is no sequence of UTF-8 stays as it is. */
+export function nameOf(uri: string): string {
+  return uri.replace(/(?:%[0-9a-f]{2})+/gi, (bytes) => {
+    try {
+      return decodeURIComponent(bytes);
+    } catch {
+      return bytes;
+    }
+  });
+}
+
+/** The address of a file of a server's scene, by its name. */
 export function sceneFile(origin: string, file: string): string {
   return new URL(`/scene/${file.split('/').map(encodeURIComponent).join('/')}`, origin).href;
 }
@@ -156,6 +167,11 @@ export class LumencastLight {
     this.#grids.visible = show !== 'direct';
   }
 
+  /** The scene's light from afar, as far as it is known. */
+  get environment(): Environment | undefined {
+    return this.#replica.environment;
+  }
+
   /** Nodes, materials, animations and cameras by glTF number. */
   get content(): Content {
     return this.#replica.content;
@@ -180,9 +196,9 @@ export class LumencastLight {
     return this.#lightRevision;
   }
 
-  /** The address of a file of the scene. */
-  urlOf(file: string): string {
-    return sceneFile(this.session.origin, file);
+  /** The address of a file of the scene, which edits name by its URI. */
+  urlOf(uri: string): string {
+    return sceneFile(this.session.origin, nameOf(uri));
   }
 
   /** Ends the session and gives the scene back without its indirect light. */

@@ -12,6 +12,7 @@ import {
   SpotLight,
   Vector3,
 } from 'three';
+import { isHidden } from './exported.js';
 import { isPunctualLight } from './lights.js';
 import { materialsOf } from './patch.js';
 
@@ -49,7 +50,7 @@ export class Shadows {
         mesh.castShadow = !materials.every(isClear);
         mesh.receiveShadow = true;
         for (const material of materials) material.shadowSide = DoubleSide;
-      } else if (isPunctualLight(object) && this.#lights.length < this.#maxLights) {
+      } else if (isPunctualLight(object) && !isHidden(object) && this.#lights.length < this.#maxLights) {
         this.#lights.push(object);
         object.castShadow = true;
         const size = object instanceof PointLight ? this.#mapSize / 2 : this.#mapSize;
