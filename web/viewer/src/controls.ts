@@ -9,6 +9,7 @@ import { StatsPanel } from './ui/stats.js';
 import { isTyping } from './view/camera-rig.js';
 import { TONE_MAPPINGS } from './view/renderer.js';
 import type { Gizmo } from './view/selection.js';
+import { SKY } from './view/sky.js';
 import type { Viewer } from './viewer.js';
 
 /** The panels over the picture, and the keys. */
@@ -70,6 +71,7 @@ export class Controls {
     dock.set('stats', !this.#stats.element.hidden);
     dock.set('help', !this.#help.hidden);
     this.#inspector.update();
+    this.#offerSky();
     if (performance.now() - this.#statsAt < 250) return;
     this.#statsAt = performance.now();
     if (!this.#stats.element.hidden) this.#stats.update(viewer.stats());
@@ -121,6 +123,19 @@ export class Controls {
       case 'help':
         this.#help.hidden = !this.#help.hidden;
     }
+  }
+
+  /** Where a scene has no light of its own, all is black. */
+  #offerSky(): void {
+    const { viewer } = this;
+    const message = 'Nothing in this scene gives light.';
+    const take = () => {
+      viewer.light
+        .edit({ edit: 'set_environment', environment: SKY })
+        .then(() => viewer.meterAnew())
+        .catch((error: Error) => this.notices.passing(`No sky: ${error.message}`));
+    };
+    this.notices.offer(viewer.isDark ? { message, label: 'Put it under a sky', take } : undefined);
   }
 
   #takeFlashlight(): void {

@@ -1,6 +1,15 @@
 import type { Session } from '@lumencast/client';
 import { attach, loadGltf, type LumencastLight, type PunctualLight, type Shown } from '@lumencast/three';
-import { Box3, type Object3D, Scene, Timer, Vector3 } from 'three';
+import {
+  Box3,
+  type InstancedMesh,
+  type Mesh,
+  type Object3D,
+  Scene,
+  type SkinnedMesh,
+  Timer,
+  Vector3,
+} from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { Controls } from './controls.js';
 import type { Figures } from './ui/stats.js';
@@ -10,6 +19,7 @@ import { findFlashlight, Flashlight } from './view/flashlight.js';
 import { ProbeSpheres } from './view/probes.js';
 import { type AnyRenderer, createRenderer, isWebGPU, Resolution } from './view/renderer.js';
 import { Selection } from './view/selection.js';
+import { isDark } from './view/sky.js';
 import { Touch } from './view/touch.js';
 
 export interface ViewerOptions {
@@ -61,6 +71,8 @@ export class Viewer {
   readonly #resolution: Resolution;
   readonly #timer = new Timer();
   #drawnRevision = -1;
+  #darkRevision = -1;
+  #isDark = false;
   #litFrames = 0;
   #frameTime = 16;
   #askedAt = 0;
@@ -148,6 +160,17 @@ export class Viewer {
     }
   }
 
+  /** Whether nothing gives light in a scene that a server would change. */
+  get isDark(): boolean {
+    const { light, session } = this;
+    if (session.status.state !== 'connected' || light.lightRevision === 0) return false;
+    if (light.sceneRevision !== this.#darkRevision) {
+      this.#darkRevision = light.sceneRevision;
+      this.#isDark = isDark(this.gltf.scene, light.environment);
+    }
+    return this.#isDark;
+  }
+
   /** The spot light that the hand takes. */
   get spot(): ReturnType<typeof findFlashlight> {
     return findFlashlight(this.selection.lights);
@@ -192,6 +215,11 @@ export class Viewer {
         if (measured !== undefined) this.exposure = measured;
       })
       .finally(() => (this.#metering = undefined)));
+  }
+
+  /** Lets exposure find its way again, as after the first light, where the page has it. */
+  meterAnew(): void {
+    this.#litFrames = 0;
   }
 
   #meterWhenLit(): void {
@@ -244,6 +272,18 @@ export class Viewer {
 }
 
 function contentBounds(content: Object3D): Box3 {
-  const bounds = new Box3().setFromObject(content);
+  const bounds = new Box3();
+  content.updateWorldMatrix(true, true);
+  content.traverseVisible((object) => bounds.union(boundsAlone(object)));
   return bounds.isEmpty() ? bounds.set(new Vector3(-1, -1, -1), new Vector3(1, 1, 1)) : bounds;
+}
+
+/** The box of an object in the world, without what hangs below it. */
+function boundsAlone(object: Object3D): Box3 {
+  const mesh = object as Partial<InstancedMesh | SkinnedMesh>;
+  if (!mesh.geometry) return new Box3();
+  // Instances and joints have a box of their own.
+  const of = 'boundingBox' in mesh ? mesh : mesh.geometry;
+  (of as Mesh['geometry']).computeBoundingBox();
+  return (of.boundingBox ?? new Box3()).clone().applyMatrix4(object.matrixWorld);
 }

@@ -1,10 +1,21 @@
-import { DirectionalLight, Group, PointLight, SpotLight, Vector3 } from 'three';
+import type { Environment } from '@lumencast/client';
+import {
+  BufferGeometry,
+  DirectionalLight,
+  Group,
+  Mesh,
+  MeshStandardMaterial,
+  PointLight,
+  SpotLight,
+  Vector3,
+} from 'three';
 import { describe, expect, it } from 'vitest';
 import { readVectors } from '../../client/test/support/vectors.js';
 import { INTENSITY, intensityAt, intensityText } from '../src/ui/intensity.js';
 import { exposureFor, STOPS, withinStops } from '../src/view/exposure.js';
 import { findFlashlight } from '../src/view/flashlight.js';
 import { irradianceWeights } from '../src/view/probes.js';
+import { isDark, SKY } from '../src/view/sky.js';
 import { setSunAngles, sunAngles } from '../src/view/sun.js';
 
 describe('exposureFor', () => {
@@ -121,5 +132,34 @@ describe('spheres at probes', () => {
     const turned = (one: Case) => ({ ...one, normal: [one.normal[1], one.normal[2], one.normal[0]] });
     const off = cases.map((one) => Math.abs(found(turned(one), 0) - one.lux[0]));
     expect(Math.max(...off)).toBeGreaterThan(0.01);
+  });
+});
+
+describe('isDark', () => {
+  const sky = readVectors<{ environment: Environment }>('sky').environment;
+  const black: Environment = { type: 'constant', radiance: [0, 0, 0] };
+
+  it('is said of a scene that nothing lights', () => {
+    const wall = new Mesh(new BufferGeometry(), new MeshStandardMaterial());
+    const scene = new Group().add(wall);
+    expect([isDark(scene, undefined), isDark(scene, black)]).toEqual([true, true]);
+    expect(isDark(scene, sky)).toBe(false);
+    wall.material.emissive.set(1, 1, 1);
+    expect(isDark(scene, black)).toBe(false);
+    wall.material.emissiveIntensity = 0;
+    expect(isDark(scene, black)).toBe(true);
+    const lamp = new PointLight(0xffffff, 1);
+    scene.add(lamp);
+    expect(isDark(scene, black)).toBe(false);
+    // As after remove_light, and below a hidden node.
+    lamp.intensity = 0;
+    expect(isDark(scene, black)).toBe(true);
+    lamp.intensity = 1;
+    lamp.visible = false;
+    expect(isDark(scene, black)).toBe(true);
+  });
+
+  it('is mended by the sky of the command line', () => {
+    expect(SKY).toEqual(sky);
   });
 });

@@ -4,6 +4,7 @@ import { h } from './dom.js';
 export class Notices {
   readonly element = h('div', { class: 'notices', role: 'status', 'aria-live': 'polite' });
   #standing: HTMLElement | undefined;
+  #offer: HTMLElement | undefined;
 
   /** A message that stays until it is replaced or, by `undefined`, taken away. */
   standing(message: string | undefined): void {
@@ -18,6 +19,22 @@ export class Notices {
       h('span', {}, message),
     );
     this.element.prepend(this.#standing);
+  }
+
+  /** A message with something to do about it, until it is taken away by `undefined`. */
+  offer(offer: { message: string; label: string; take: () => void } | undefined): void {
+    if (this.#offer?.dataset.message === offer?.message) return;
+    this.#offer?.remove();
+    this.#offer = undefined;
+    if (offer === undefined) return;
+    const { message, label, take } = offer;
+    this.#offer = h(
+      'div',
+      { class: 'notice offer', 'data-message': message },
+      h('span', {}, message),
+      h('button', { type: 'button', class: 'text', onclick: take }, label),
+    );
+    this.element.append(this.#offer);
   }
 
   /** A message that goes after a while, or when clicked. */

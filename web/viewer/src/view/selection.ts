@@ -1,4 +1,4 @@
-import { isPunctualLight, type LumencastLight, type PunctualLight } from '@lumencast/three';
+import { isHidden, isPunctualLight, type LumencastLight, type PunctualLight } from '@lumencast/three';
 import {
   Box3,
   type Camera,
@@ -79,10 +79,10 @@ export class Selection {
     return this.#controls.mode as Gizmo;
   }
 
-  /** All lights of the scene. */
+  /** All lights of the scene that are not hidden. */
   get lights(): PunctualLight[] {
     const lights: PunctualLight[] = [];
-    this.content.traverse((object) => {
+    this.content.traverseVisible((object) => {
       if (isPunctualLight(object)) lights.push(object);
     });
     return lights;
@@ -131,7 +131,8 @@ export class Selection {
     this.#raycaster.setFromCamera(pointer, this.camera);
     const glyph = this.#raycaster.intersectObjects([...this.#glyphs.values()], false)[0];
     if (glyph) return glyph.object.userData.light as Object3D;
-    const hit = this.#raycaster.intersectObject(this.content, true)[0];
+    const hits = this.#raycaster.intersectObject(this.content, true);
+    const hit = hits.find(({ object }) => !isHidden(object));
     const node = hit && this.light.content.nodeOf(hit.object);
     const object = node === undefined ? undefined : this.light.content.object(node);
     return object && this.#isHandy(object) ? object : undefined;

@@ -1,0 +1,151 @@
+/**
+ * Pages of scenes that people have: without any light, with instances and hidden nodes, with files whose
+ * names are written in many ways.
+ */
+import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import type { Browser, Page } from 'playwright-core';
+import { afterAll, beforeAll, expect, it } from 'vitest';
+import { launchBrowser } from '../../testing/chromium.js';
+import { buildPage, draw, look, openPage, type Pixel, shoot } from './browser.js';
+import { freePort, lumencastProgram, Server } from './server.js';
+
+const VIEWPORT = { width: 800, height: 600 };
+const SCALE = { scale: '0.5' };
+
+const program = lumencastProgram();
+let folder: string;
+let page: string;
+let browser: Browser;
+
+beforeAll(async () => {
+  folder = mkdtempSync(join(tmpdir(), 'lumencast-files-'));
+  page = join(folder, 'page');
+  await buildPage(page);
+  browser = await launchBrowser();
+}, 180_000);
+
+afterAll(async () => {
+  await browser?.close();
+  rmSync(folder, { recursive: true, force: true });
+}, 30_000);
+
+/** A floor, white unless said otherwise, whose buffer stands at a URI, with other parts. */
+function writeScene(uri: string, parts: object = {}): string {
+  const corners = [-1, 0, -1, -1, 0, 1, 1, 0, 1, -1, 0, -1, 1, 0, 1, 1, 0, -1];
+  mkdirSync(join(folder, 'the data'), { recursive: true });
+  writeFileSync(join(folder, 'the data', 'café 50%.bin'), Float32Array.from(corners));
+  const scene = join(folder, 'floor.gltf');
+  const json = {
+    asset: { version: '2.0' },
+    buffers: [{ uri, byteLength: 72 }],
+    bufferViews: [{ buffer: 0, byteLength: 72 }],
+    accessors: [
+      { bufferView: 0, componentType: 5126, type: 'VEC3', count: 6, min: [-1, 0, -1], max: [1, 0, 1] },
+    ],
+    materials: [{ pbrMetallicRoughness: { metallicFactor: 0 }, doubleSided: true }],
+    meshes: [{ primitives: [{ attributes: { POSITION: 0 }, material: 0 }] }],
+    nodes: [{ mesh: 0 }],
+    scenes: [{ nodes: [0] }],
+    scene: 0,
+    ...parts,
+  };
+  // With a byte-order mark.
+  writeFileSync(scene, `\ufeff${JSON.stringify(json)}`);
+  return scene;
+}
+
+async function visit(scene: string, see: (page: Page) => Promise<void>): Promise<void> {
+  const options = ['--page', page, '--samples', '4..16', '--volume', '2x2x2@0,0.5,0:3,1.5,3'];
+  const server = await Server.start(program, scene, await freePort(), options);
+  const errors: string[] = [];
+  try {
+    const opened = await openPage(browser, server.address, VIEWPORT, SCALE, errors);
+    await see(opened);
+    expect(errors).toEqual([]);
+    await opened.close();
+  } finally {
+    await server.kill();
+  }
+}
+
+const brightness = (picture: readonly Pixel[]) =>
+  picture.reduce((total, [r, g, b]) => total + r + g + b, 0) / picture.length;
+
+it('offers a sky to a scene without light, by one click', async () => {
+  await visit(writeScene('the%20data\\caf%C3%A9%2050%25.bin'), async (page) => {
+    await draw(page);
+    expect(await page.textContent('.notice.offer')).toContain('Nothing in this scene gives light');
+    const dark = brightness(await look(page, 'both'));
+    await shoot(page, 'dark.png');
+    await page.click('.notice.offer button');
+    await page.waitForFunction(() => window.lumencast!.light.environment?.type === 'sky');
+    await expect.poll(() => draw(page).then(() => page.isVisible('.notice.offer'))).toBe(false);
+    await page.evaluate(() => window.lumencast!.viewer.meter());
+    expect(dark).toBeLessThan(3);
+    expect(brightness(await look(page, 'both'))).toBeGreaterThan(60);
+    await shoot(page, 'sky.png');
+  });
+}, 120_000);
+
+it('offers none where there is light', async () => {
+  const lit = { pbrMetallicRoughness: { metallicFactor: 0 }, emissiveFactor: [1, 1, 1] };
+  await visit(writeScene('the data//café 50%.bin', { materials: [lit] }), async (page) => {
+    await draw(page);
+    expect(await page.isVisible('.notice.offer')).toBe(false);
+  });
+}, 120_000);
+
+/** Three small floors in a row, and one in front of the camera that is hidden. */
+it('shows instances and no hidden nodes', async () => {
+  const instances = { EXT_mesh_gpu_instancing: { attributes: { TRANSLATION: 0, SCALE: 1 } } };
+  const hide = { KHR_node_visibility: { visible: false } };
+  const scene = writeScene('the data/café 50%.bin', {
+    extensionsUsed: ['EXT_mesh_gpu_instancing', 'KHR_node_visibility'],
+    // Of six instances in the corners of the floor's two triangles.
+    accessors: [
+      { bufferView: 0, componentType: 5126, type: 'VEC3', count: 6, min: [-1, 0, -1], max: [1, 0, 1] },
+      { componentType: 5126, type: 'VEC3', count: 6, bufferView: 1 },
+    ],
+    buffers: [
+      { uri: 'the data/café 50%.bin', byteLength: 72 },
+      {
+        uri: `data:;base64,${Buffer.from(Float32Array.from(new Array(18).fill(0.25)).buffer).toString('base64')}`,
+        byteLength: 72,
+      },
+    ],
+    bufferViews: [
+      { buffer: 0, byteLength: 72 },
+      { buffer: 1, byteLength: 72 },
+    ],
+    materials: [{ emissiveFactor: [1, 1, 1] }],
+    nodes: [
+      { mesh: 0, extensions: instances },
+      { mesh: 0, translation: [0, 50, 0], extensions: hide },
+    ],
+    scenes: [{ nodes: [0, 1] }],
+  });
+  await visit(scene, async (page) => {
+    const found = await page.evaluate(() => {
+      const { light, viewer, camera } = window.lumencast!;
+      const hidden = light.content.object(1)!;
+      const points = [
+        [-1, 0, -1],
+        [1, 0, 1],
+        [0, 0, 0],
+      ].map(([x, y, z]) => {
+        const at = camera.position.clone().set(x, y, z).project(camera);
+        return [((at.x + 1) / 2) * innerWidth, ((1 - at.y) / 2) * innerHeight] as const;
+      });
+      return { pixels: viewer.pixels(points), hidden: hidden.visible, height: camera.position.y };
+    });
+    const [near, far, between] = found.pixels.map(([r, g, b]) => r + g + b);
+    expect(Math.min(near, far)).toBeGreaterThan(100);
+    expect(between).toBeLessThan(30);
+    expect(found.hidden).toBe(false);
+    // What is hidden does not widen the view.
+    expect(found.height).toBeLessThan(20);
+    await shoot(page, 'instances.png');
+  });
+}, 120_000);
