@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::{Context, Result, anyhow, ensure};
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::Gather;
@@ -16,6 +17,7 @@ use lumencast_server::{FitOptions, GatherOptions, SampleRange, TickOptions};
 use lumencast_shade::Occlusion;
 
 use crate::environment::EnvironmentArgument;
+use crate::{output, warnings};
 
 /// The port of `serve` unless told otherwise.
 pub(crate) const DEFAULT_PORT: u16 = 4443;
@@ -24,7 +26,7 @@ pub(crate) const DEFAULT_PORT: u16 = 4443;
 #[derive(Debug, Args)]
 pub(crate) struct SceneSource {
     /// A glTF file (.gltf or .glb), or a built-in scene: cornell, door, tomb.
-    #[arg(value_name = "SCENE")]
+    #[arg(value_name = "SCENE", value_parser = scene_name())]
     pub(crate) scene: String,
     /// Light from all around in place of the scene's own: sky:LUX, a colour R,G,B in cd/m², or an
     /// .hdr or .exr file in the scene's folder.
@@ -33,13 +35,32 @@ pub(crate) struct SceneSource {
 }
 
 impl SceneSource {
+    /// The scene, with what there is to be said of it said.
     pub(crate) fn open(&self) -> Result<Scene> {
+        let spinner = output::spinner(format!("Loading {}", self.scene));
+        let scene = self.load();
+        spinner.finish_and_clear();
+        let scene = scene?;
+        warnings::left_out(&scene);
+        warnings::dark(&scene);
+        Ok(scene)
+    }
+
+    fn load(&self) -> Result<Scene> {
         let mut scene = Scene::open(&self.scene)?;
         if let Some(EnvironmentArgument(environment)) = self.environment.clone() {
             scene.apply(&Edit::SetEnvironment { environment }).context("--environment")?;
         }
         Ok(scene)
     }
+}
+
+/// Names are passed on as text, to servers and pages too.
+pub(crate) fn scene_name() -> impl TypedValueParser<Value = String> {
+    OsStringValueParser::new().try_map(|name| {
+        name.into_string()
+            .map_err(|name| format!("the name {} is not UTF-8; rename the file", name.display()))
+    })
 }
 
 /// Which scene, and where its probes are.

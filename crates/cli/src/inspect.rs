@@ -1,5 +1,6 @@
 //! `lumencast inspect`: what is in a saved light field, a running server or a scene.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -7,10 +8,11 @@ use clap::Args;
 use glam::Vec3;
 use lumencast_codec::{Catalog, LightFile, StateFrame};
 use lumencast_light::ProbeVolume;
-use lumencast_scene::Scene;
+use lumencast_scene::{MeshId, Scene};
 use serde_json::{Map, Value, json};
 
-use crate::{light_source, output, remote};
+use crate::arguments::scene_name;
+use crate::{light_source, output, remote, warnings};
 
 /// Says what is in a file (.light, .gltf, .glb), a built-in scene, or a running server.
 #[derive(Debug, Args)]
@@ -21,7 +23,7 @@ Examples:
   lumencast inspect http://127.0.0.1:4443/cornell --json")]
 pub(crate) struct Inspect {
     /// A file, the name of a built-in scene, or the address of a server's scene.
-    #[arg(value_name = "FILE|URL")]
+    #[arg(value_name = "FILE|URL", value_parser = scene_name())]
     what: String,
     /// Prints JSON only.
     #[arg(long)]
@@ -42,7 +44,7 @@ impl Inspect {
             let (file, volumes) = read().with_context(|| self.what.clone())?;
             light_report(&file.catalog, &volumes, bytes.len() as u64, None)
         } else {
-            scene_report(&Scene::open(&self.what)?)
+            scene_report(&mut Scene::open(&self.what)?)
         };
         if self.json {
             return output::json(&report);
@@ -128,22 +130,28 @@ fn c0_statistics(volume: &ProbeVolume) -> Value {
     })
 }
 
-fn scene_report(scene: &Scene) -> Value {
+fn scene_report(scene: &mut Scene) -> Value {
+    // What is drawn: of two scenes in a file the one that it names, with each of a node's instances.
+    let snapshot = scene.snapshot();
+    let triangles: usize = snapshot.instances.iter().map(|i| i.mesh.triangle_count()).sum();
     let nodes: Vec<Value> = scene
-        .nodes()
+        .drawn_nodes()
         .map(|n| json!({ "node": n.id, "name": n.name, "parent": n.parent, "mesh": n.mesh }))
         .collect();
     let lights: Vec<Value> = scene
-        .nodes()
+        .drawn_nodes()
         .filter_map(|node| {
             let light = node.light?;
             Some(json!({ "node": node.id, "name": node.name, "light": light }))
         })
         .collect();
-    let meshes: Vec<Value> = scene
-        .meshes()
-        .iter()
-        .map(|mesh| json!({ "name": mesh.name, "triangles": mesh.triangle_count() }))
+    let shown: BTreeSet<MeshId> = scene.drawn_nodes().filter_map(|node| node.mesh).collect();
+    let meshes: Vec<Value> = shown
+        .into_iter()
+        .filter_map(|id| Some((id, scene.meshes().get(id.0 as usize)?)))
+        .map(|(id, mesh)| {
+            json!({ "mesh": id, "name": mesh.name, "triangles": mesh.triangle_count() })
+        })
         .collect();
     let cameras: Vec<Value> = scene
         .cameras()
@@ -159,16 +167,14 @@ fn scene_report(scene: &Scene) -> Value {
         .animations()
         .map(|a| json!({ "animation": a.id, "name": a.name, "seconds": a.duration }))
         .collect();
-    let triangles: usize = scene
-        .nodes()
-        .filter_map(|node| scene.meshes().get(node.mesh?.0 as usize))
-        .map(|mesh| mesh.triangle_count())
-        .sum();
+    let dark = scene.is_dark().then(|| warnings::DARK.to_owned());
+    let warnings: Vec<String> = scene.warnings().iter().cloned().chain(dark).collect();
     let bounds = scene.bounds();
     json!({
         "scene": scene.name(),
         "root": scene.root_file(),
         "triangles": triangles,
+        "instances": snapshot.instances.len(),
         "bounds": { "min": bounds.min, "max": bounds.max },
         "nodes": nodes,
         "meshes": meshes,
@@ -179,7 +185,7 @@ fn scene_report(scene: &Scene) -> Value {
         "environment": scene.environment(),
         "volumes": scene.volumes(),
         "files": scene.files().into_iter().map(|file| file.name).collect::<Vec<_>>(),
-        "warnings": scene.warnings(),
+        "warnings": warnings,
     })
 }
 

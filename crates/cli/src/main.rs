@@ -21,6 +21,7 @@ mod render;
 mod serve;
 mod token;
 mod view;
+mod warnings;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

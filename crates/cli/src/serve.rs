@@ -11,7 +11,7 @@ use lumencast_transport::{Access, Key, Tls};
 use serde_json::json;
 
 use crate::arguments::{DEFAULT_PORT, GatherArguments, SceneArguments, TickArguments};
-use crate::{interrupt, output};
+use crate::interrupt;
 
 /// Loads a scene, computes its light continuously and casts it; serves the page that shows it.
 #[derive(Debug, Args)]
@@ -74,14 +74,12 @@ pub(crate) struct Serve {
 impl Serve {
     pub(crate) fn run(self) -> Result<()> {
         let network = self.network()?;
-        let spinner = output::spinner(format!("Loading {}", self.scene.source.scene));
         let scene = self.scene.source.open()?;
         let options = self.tick.options(&scene, &self.scene, &self.gather)?;
         let mut config = ServerConfig::new(network);
         config.tick = options;
         config.page = self.page.clone();
         let gatherer = self.gather.gatherer(Levels::Two)?;
-        spinner.finish_and_clear();
 
         let runtime = tokio::runtime::Builder::new_multi_thread()
             // The network needs little; the processor is for the light.
@@ -135,10 +133,6 @@ impl Serve {
             });
             println!("{ready}");
             return;
-        }
-        let scene = server.tick().scene();
-        for warning in scene.warnings() {
-            eprintln!("warning: {warning}");
         }
         println!("{}: {probes} probes at {} Hz", server.scene_name(), self.tick.rate);
         println!("{page}");

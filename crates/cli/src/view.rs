@@ -24,7 +24,7 @@ use crate::arguments::{
 };
 use crate::camera::{self, CameraArgument, parse_size};
 use crate::light_source::{self, is_address};
-use crate::output;
+use crate::{output, warnings};
 
 /// How long threads may take to end once the window is closed.
 const GRACE: Duration = Duration::from_secs(2);
@@ -171,13 +171,14 @@ impl View {
         }))?;
         bar.finish_and_clear();
         let scene = Scene::load(files.root())?;
+        warnings::left_out(&scene);
         Ok(world(session, scene))
     }
 
     /// A scene whose light is computed here, by a server of its own.
     fn here(&self, runtime: &Runtime) -> Result<(Box<dyn World>, Running)> {
-        let spinner = output::spinner(format!("Loading {}", self.scene.source.scene));
         let scene = self.scene.source.open()?;
+        let spinner = output::spinner("Starting to compute its light".into());
         let replica = scene.pristine(0.0);
         let loopback = std::net::SocketAddr::from(([127, 0, 0, 1], 0));
         let mut config = ServerConfig::new(lumencast_transport::ServerConfig::new(loopback));

@@ -104,6 +104,25 @@ impl Program {
         })
     }
 
+    /// What it says on standard error up to the line that holds a word.
+    #[track_caller]
+    pub fn stderr_until(&mut self, word: &str) -> String {
+        let stderr = self.0.stderr.take().expect("piped, and not taken yet");
+        let (send, lines) = mpsc::channel();
+        thread::spawn(move || {
+            for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+                let _ = send.send(line);
+            }
+        });
+        let mut said = String::new();
+        while !said.contains(word) {
+            let line = lines.recv_timeout(PATIENCE);
+            said += &line.unwrap_or_else(|_| panic!("{word:?} is never said: {said}"));
+            said.push('\n');
+        }
+        said
+    }
+
     /// Waits for its end.
     #[track_caller]
     pub fn wait(&mut self) -> ExitStatus {

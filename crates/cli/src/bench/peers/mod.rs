@@ -22,7 +22,7 @@ use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading};
 use super::{cells, draw};
 use crate::arguments::{Reading, ReadingArguments, VolumeArgument};
 use crate::light_source::Computed;
-use crate::{camera, output};
+use crate::{camera, output, warnings};
 use judge::Judge;
 use reference::References;
 use report::{Fault, Field, Report, Table};
@@ -122,6 +122,7 @@ impl BenchPeers {
         let path = self.scenes.join(subject.file);
         let reference = self.references.read(subject, &path)?;
         let mut scene = Scene::open(&path.to_string_lossy())?;
+        warnings::left_out(&scene);
         let view = camera::view(&scene, None)?;
         let snapshot = scene.snapshot();
         let judge = Judge::new(reference, covered(renderer, &snapshot, view, settings)?)?;

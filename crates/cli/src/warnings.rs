@@ -1,0 +1,29 @@
+//! What every command that reads a scene says of it, on standard error.
+
+use lumencast_scene::Scene;
+
+/// How many lines there are at most.
+const SHOWN: usize = 20;
+
+/// Said where nothing gives light.
+pub(crate) const DARK: &str =
+    "nothing in the scene gives light; --environment sky:1000 puts it under a sky";
+
+/// Says what of a scene's files is left out, and what was mended.
+pub(crate) fn left_out(scene: &Scene) {
+    let warnings = scene.warnings();
+    for warning in warnings.iter().take(SHOWN) {
+        eprintln!("warning: {warning}");
+    }
+    if warnings.len() > SHOWN {
+        let more = warnings.len() - SHOWN;
+        eprintln!("warning: {more} more like these; `lumencast inspect --json` lists all");
+    }
+}
+
+/// Says where a scene comes out black, and what to do.
+pub(crate) fn dark(scene: &Scene) {
+    if scene.is_dark() {
+        eprintln!("warning: {DARK}");
+    }
+}
