@@ -11,6 +11,7 @@ import {
 } from 'three';
 import { type GLTF, GLTFLoader, type GLTFReference } from 'three/addons/loaders/GLTFLoader.js';
 import { blankPadding, completeNodes } from './exported.js';
+import { SpecularGlossiness } from './glossiness.js';
 import { isPunctualLight, type PunctualLight } from './lights.js';
 import { copyParts } from './materials.js';
 import { materialsOf } from './patch.js';
@@ -170,7 +171,8 @@ export async function loadGltf(
     .setResponseType('arraybuffer')
     .loadAsync(url, (event) => progress?.(event.loaded, event.lengthComputable ? event.total : undefined));
   const folder = LoaderUtils.extractUrlBase(url);
-  const gltf = await new GLTFLoader().parseAsync(blankPadding(file as ArrayBuffer), folder);
+  const loader = new GLTFLoader().register((parser) => new SpecularGlossiness(parser));
+  const gltf = await loader.parseAsync(blankPadding(file as ArrayBuffer), folder);
   if (gltf.scenes.length > 1) await nameNodes(gltf);
   // Matrices decompose into what edits set.
   gltf.scene.traverse((object) => void (object.matrixAutoUpdate = true));

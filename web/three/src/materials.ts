@@ -22,7 +22,7 @@ export const MATERIAL_PARTS: readonly Part[] = [
 const PHYSICAL: ReadonlySet<Part> = new Set<Part>(['transmission', 'ior', 'specular', 'specular_color']);
 
 /** Stands for an infinite index of refraction, as in GLTFLoader. */
-const INFINITE_IOR = 1000;
+export const INFINITE_IOR = 1000;
 
 /** A part of a material as edits have it; `undefined` where the material has no such thing. */
 export function materialPart(material: Material | undefined, part: Part): unknown {

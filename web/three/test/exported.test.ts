@@ -1,8 +1,17 @@
 /** What exporters write besides plain glTF, as GLTFLoader reads it: numbers that edits know, and what is hidden. */
-import { type InstancedMesh, Matrix4, type Mesh, Scene, type SkinnedMesh, Vector3 } from 'three';
+import {
+  type InstancedMesh,
+  Matrix4,
+  type Mesh,
+  type MeshPhysicalMaterial,
+  Scene,
+  type SkinnedMesh,
+  Vector3,
+} from 'three';
 import { afterEach, describe, expect, it, vi } from 'vitest';
 import { blankPadding, isHidden } from '../src/exported.js';
 import { loadGltf } from '../src/content.js';
+import { roughen } from '../src/glossiness.js';
 import { Replica } from '../src/replica.js';
 import { nameOf, sceneFile } from '../src/light.js';
 import { glbUrl, JOINTS, load, POSITION, WEIGHTS } from './support/glb.js';
@@ -122,6 +131,44 @@ describe('a skin of more than four joints a vertex', () => {
     // One whole weight in either set: half of each.
     expect([0, 1, 2, 3].map((i) => skinWeight.getComponent(0, i))).toEqual([0.5, 0.5, 0, 0]);
     expect(joints_1).toBeUndefined();
+  });
+});
+
+describe('specular-glossiness', () => {
+  it('is a dielectric of a coloured reflection', async () => {
+    const gloss = {
+      diffuseFactor: [1, 0, 0.5, 0.25],
+      specularFactor: [0, 0.5, 1],
+      glossinessFactor: 0.25,
+    };
+    const { replica } = await replicaOf({
+      extensionsUsed: ['KHR_materials_pbrSpecularGlossiness'],
+      scenes: [{ nodes: [0] }],
+      nodes: [{ mesh: 0 }],
+      meshes: [{ primitives: [{ attributes: { POSITION }, material: 0 }] }],
+      materials: [
+        {
+          alphaMode: 'BLEND',
+          pbrMetallicRoughness: { baseColorFactor: [0, 1, 0, 1] },
+          extensions: { KHR_materials_pbrSpecularGlossiness: gloss },
+        },
+        { pbrMetallicRoughness: { metallicFactor: 0.5 } },
+      ],
+    });
+    const material = replica.content.materials(0)[0] as MeshPhysicalMaterial;
+    expect(material.isMeshPhysicalMaterial).toBe(true);
+    expect([...material.color.toArray(), material.opacity]).toEqual(gloss.diffuseFactor);
+    expect(material.specularColor.toArray()).toEqual(gloss.specularFactor);
+    expect([material.metalness, material.roughness, material.specularIntensity]).toEqual([0, 0.75, 1]);
+    // Reflection at normal incidence is the colour itself.
+    expect(((material.ior - 1) / (material.ior + 1)) ** 2).toBeGreaterThan(0.99);
+  });
+
+  it('has the server’s roughness', () => {
+    const texels = Uint8ClampedArray.from([200, 100, 50, 102, 9, 9, 9, 255]);
+    expect(roughen(texels, 0.5)).toBe(true);
+    expect([...texels]).toEqual([0, 204, 0, 255, 0, 128, 0, 255]);
+    expect(roughen(Uint8ClampedArray.from([1, 2, 3, 255]), 1)).toBe(false);
   });
 });
 

@@ -5,6 +5,7 @@
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
+import { crc32, deflateSync } from 'node:zlib';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
@@ -94,6 +95,57 @@ it('offers none where there is light', async () => {
   await visit(writeScene('the data//café 50%.bin', { materials: [lit] }), async (page) => {
     await draw(page);
     expect(await page.isVisible('.notice.offer')).toBe(false);
+  });
+}, 120_000);
+
+/** A PNG of a row of texels: red, green, blue, alpha. */
+function png(...texels: readonly (readonly number[])[]): string {
+  const word = (value: number) => Buffer.from([value >>> 24, value >>> 16, value >>> 8, value]);
+  const chunk = (kind: string, body: Buffer) => {
+    const checked = Buffer.concat([Buffer.from(kind), body]);
+    return [word(body.length), checked, word(crc32(checked))];
+  };
+  const header = Buffer.concat([word(texels.length), word(1), Buffer.from([8, 6, 0, 0, 0])]);
+  const row = deflateSync(Buffer.from([0, ...texels.flat()]));
+  const signature = Buffer.from([0x89, 0x50, 0x4e, 0x47, 13, 10, 26, 10]);
+  const parts = [...chunk('IHDR', header), ...chunk('IDAT', row), ...chunk('IEND', Buffer.alloc(0))];
+  return `data:image/png;base64,${Buffer.concat([signature, ...parts]).toString('base64')}`;
+}
+
+it('shows the roughness of specular-glossiness', async () => {
+  const specularGlossinessTexture = { index: 0, extensions: { KHR_texture_transform: { offset: [0.5, 0] } } };
+  const gloss = { glossinessFactor: 0.5, specularGlossinessTexture };
+  const scene = writeScene('the data/café 50%.bin', {
+    extensionsUsed: ['KHR_materials_pbrSpecularGlossiness', 'KHR_texture_transform'],
+    materials: [{ emissiveFactor: [1, 1, 1], extensions: { KHR_materials_pbrSpecularGlossiness: gloss } }],
+    images: [{ uri: png([200, 100, 50, 102], [10, 20, 30, 255]) }],
+    textures: [{ source: 0 }],
+  });
+  await visit(scene, async (page) => {
+    const found = await page.evaluate(() => {
+      const texelsOf = (image: CanvasImageSource) => {
+        const canvas = document.createElement('canvas');
+        [canvas.width, canvas.height] = [2, 1];
+        const context = canvas.getContext('2d')!;
+        context.drawImage(image, 0, 0);
+        return [...context.getImageData(0, 0, 2, 1).data];
+      };
+      const material = window.lumencast!.light.content.materials(0)[0] as unknown as {
+        roughnessMap: { image: CanvasImageSource; offset: { x: number } };
+        specularColorMap: { image: CanvasImageSource };
+        roughness: number;
+      };
+      const { roughnessMap, specularColorMap, roughness } = material;
+      return {
+        rough: texelsOf(roughnessMap.image),
+        specular: texelsOf(specularColorMap.image),
+        offset: roughnessMap.offset.x,
+        roughness,
+      };
+    });
+    expect(found.rough).toEqual([0, 204, 0, 255, 0, 128, 0, 255]);
+    expect(found.specular.slice(4)).toEqual([10, 20, 30, 255]);
+    expect([found.offset, found.roughness]).toEqual([0.5, 1]);
   });
 }, 120_000);
 

@@ -302,6 +302,30 @@ pub(super) struct MaterialExtensions {
     pub(super) ior: Option<Ior>,
     #[serde(rename = "KHR_materials_specular")]
     pub(super) specular: Option<Specular>,
+    #[serde(rename = "KHR_materials_pbrSpecularGlossiness")]
+    pub(super) glossiness: Option<SpecularGlossiness>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct SpecularGlossiness {
+    pub(super) diffuse_factor: [f32; 4],
+    pub(super) diffuse_texture: Option<TextureInfo>,
+    pub(super) specular_factor: [f32; 3],
+    pub(super) glossiness_factor: f32,
+    pub(super) specular_glossiness_texture: Option<TextureInfo>,
+}
+
+impl Default for SpecularGlossiness {
+    fn default() -> Self {
+        Self {
+            diffuse_factor: [1.0; 4],
+            diffuse_texture: None,
+            specular_factor: [1.0; 3],
+            glossiness_factor: 1.0,
+            specular_glossiness_texture: None,
+        }
+    }
 }
 
 #[derive(Debug, Deserialize)]

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 
 use glam::{Vec3, Vec4};
 
-use super::json;
 use super::texture::{Images, image_of};
+use super::{glossiness, json};
 use crate::error::{At, Fault, invalid};
-use crate::limits;
+use crate::limits::{self, Budget};
 use crate::material::{AlphaMode, Material};
 
 /// Indices of the images that materials show.
@@ -24,9 +24,13 @@ pub(super) fn images_used(root: &json::Root) -> Result<Vec<usize>, Fault> {
 fn textures(m: &json::Material) -> impl Iterator<Item = &json::TextureInfo> {
     let pbr = &m.pbr_metallic_roughness;
     let specular = m.extensions.specular.as_ref();
+    let [first, second] = match &m.extensions.glossiness {
+        Some(gloss) => [&gloss.diffuse_texture, &gloss.specular_glossiness_texture],
+        None => [&pbr.base_color_texture, &pbr.metallic_roughness_texture],
+    };
     [
-        pbr.base_color_texture.as_ref(),
-        pbr.metallic_roughness_texture.as_ref(),
+        first.as_ref(),
+        second.as_ref(),
         m.normal_texture.as_ref().map(|n| &n.info),
         m.occlusion_texture.as_ref().map(|o| &o.info),
         m.emissive_texture.as_ref(),
@@ -76,13 +80,14 @@ impl UvSets {
 pub(super) fn read(
     root: &json::Root,
     images: &Images,
+    budget: &Budget,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Material>, Fault> {
     let mut materials = Vec::with_capacity(root.materials.len() + 1);
     for (index, json) in root.materials.iter().enumerate() {
         let first = warnings.len();
         let place = || describe(index, &json.name);
-        materials.push(read_material(root, json, images, warnings).at(place)?);
+        materials.push(read_material(root, json, images, budget, warnings).at(place)?);
         warnings[first..].iter_mut().for_each(|w| *w = format!("{}: {w}", place()));
     }
     materials.push(Material { name: "default".into(), ..Material::default() });
@@ -97,6 +102,7 @@ fn read_material(
     root: &json::Root,
     json: &json::Material,
     images: &Images,
+    budget: &Budget,
     warnings: &mut Vec<String>,
 ) -> Result<Material, Fault> {
     let pbr = &json.pbr_metallic_roughness;
@@ -109,10 +115,8 @@ fn read_material(
     let mut material = Material {
         name: json.name.clone(),
         base_color: Vec4::from(pbr.base_color_factor),
-        base_color_texture: texture(pbr.base_color_texture.as_ref())?,
         metallic: pbr.metallic_factor,
         roughness: pbr.roughness_factor,
-        metallic_roughness_texture: texture(pbr.metallic_roughness_texture.as_ref())?,
         normal_texture: texture(json.normal_texture.as_ref().map(|n| &n.info))?,
         normal_scale: json.normal_texture.as_ref().map_or(1.0, |n| n.scale),
         occlusion_texture: texture(json.occlusion_texture.as_ref().map(|o| &o.info))?,
@@ -135,6 +139,15 @@ fn read_material(
         material.specular_texture = texture(specular.specular_texture.as_ref())?;
         material.specular_color = Vec3::from(specular.specular_color_factor);
         material.specular_color_texture = texture(specular.specular_color_texture.as_ref())?;
+    }
+    if let Some(gloss) = &extensions.glossiness {
+        let infos = [&gloss.diffuse_texture, &gloss.specular_glossiness_texture];
+        let [diffuse, specular] = infos.map(|info| texture(info.as_ref()));
+        glossiness::apply(&mut material, gloss, [diffuse?, specular?], budget)?;
+    } else {
+        material.base_color_texture = texture(pbr.base_color_texture.as_ref())?;
+        let info = pbr.metallic_roughness_texture.as_ref();
+        material.metallic_roughness_texture = texture(info)?;
     }
     check(&mut material)?;
     Ok(material)

@@ -5,6 +5,7 @@
 
 mod accessor;
 mod animation;
+mod glossiness;
 mod instancing;
 mod json;
 mod material;
@@ -35,6 +36,7 @@ const KNOWN: &[&str] = &[
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
@@ -81,7 +83,7 @@ fn read(bytes: Vec<u8>, folder: Option<&Folder>, budget: &Budget) -> Result<Asse
     let accessors = Accessors { root: &root, buffers: &buffers, budget };
 
     let images = texture::read_images(accessors, folder, &material::images_used(&root)?)?;
-    let materials = material::read(&root, &images, &mut warnings)?;
+    let materials = material::read(&root, &images, budget, &mut warnings)?;
     let meshes = read_meshes(accessors, &materials, &mut warnings)?;
     let lights = node::lights(&root, &mut warnings)?;
     let mut nodes = node::read(&root, &lights, &mut warnings)?;

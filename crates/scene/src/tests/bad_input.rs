@@ -18,7 +18,10 @@ fn rich() -> Vec<u8> {
         json!({ "bufferView": joints, "componentType": 5121, "type": "VEC4", "count": 3 }),
     );
     let matrices = w.floats("MAT4", &glam::Mat4::IDENTITY.to_cols_array());
-    let attributes = json!({ "POSITION": positions, "JOINTS_0": joints, "WEIGHTS_0": weights });
+    let attributes = json!({
+        "POSITION": positions, "JOINTS_0": joints, "WEIGHTS_0": weights,
+        "JOINTS_1": joints, "WEIGHTS_1": weights,
+    });
     let primitive = json!({ "attributes": attributes, "targets": [{ "POSITION": positions }] });
     w.add("meshes", json!({ "primitives": [primitive] }));
     w.add("skins", json!({ "joints": [0], "inverseBindMatrices": matrices }));
@@ -31,7 +34,13 @@ fn rich() -> Vec<u8> {
     let image = w.view(&png(2, 2));
     w.add("images", json!({ "bufferView": image, "mimeType": "image/png" }));
     w.add("textures", json!({ "source": 0 }));
-    w.add("materials", json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }));
+    let texture = json!({ "index": 0, "texCoord": 2 });
+    w.add("materials", json!({ "pbrMetallicRoughness": { "baseColorTexture": texture } }));
+    let turns = w.floats("VEC4", &[0.0, 0.0, 0.0, 1.0].repeat(3));
+    let places = json!({ "TRANSLATION": positions, "ROTATION": turns, "SCALE": positions });
+    let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": places } });
+    w.node(json!({ "mesh": 0, "extensions": instancing }));
+    w.node(json!({ "mesh": 0, "extensions": { "KHR_node_visibility": { "visible": false } } }));
     w.finish(
         json!({ "lumencast": { "environment": { "type": "constant", "radiance": [1, 1, 1] } } }),
     )

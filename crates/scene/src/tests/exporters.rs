@@ -341,3 +341,51 @@ fn later_texture_coordinates_are_read() {
     assert!(warning.contains("material 0: texture 0 is left out: it uses TEXCOORD_2"), "{warning}");
     assert_eq!(read(&scene, &scene.materials()[0].normal_texture), 4.0);
 }
+
+/// Specular and glossiness by what there is of metalness and roughness: where the picture's alpha is
+/// 102/255, a glossiness of 0.5 · 0.4.
+#[test]
+fn specular_glossiness_is_read() {
+    let of = |gloss: Value| {
+        let mut w = triangle();
+        let picture = image::RgbaImage::from_pixel(2, 2, image::Rgba([200, 100, 50, 102]));
+        let mut png = std::io::Cursor::new(Vec::new());
+        image::DynamicImage::from(picture)
+            .write_to(&mut png, image::ImageFormat::Png)
+            .expect("encodes");
+        for png in [png.into_inner(), super::bad_input::png(2, 2)] {
+            let view = w.view(&png);
+            let source = w.add("images", json!({ "bufferView": view }));
+            w.add("textures", json!({ "source": source }));
+        }
+        w.add("extensionsUsed", "KHR_materials_pbrSpecularGlossiness".into());
+        let beside = json!({ "baseColorTexture": { "index": 1 }, "metallicFactor": 1.0 });
+        let extensions = json!({ "KHR_materials_pbrSpecularGlossiness": gloss });
+        w.add("materials", json!({ "pbrMetallicRoughness": beside, "extensions": extensions }));
+        let scene = load(w);
+        assert_eq!(scene.warnings(), [""; 0]);
+        scene.materials()[0].clone()
+    };
+    let plain = of(json!({
+        "diffuseFactor": [1.0, 0.0, 0.5, 0.25], "specularFactor": [0.0, 0.5, 1.0], "glossinessFactor": 0.25,
+    }));
+    assert_eq!(plain.base_color.to_array(), [1.0, 0.0, 0.5, 0.25]);
+    assert_eq!((plain.metallic, plain.roughness, plain.ior), (0.0, 0.75, 0.0));
+    assert_eq!((plain.specular, plain.specular_color), (1.0, Vec3::new(0.0, 0.5, 1.0)));
+    assert!(plain.base_color_texture.is_none() && plain.metallic_roughness_texture.is_none());
+
+    let textured = of(json!({
+        "glossinessFactor": 0.5, "specularGlossinessTexture": { "index": 0 },
+        "diffuseTexture": { "index": 1 },
+    }));
+    let texel = |texture: &Option<crate::TextureRef>| {
+        texture.as_ref().map(|texture| texture.image.texels[0])
+    };
+    assert_eq!(texel(&textured.base_color_texture), Some([10, 10, 10, 255]));
+    assert_eq!(texel(&textured.specular_color_texture), Some([200, 100, 50, 102]));
+    assert_eq!(texel(&textured.metallic_roughness_texture), Some([0, 204, 0, 255]));
+    assert_eq!(textured.roughness, 1.0);
+    // Where alpha is 1 everywhere there is nothing to vary.
+    let even = of(json!({ "specularGlossinessTexture": { "index": 1 } }));
+    assert!(even.metallic_roughness_texture.is_none() && even.roughness == 0.0);
+}
