@@ -1,6 +1,6 @@
 //! Files: PNG, JPEG and OpenEXR written; PNG, OpenEXR and Radiance HDR read.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::Path;
 
@@ -12,6 +12,7 @@ use image::{
 };
 
 use crate::tone::{gamma_code, linear_from_srgb};
+use crate::whole::write_whole;
 use crate::{Picture, PictureError, ToneMap};
 
 /// The longest side that is read, pixels.
@@ -100,7 +101,7 @@ impl Picture {
         exposure: f32,
     ) -> Result<(), PictureError> {
         let image = self.coded(tone_map, exposure);
-        write_whole(path.as_ref(), |out| image.write_with_encoder(PngEncoder::new(out)))
+        save(path.as_ref(), |out| image.write_with_encoder(PngEncoder::new(out)))
     }
 
     /// Writes a JPEG for documents, a tenth of a PNG's size, shown by `tone_map` after a factor of
@@ -116,7 +117,7 @@ impl Picture {
         exposure: f32,
     ) -> Result<(), PictureError> {
         let image = self.coded(tone_map, exposure);
-        write_whole(path.as_ref(), |out| {
+        save(path.as_ref(), |out| {
             image.write_with_encoder(JpegEncoder::new_with_quality(out, JPEG_QUALITY))
         })
     }
@@ -138,7 +139,7 @@ impl Picture {
     pub fn write_exr(&self, path: impl AsRef<Path>) -> Result<(), PictureError> {
         let bytes: Vec<u8> =
             self.pixels().iter().flat_map(|p| p.to_array()).flat_map(f32::to_ne_bytes).collect();
-        write_whole(path.as_ref(), |out| {
+        save(path.as_ref(), |out| {
             OpenExrEncoder::new(out).write_image(
                 &bytes,
                 self.width(),
@@ -156,31 +157,16 @@ fn from_image(decoded: DynamicImage) -> Result<Picture, PictureError> {
     Picture::new(width, height, pixels)
 }
 
-/// Writes a file beside `path` and renames it to that, so that there is a whole file or none.
-fn write_whole(
+/// Writes a picture's file.
+fn save(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<(), ImageError>,
 ) -> Result<(), PictureError> {
-    let fail = |source| PictureError::Write { file: path.into(), source };
-    let Some(name) = path.file_name() else {
-        return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, "it has no file name")));
-    };
-    let mut temporary = std::ffi::OsString::from(".");
-    temporary.push(name);
-    temporary.push(format!(".{}.tmp", std::process::id()));
-    let temporary = path.with_file_name(temporary);
-    let written = || -> io::Result<()> {
-        let mut out = BufWriter::new(File::create(&temporary)?);
-        write(&mut out).map_err(|e| match e {
+    let written = write_whole(path, |out| {
+        write(out).map_err(|e| match e {
             ImageError::IoError(e) => e,
             e => io::Error::other(e),
-        })?;
-        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-        fs::rename(&temporary, path)
-    };
-    written().map_err(|source| {
-        // What is left of it is of no use; that it may not be there is no second fault.
-        let _ = fs::remove_file(&temporary);
-        fail(source)
-    })
+        })
+    });
+    written.map_err(|source| PictureError::Write { file: path.into(), source })
 }

@@ -36,6 +36,7 @@ mod picture;
 mod plane;
 mod ssim;
 mod tone;
+mod whole;
 
 pub use compare::{Comparison, compare};
 pub use difference::{mse, psnr, relative_mse};
@@ -47,3 +48,4 @@ pub use pair::Pair;
 pub use picture::{Picture, exposure, luminance};
 pub use ssim::ssim;
 pub use tone::{ToneMap, gamma_code, linear_from_srgb, srgb_from_linear};
+pub use whole::{check_place, write_whole};
