@@ -12,7 +12,7 @@ use lumencast_gather::Gather;
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Levels, MaterialModel, Options};
 use lumencast_light::{Grid, Offset, Order};
-use lumencast_scene::{Edit, Scene, Script, VolumeSpec};
+use lumencast_scene::{Edit, FileContents, Scene, Script, VolumeSpec};
 use lumencast_server::{FitOptions, GatherOptions, SampleRange, TickOptions};
 use lumencast_shade::Occlusion;
 
@@ -52,6 +52,16 @@ impl SceneSource {
             scene.apply(&Edit::SetEnvironment { environment }).context("--environment")?;
         }
         Ok(scene)
+    }
+
+    /// The files that the opened scene was read from.
+    pub(crate) fn files(&self, scene: &Scene) -> Vec<PathBuf> {
+        let settings = Path::new(&self.scene).with_extension("lumencast.toml");
+        let referred = scene.files().into_iter().filter_map(|file| match file.contents {
+            FileContents::Path(path) => Some(path),
+            FileContents::Bytes(_) => None,
+        });
+        referred.chain([settings]).collect()
     }
 }
 
@@ -215,7 +225,7 @@ pub(crate) struct TickArguments {
     feedback: bool,
     /// A script of edits (JSON lines, {"at": seconds, "edit": …}), played by scene time.
     #[arg(long, value_name = "FILE")]
-    edits: Option<PathBuf>,
+    pub(crate) edits: Option<PathBuf>,
 }
 
 impl TickArguments {

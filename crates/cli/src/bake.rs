@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use lumencast_codec::{Epoch, LightFile, SceneInfo, UpdateInfo};
 use lumencast_gather::blend::BlendSettings;
@@ -10,7 +10,10 @@ use lumencast_gather::path_trace::Levels;
 use serde_json::json;
 
 use crate::arguments::{GatherArguments, SceneArguments, source};
-use crate::output;
+use crate::{
+    out_file,
+    output::{self, say},
+};
 
 /// Computes a scene's light until it has converged and writes it to a file.
 #[derive(Debug, Args)]
@@ -39,8 +42,9 @@ pub(crate) struct Bake {
 
 impl Bake {
     pub(crate) fn run(self) -> Result<()> {
-        output::check_file(&self.output)?;
+        out_file::check(&self.output)?;
         let mut scene = self.scene.source.open()?;
+        out_file::check_apart([&self.output], &self.scene.source.files(&scene))?;
         let volumes = self.scene.volumes(&scene)?;
         let snapshot = scene.snapshot();
         let mut gatherer = self.gather.gatherer(Levels::One)?;
@@ -65,8 +69,7 @@ impl Bake {
         };
         let source = format!("{}, baked, {} samples", source(&options), self.samples);
         let bytes = LightFile::of_volumes(Epoch(0), info, 1.0, &source, &light, at).write();
-        std::fs::write(&self.output, &bytes)
-            .with_context(|| format!("cannot write {}", self.output.display()))?;
+        out_file::write(&self.output, &bytes)?;
         let probes: usize = light.iter().map(|volume| volume.grid.probe_count()).sum();
         if self.json {
             return output::json(&json!({
@@ -74,7 +77,7 @@ impl Bake {
                 "probes": probes, "samples": self.samples,
             }));
         }
-        println!(
+        say!(
             "{}: fields: {}, probes: {probes}, {}",
             self.output.display(),
             light.len(),

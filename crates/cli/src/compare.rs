@@ -8,7 +8,10 @@ use lumencast_picture::{Comparison, Loaded, PIXELS_PER_DEGREE, ToneMap, compare}
 use serde_json::{Value, json};
 
 use crate::arguments::Exposure;
-use crate::output;
+use crate::{
+    out_file,
+    output::{self, say},
+};
 
 /// Says how far a picture is from a reference: PSNR, FLIP, SSIM, MSE (.png, .exr, .hdr).
 #[derive(Debug, Args)]
@@ -62,6 +65,8 @@ impl Compare {
         if let Some(output) = &self.output {
             let is_png = output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
             ensure!(is_png, "{}: the difference is written as PNG; name it so", output.display());
+            out_file::check(output)?;
+            out_file::check_apart([output], &[self.reference.clone(), self.picture.clone()])?;
         }
         let (reference, picture) = (Loaded::read(&self.reference)?, Loaded::read(&self.picture)?);
         let found = compare(&reference, &picture, self.exposure.0, self.ppd)
@@ -72,19 +77,19 @@ impl Compare {
         if self.json {
             return output::json(&self.report(&reference, &found));
         }
-        println!("PSNR          {:.3} dB", found.psnr);
-        println!("  unclamped   {:.3} dB", found.psnr_unclamped);
-        println!("FLIP          {:.5}", found.flip.mean());
+        say!("PSNR          {:.3} dB", found.psnr);
+        say!("  unclamped   {:.3} dB", found.psnr_unclamped);
+        say!("FLIP          {:.5}", found.flip.mean());
         if let Some(hdr) = &found.flip_hdr {
-            print!("HDR-FLIP      {:.5}", hdr.map.mean());
-            println!("   {} exposures, 2^{:.2} to 2^{:.2}", hdr.exposures, hdr.start, hdr.stop);
+            let range = format!("2^{:.2} to 2^{:.2}", hdr.start, hdr.stop);
+            say!("HDR-FLIP      {:.5}   {} exposures, {range}", hdr.map.mean(), hdr.exposures);
         }
         if let Some(ssim) = found.ssim {
-            println!("SSIM          {ssim:.5}");
+            say!("SSIM          {ssim:.5}");
         }
-        println!("MSE           {:.4e}", found.mse);
-        println!("relative MSE  {:.4e}", found.relative_mse);
-        println!("exposure      {}", found.exposure);
+        say!("MSE           {:.4e}", found.mse);
+        say!("relative MSE  {:.4e}", found.relative_mse);
+        say!("exposure      {}", found.exposure);
         Ok(())
     }
 

@@ -12,7 +12,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::arguments::DEFAULT_PORT;
-use crate::output;
+use crate::output::{self, say};
 
 /// Says what this machine offers: system, processor, drivers, adapters, port, programs.
 #[derive(Debug, Args)]
@@ -71,36 +71,36 @@ fn print_report(report: &Value) {
     };
     let yes = |pointer: &str| report.pointer(pointer).and_then(Value::as_bool) == Some(true);
 
-    println!("lumencast   {}", text("/lumencast"));
+    say!("lumencast   {}", text("/lumencast"));
     let page = if yes("/page") { "compiled in" } else { "not compiled in: build web/viewer first" };
-    println!("page        {page}");
-    println!("system      {}, kernel {}", text("/system/name"), text("/system/kernel"));
-    println!(
+    say!("page        {page}");
+    say!("system      {}, kernel {}", text("/system/name"), text("/system/kernel"));
+    say!(
         "processor   {}, {} cores, rays are traced with {}",
         text("/processor/name"),
         text("/processor/cores"),
         text("/processor/rays"),
     );
-    println!("memory      {} GiB", text("/system/memory_gib"));
+    say!("memory      {} GiB", text("/system/memory_gib"));
     for driver in report["drivers"].as_array().into_iter().flatten() {
-        println!("driver      {}", driver.as_str().unwrap_or_default());
+        say!("driver      {}", driver.as_str().unwrap_or_default());
     }
     match report["adapters"].as_array().map(Vec::as_slice) {
-        None => println!("adapter     unknown: a driver crashed or did not answer"),
-        Some([]) => println!("adapter     none; light is computed on the processor without one"),
+        None => say!("adapter     unknown: a driver crashed or did not answer"),
+        Some([]) => say!("adapter     none; light is computed on the processor without one"),
         Some(adapters) => adapters.iter().for_each(print_adapter),
     }
-    println!("port {DEFAULT_PORT}   {}", text("/port/state"));
+    say!("port {DEFAULT_PORT}   {}", text("/port/state"));
     for program in report["programs"].as_array().into_iter().flatten() {
         let version = program["version"].as_str().unwrap_or("not found");
         let name = program["name"].as_str().unwrap_or_default();
-        println!("{name:<11} {version} ({})", program["purpose"].as_str().unwrap_or_default());
+        say!("{name:<11} {version} ({})", program["purpose"].as_str().unwrap_or_default());
     }
 }
 
 fn print_adapter(adapter: &Value) {
     let text = |key: &str| adapter[key].as_str().unwrap_or_default();
-    println!(
+    say!(
         "adapter     {} ({}, {}, driver {} {}), ray query {}",
         text("name"),
         text("kind"),

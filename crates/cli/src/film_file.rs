@@ -13,6 +13,8 @@ use anyhow::{Context, Result};
 use glam::{UVec2, Vec3};
 use lumencast_gather::reference::Film;
 
+use crate::{out_file, output::tell};
+
 const MAGIC: &[u8] = b"lumencast picture 2\n";
 
 /// A film that grows is written at least so often.
@@ -30,11 +32,7 @@ pub(crate) fn write(path: &Path, key: u64, film: &Film) -> Result<()> {
         sum.to_array().iter().for_each(|v| bytes.extend(v.to_le_bytes()));
     }
     bytes.extend(hash(&bytes).to_le_bytes());
-    let mut temporary = path.as_os_str().to_owned();
-    temporary.push(".tmp");
-    fs::write(&temporary, bytes)
-        .and_then(|()| fs::rename(&temporary, path))
-        .with_context(|| format!("cannot keep the picture so far in {}", path.display()))
+    out_file::write(path, &bytes).context("cannot keep the picture so far")
 }
 
 /// The film to go on with: that of a file, or else one of so many `planned` samples. Says which where
@@ -42,12 +40,12 @@ pub(crate) fn write(path: &Path, key: u64, film: &Film) -> Result<()> {
 pub(crate) fn begun(path: &Path, key: u64, size: UVec2, planned: u32) -> Film {
     match read(path, key, size) {
         Some(film) => {
-            eprintln!("Going on from {} samples in {}.", film.samples(), path.display());
+            tell!("Going on from {} samples in {}.", film.samples(), path.display());
             film
         }
         None => {
             if path.exists() {
-                eprintln!(
+                tell!(
                     "{} belongs to another picture or is damaged: beginning anew.",
                     path.display()
                 );

@@ -11,8 +11,11 @@ use lumencast_light::ProbeVolume;
 use lumencast_scene::{MeshId, Scene};
 use serde_json::{Map, Value, json};
 
-use crate::arguments::scene_name;
-use crate::{light_source, output, remote, warnings};
+use crate::{
+    light_source,
+    output::{self, say},
+    remote,
+};
 
 /// Says what is in a file (.light, .gltf, .glb), a built-in scene, or a running server.
 #[derive(Debug, Args)]
@@ -194,16 +197,16 @@ fn print_report(report: &Value) {
     for (key, value) in report.as_object().into_iter().flatten() {
         match value {
             Value::Array(entries) => {
-                println!("{key} ({})", entries.len());
+                say!("{key} ({})", entries.len());
                 const SHOWN: usize = 40;
                 for entry in entries.iter().take(SHOWN) {
-                    println!("  {}", in_words(entry));
+                    say!("  {}", in_words(entry));
                 }
                 if entries.len() > SHOWN {
-                    println!("  … and {} more (--json lists all)", entries.len() - SHOWN);
+                    say!("  … and {} more (--json lists all)", entries.len() - SHOWN);
                 }
             }
-            value => println!("{key}: {}", in_words(value)),
+            value => say!("{key}: {}", in_words(value)),
         }
     }
 }

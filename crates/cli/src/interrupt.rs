@@ -6,6 +6,8 @@ use std::thread;
 
 use anyhow::{Context, Result};
 
+use crate::output::tell;
+
 /// Exit code of a program that was interrupted.
 pub(crate) const EXIT_CODE: i32 = 130;
 
@@ -33,7 +35,7 @@ pub(crate) fn flag() -> Result<Arc<AtomicBool>> {
 /// Ends at the first Ctrl-C (or SIGTERM); the second one ends the program.
 pub(crate) async fn first() {
     signal().await;
-    eprintln!("Stopping; Ctrl-C again stops at once.");
+    tell!("Stopping; Ctrl-C again stops at once.");
     tokio::spawn(async {
         signal().await;
         std::process::exit(EXIT_CODE);

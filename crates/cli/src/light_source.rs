@@ -11,7 +11,10 @@ use lumencast_light::ProbeVolume;
 use lumencast_scene::{Scene, Snapshot, VolumeSpec};
 
 use crate::arguments::Reading;
-use crate::{output, remote};
+use crate::{
+    output::{self, tell},
+    remote,
+};
 
 /// Whether it is the address of a server's scene.
 pub(crate) fn is_address(what: &str) -> bool {
@@ -38,12 +41,12 @@ pub(crate) fn light(what: &str) -> Result<(Catalog, Vec<ProbeVolume>)> {
 pub(crate) fn check_fits(what: &str, catalog: &Catalog, scene: &Scene) {
     let (of, this) = (&catalog.scene.name, scene.name());
     if of != this {
-        eprintln!("warning: {what} is the light of {of:?}, and this scene is {this:?}");
+        tell!("warning: {what} is the light of {of:?}, and this scene is {this:?}");
     }
     let bounds = scene.bounds();
     let (middle, reach) = (0.5 * (bounds.min + bounds.max), 0.5 * bounds.min.distance(bounds.max));
     if !catalog.fields.iter().any(|field| field.grid.distance(middle) <= reach) {
-        eprintln!("warning: {what} lights no part of this scene; is it another scene's?");
+        tell!("warning: {what} lights no part of this scene; is it another scene's?");
     }
 }
 

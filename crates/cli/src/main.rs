@@ -1,6 +1,7 @@
 //! The `lumencast` program.
 
-#![expect(clippy::print_stdout, reason = "printing is what a program at a terminal does")]
+// All that is printed goes through `output`: it bears a full disk, and names from anywhere.
+#![warn(clippy::print_stderr)]
 
 mod arguments;
 mod bake;
@@ -14,7 +15,9 @@ mod fingerprint;
 mod inspect;
 mod interrupt;
 mod light_source;
+mod out_file;
 mod output;
+mod printable;
 mod probe;
 mod remote;
 mod render;
@@ -28,6 +31,10 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
+use tracing_subscriber::field::MakeExt as _;
+use tracing_subscriber::fmt::format;
+
+use crate::printable::printable;
 
 /// Computes the indirect light of a 3D scene and casts it, live, to any number of clients.
 #[derive(Debug, Parser)]
@@ -69,14 +76,18 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    output::end_quietly_where_nobody_reads();
-    let cli = Cli::parse();
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(LOGGED));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .init();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        // Help and the version come this way too, and go to standard output.
+        Err(message) => {
+            let printed = message.print();
+            if !message.use_stderr() {
+                output::end_unless_printed(printed);
+            }
+            return u8::try_from(message.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from);
+        }
+    };
+    log();
 
     let result = match cli.command {
         Command::Serve(command) => command.run(),
@@ -93,10 +104,29 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            output::error(&error);
             ExitCode::FAILURE
         }
     }
+}
+
+/// Logs to standard error.
+fn log() {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(LOGGED));
+    let fields = format::debug_fn(|out, field, value| {
+        let value = format!("{value:?}");
+        match field.name() {
+            "message" => write!(out, "{}", printable(&value)),
+            name => write!(out, "{name}={}", printable(&value)),
+        }
+    });
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .fmt_fields(fields.delimited(" "))
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .log_internal_errors(false)
+        .init();
 }
 
 #[cfg(test)]

@@ -1,55 +1,90 @@
 //! What goes to the terminal.
 
 use std::borrow::Cow;
-use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::fmt;
+use std::io::{self, ErrorKind, Write};
 use std::time::Duration;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Ends the program as Unix's own do when nobody reads on, `lumencast inspect FILE | head` for
-/// instance: quietly, with the code of SIGPIPE. For `println!`, which panics then, and for all other
-/// panics the usual message.
-pub(crate) fn end_quietly_where_nobody_reads() {
-    let report = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        let message = panic.payload_as_str().unwrap_or_default();
-        if message.starts_with("failed printing to stdout") && message.contains("Broken pipe") {
-            std::process::exit(BROKEN_PIPE);
-        }
-        report(panic);
-    }));
+use crate::printable::{printable, printable_error, printable_json};
+
+/// Prints a line to standard output: what a command was asked for.
+macro_rules! say {
+    ($($words:tt)*) => { $crate::output::line(format_args!($($words)*)) };
 }
+pub(crate) use say;
+
+/// Tells people a line on standard error: warnings, and what goes on.
+macro_rules! tell {
+    ($($words:tt)*) => { $crate::output::note(format_args!($($words)*)) };
+}
+pub(crate) use tell;
 
 /// Exit code of a program that SIGPIPE ended.
 const BROKEN_PIPE: i32 = 141;
 
-/// Prints JSON, and nothing but it, to standard output.
+/// Prints a line, printable.
+pub(crate) fn line(words: fmt::Arguments<'_>) {
+    print(&format!("{}\n", printable(&words.to_string())));
+}
+
+/// Prints lines, each printable.
+pub(crate) fn lines(text: &str) {
+    text.lines().for_each(|words| say!("{words}"));
+}
+
+/// Prints JSON, and nothing but it.
 pub(crate) fn json(value: &serde_json::Value) -> Result<()> {
-    let mut out = std::io::stdout().lock();
-    let written = serde_json::to_writer_pretty(&mut out, value)
-        .map_err(std::io::Error::from)
-        .and_then(|()| writeln!(out));
-    match written {
+    print(&format!("{}\n", printable_json(&serde_json::to_string_pretty(value)?)));
+    Ok(())
+}
+
+/// Prints JSON on one line.
+pub(crate) fn json_line(value: &serde_json::Value) {
+    print(&format!("{}\n", printable_json(&value.to_string())));
+}
+
+/// Writes to standard output. Where that fails the program ends, as nothing more can be printed: where
+/// nobody reads on, `lumencast inspect FILE | head` for instance, quietly and with the code of SIGPIPE, as
+/// Unix's own programs do.
+pub(crate) fn print(text: &str) {
+    let mut out = io::stdout().lock();
+    end_unless_printed(out.write_all(text.as_bytes()).and_then(|()| out.flush()));
+}
+
+/// Ends the program where something could not be printed.
+pub(crate) fn end_unless_printed(printed: io::Result<()>) {
+    match printed {
+        Ok(()) => {}
         Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(BROKEN_PIPE),
-        written => written.context("cannot write to standard output"),
+        Err(error) => {
+            tell!("error: cannot write to standard output: {error}");
+            std::process::exit(1);
+        }
     }
 }
 
-/// Whether a file can be written there: said before hours of work, not after.
-pub(crate) fn check_file(path: &Path) -> Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let folder = folder.unwrap_or(Path::new("."));
-    ensure!(folder.is_dir(), "{}: there is no such folder as {}", path.display(), folder.display());
-    ensure!(!path.is_dir(), "{}: is a folder", path.display());
-    Ok(())
+/// Tells why a command failed.
+pub(crate) fn error(error: &anyhow::Error) {
+    to_stderr(&format!("error: {}\n", printable_error(error)));
+}
+
+/// Tells a line, printable.
+pub(crate) fn note(words: fmt::Arguments<'_>) {
+    to_stderr(&format!("{}\n", printable(&words.to_string())));
+}
+
+/// Where standard error fails there is nobody to tell.
+fn to_stderr(text: &str) {
+    let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 
 /// A line that turns while something of unknown length goes on; on standard error, and only if
 /// that is a terminal.
 pub(crate) fn spinner(message: String) -> ProgressBar {
-    let bar = ProgressBar::new_spinner().with_message(message);
+    let bar = ProgressBar::new_spinner().with_message(printable(&message).into_owned());
     bar.enable_steady_tick(Duration::from_millis(100));
     bar
 }

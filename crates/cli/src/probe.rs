@@ -8,7 +8,7 @@ use lumencast_light::Order;
 use serde_json::{Value, json};
 
 use crate::arguments::{Materials, SceneSource, parse_order, parse_point};
-use crate::output;
+use crate::output::{self, say};
 
 /// Computes the spherical-harmonic coefficients of the radiance that arrives at points.
 #[derive(Debug, Args)]
@@ -65,13 +65,13 @@ impl Probe {
             return output::json(&self.report(&estimates));
         }
         for (point, estimate) in self.points.iter().zip(&estimates) {
-            println!("at {}, {}, {}", point.x, point.y, point.z);
-            println!("   l   m {:>33}   standard error", "r, g, b");
+            say!("at {}, {}, {}", point.x, point.y, point.z);
+            say!("   l   m {:>33}   standard error", "r, g, b");
             for (i, (sh, error)) in estimate.sh.iter().zip(&estimate.standard_error).enumerate() {
                 let l = i.isqrt();
                 let m = i as i64 - (l * (l + 1)) as i64;
-                print!("{l:>4} {m:>3} {:>10.5} {:>10.5} {:>10.5}", sh.x, sh.y, sh.z);
-                println!("   {:.5} {:.5} {:.5}", error.x, error.y, error.z);
+                let error = format!("{:.5} {:.5} {:.5}", error.x, error.y, error.z);
+                say!("{l:>4} {m:>3} {:>10.5} {:>10.5} {:>10.5}   {error}", sh.x, sh.y, sh.z);
             }
         }
         Ok(())

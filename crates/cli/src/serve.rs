@@ -11,7 +11,10 @@ use lumencast_transport::{Access, Key, Tls};
 use serde_json::json;
 
 use crate::arguments::{DEFAULT_PORT, GatherArguments, SceneArguments, TickArguments};
-use crate::interrupt;
+use crate::{
+    interrupt,
+    output::{self, say, tell},
+};
 
 /// Loads a scene, computes its light continuously and casts it; serves the page that shows it.
 #[derive(Debug, Args)]
@@ -131,16 +134,18 @@ impl Serve {
                 "address": page, "scene": server.scene_name(), "port": address.port(),
                 "epoch": server.tick().catalog().epoch, "probes": probes,
             });
-            println!("{ready}");
+            output::json_line(&ready);
             return;
         }
-        println!("{}: {probes} probes at {} Hz", server.scene_name(), self.tick.rate);
-        println!("{page}");
-        if !lumencast_server::page_is_embedded() && self.page.is_none() {
-            eprintln!(
-                "warning: compiled without its page; give --page DIR, or build web/viewer first"
-            );
+        let scene = server.tick().scene();
+        for warning in scene.warnings() {
+            tell!("warning: {warning}");
         }
-        println!("Ctrl-C stops the server.");
+        say!("{}: {probes} probes at {} Hz", server.scene_name(), self.tick.rate);
+        say!("{page}");
+        if !lumencast_server::page_is_embedded() && self.page.is_none() {
+            tell!("warning: compiled without its page; give --page DIR, or build web/viewer first");
+        }
+        say!("Ctrl-C stops the server.");
     }
 }

@@ -7,6 +7,8 @@ use anyhow::{Result, ensure};
 use clap::Args;
 use lumencast_transport::Key;
 
+use crate::output::say;
+
 /// Issues a token that lets its bearer edit a scene.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -43,7 +45,7 @@ impl Token {
             Key::read(path)?
         };
         let lifetime = Duration::from_secs(u64::from(self.days) * 24 * 60 * 60);
-        println!("{}", key.issue_token(&self.scene, Some(lifetime))?);
+        say!("{}", key.issue_token(&self.scene, Some(lifetime))?);
         Ok(())
     }
 }

@@ -24,7 +24,7 @@ use crate::arguments::{
 };
 use crate::camera::{self, CameraArgument, parse_size};
 use crate::light_source::{self, is_address};
-use crate::{output, warnings};
+use crate::{out_file, output};
 
 /// How long threads may take to end once the window is closed.
 const GRACE: Duration = Duration::from_secs(2);
@@ -87,7 +87,7 @@ impl View {
         if let Some(file) = &self.screenshot {
             let is_png = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
             ensure!(is_png, "{}: screenshots are written as .png", file.display());
-            output::check_file(file)?;
+            out_file::check(file)?;
         }
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)

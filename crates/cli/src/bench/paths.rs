@@ -10,7 +10,7 @@ use serde_json::json;
 use super::Spread;
 use crate::arguments::SceneSource;
 use crate::camera::{self, PictureArguments};
-use crate::output;
+use crate::output::{self, say};
 
 /// Measures camera paths and path segments a second.
 #[derive(Debug, Args)]
@@ -73,7 +73,7 @@ impl BenchPaths {
                 "noise_relative_rms": relative_rms,
             }));
         }
-        println!(
+        say!(
             "{}: {} × {}, {} bounces",
             scene.name(),
             self.picture.size.x,
@@ -81,7 +81,7 @@ impl BenchPaths {
             self.picture.bounces
         );
         for (name, rates) in [("paths", &paths), ("segments", &segments)] {
-            println!(
+            say!(
                 "{name:<9} {:.3} M a second ({:.3} to {:.3})",
                 1e-6 * rates.median,
                 1e-6 * rates.min,
@@ -89,7 +89,7 @@ impl BenchPaths {
             );
         }
         if let Some(rms) = relative_rms {
-            println!("noise     {:.1} % of the mean after {} samples", 100.0 * rms, film.samples());
+            say!("noise     {:.1} % of the mean after {} samples", 100.0 * rms, film.samples());
         }
         Ok(())
     }

@@ -12,7 +12,7 @@ use serde_json::json;
 use super::Spread;
 use crate::arguments::SceneSource;
 use crate::camera::{self, CameraArgument};
-use crate::output;
+use crate::output::{self, say};
 
 /// Measures rays a second and times of building acceleration structures.
 #[derive(Debug, Args)]
@@ -112,9 +112,9 @@ impl BenchRays {
                 "peak_bytes_a_triangle": peak,
             }));
         }
-        println!("{}: {triangles} triangles, {threads} threads", scene.name());
+        say!("{}: {triangles} triangles, {threads} threads", scene.name());
         let rate = |name: &str, rates: &Spread, rays: usize, hits: usize| {
-            println!(
+            say!(
                 "{name:<12} {:.3} M rays a second ({:.3} to {:.3}); {hits} of {rays} hit",
                 1e-6 * rates.median,
                 1e-6 * rates.min,
@@ -124,14 +124,14 @@ impl BenchRays {
         rate("closest hit", &closest, bench.closest.len(), hits.0);
         rate("any hit", &any, bench.any.len(), hits.1);
         let time = |name: &str, times: &Spread| {
-            println!("{name:<12} {:.2} ms ({:.2} to {:.2})", times.median, times.min, times.max);
+            say!("{name:<12} {:.2} ms ({:.2} to {:.2})", times.median, times.min, times.max);
         };
         time("build", &build);
         time("improved", &improved);
         time("top level", &top);
-        println!("memory       {bytes:.1} bytes a triangle");
+        say!("memory       {bytes:.1} bytes a triangle");
         if let Some(peak) = peak {
-            println!("at most      {peak:.0} bytes a triangle while it is built");
+            say!("at most      {peak:.0} bytes a triangle while it is built");
         }
         Ok(())
     }

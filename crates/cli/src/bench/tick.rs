@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::quantile;
 use crate::arguments::{GatherArguments, SceneArguments, TickArguments};
-use crate::output;
+use crate::output::{self, say};
 
 /// Runs the server's tick without network and prints its times, samples and bytes.
 #[derive(Debug, Args)]
@@ -174,7 +174,7 @@ impl Outlet for Sent {
 fn print_figures(figures: &Value) {
     let number =
         |pointer: &str| figures.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
-    println!(
+    say!(
         "{}: {} ticks at {} Hz on {} cores, {} bounces",
         figures["scene"].as_str().unwrap_or_default(),
         figures["ticks"],
@@ -182,7 +182,7 @@ fn print_figures(figures: &Value) {
         figures["cores"],
         figures["bounces"],
     );
-    println!(
+    say!(
         "tick        median {:.2} ms, p99 {:.2} ms, {:.1} % in time",
         number("/tick_ms/median"),
         number("/tick_ms/p99"),
@@ -193,9 +193,9 @@ fn print_figures(figures: &Value) {
             number(&format!("/stages_ms/{stage}/median")),
             number(&format!("/stages_ms/{stage}/p99")),
         );
-        println!("  {:<11} median {median:.3} ms, p99 {p99:.3} ms", stage.to_string());
+        say!("  {:<11} median {median:.3} ms, p99 {p99:.3} ms", stage.to_string());
     }
-    println!(
+    say!(
         "samples     {} to {} a probe, median {}; {:.2} M a second, {:.2} M rays a second",
         figures["samples_a_probe"]["min"],
         figures["samples_a_probe"]["max"],
@@ -204,7 +204,7 @@ fn print_figures(figures: &Value) {
         number("/rays_a_second") / 1e6,
     );
     for field in figures["fields"].as_array().into_iter().flatten() {
-        println!(
+        say!(
             "field {}     {} probes: {:.0} bytes an update, {:.2} a probe (raw {} or {}); layers {}",
             field["id"],
             field["probes"],
@@ -215,8 +215,8 @@ fn print_figures(figures: &Value) {
             field["bytes_by_layer"],
         );
     }
-    println!("codec       RMS error {:.3} % of c0", 100.0 * number("/codec_rms_error_of_c0"));
-    println!(
+    say!("codec       RMS error {:.3} % of c0", 100.0 * number("/codec_rms_error_of_c0"));
+    say!(
         "edits       {} accepted, {} refused; state {:.0} bytes a tick, catalogs {:.0}",
         figures["edits_accepted"],
         figures["edits_refused"],

@@ -11,7 +11,7 @@ use lumencast_picture::{Picture, ToneMap};
 
 use crate::arguments::{Exposure, SceneArguments, parse_positive};
 use crate::camera::{self, PictureArguments};
-use crate::output;
+use crate::out_file;
 
 /// Draws a picture of a scene.
 #[derive(Debug, Args)]
@@ -131,6 +131,9 @@ impl Render {
         }
         self.check_outputs()?;
         let mut scene = self.scene.source.open()?;
+        let mut inputs = self.scene.source.files(&scene);
+        inputs.extend(self.raster.light_file());
+        out_file::check_apart(&self.output, &inputs)?;
         scene.advance(self.time);
         let view = camera::view(&scene, self.picture.camera.as_ref())?;
         match self.lighting() {
@@ -155,7 +158,7 @@ impl Render {
                 Some("png" | "exr") => {}
                 _ => bail!("{}: pictures are written as .exr or .png", path.display()),
             }
-            output::check_file(path)?;
+            out_file::check(path)?;
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Pictures as a client draws them: by a graphics adapter, under a light field.
 
+use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
@@ -14,7 +15,7 @@ use serde_json::json;
 use super::{Lighting, PartsArgument, Render};
 use crate::arguments::{ReadingArguments, occlusion, parse_occlusion, parse_positive};
 use crate::light_source::{self, Computed};
-use crate::output;
+use crate::output::{self, say, tell};
 
 /// Samples a pixel unless told otherwise.
 const SAMPLES: u32 = 8;
@@ -90,6 +91,11 @@ impl RasterArguments {
         let light = self.light.is_some().then_some("--light");
         light.or_else(|| self.views.is_some().then_some("--views"))
     }
+
+    /// The light's file, where that is what it comes from.
+    pub(super) fn light_file(&self) -> Option<PathBuf> {
+        self.light.as_deref().filter(|light| !light_source::is_address(light)).map(PathBuf::from)
+    }
 }
 
 impl Render {
@@ -102,7 +108,7 @@ impl Render {
         let gpu = Gpu::new()?;
         let adapter = gpu.name();
         for what in gpu.abilities().missing(&settings) {
-            eprintln!("warning: {what}");
+            tell!("warning: {what}");
         }
         let snapshot = scene.snapshot();
         let mut renderer = Renderer::new(gpu, &settings);
@@ -191,7 +197,7 @@ impl Render {
         exposure: f32,
     ) -> Result<()> {
         if drawn.lights_without_shadow > 0 {
-            eprintln!(
+            tell!(
                 "warning: {} lights cast no shadow: there is no room for their maps",
                 drawn.lights_without_shadow
             );
@@ -222,19 +228,20 @@ impl Render {
             }));
         }
         let files: Vec<_> = self.output.iter().map(|path| path.display().to_string()).collect();
-        println!("{}", files.join(", "));
-        println!(
+        say!("{}", files.join(", "));
+        say!(
             "views: {views} of {width} × {height}, samples a pixel: {} in {} frames, {seconds:.2} s",
             drawn.frames * drawn.samples,
             drawn.frames,
         );
-        println!(
+        say!(
             "probes: {probes}, shadow maps: {} of {}², exposure {exposure}",
-            drawn.shadow_maps, drawn.shadow_resolution
+            drawn.shadow_maps,
+            drawn.shadow_resolution
         );
         match drawn.time {
             // Nothing is shown on a screen.
-            Some(PassTimes { deformation, shadows, occlusion, pictures, screen: _ }) => println!(
+            Some(PassTimes { deformation, shadows, occlusion, pictures, screen: _ }) => say!(
                 "{adapter}: {:.1} ms skins and morph targets, {:.1} ms shadow maps, \
                  {:.1} ms occlusion, {:.1} ms pictures",
                 1e3 * deformation,
@@ -242,7 +249,7 @@ impl Render {
                 1e3 * occlusion,
                 1e3 * pictures
             ),
-            None => println!("{adapter}"),
+            None => say!("{adapter}"),
         }
         Ok(())
     }

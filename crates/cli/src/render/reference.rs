@@ -13,7 +13,10 @@ use lumencast_scene::{Scene, View};
 use serde_json::{Value, json};
 
 use super::{FilterArgument, PartsArgument, Render};
-use crate::{film_file, fingerprint, interrupt, output};
+use crate::{
+    film_file, fingerprint, interrupt,
+    output::{self, say, tell},
+};
 
 /// Samples a pixel unless told otherwise.
 const SAMPLES: u32 = 64;
@@ -38,8 +41,8 @@ impl Render {
                     film_file::write(&partial, key, &film)?;
                 }
                 match film.samples() {
-                    0 => eprintln!("Stopped before the first samples were done."),
-                    samples => eprintln!(
+                    0 => tell!("Stopped before the first samples were done."),
+                    samples => tell!(
                         "Stopped at {samples} of {} samples; the same command goes on from {}.",
                         self.reference_samples(),
                         partial.display()
@@ -147,8 +150,8 @@ impl Render {
 
     fn print(&self, done: &Done) {
         let files: Vec<_> = self.output.iter().map(|path| path.display().to_string()).collect();
-        println!("{}", files.join(", "));
-        println!(
+        say!("{}", files.join(", "));
+        say!(
             "{} × {}, {} samples a pixel, {} bounces, {:.1} s",
             self.picture.size.x,
             self.picture.size.y,
@@ -157,14 +160,14 @@ impl Render {
             done.seconds
         );
         if done.paths(self.picture.size) > 0.0 {
-            println!(
+            say!(
                 "{:.3} M paths, {:.3} M rays a second",
                 1e-6 * done.paths(self.picture.size) / done.seconds,
                 1e-6 * done.rays as f64 / done.seconds
             );
         }
         if let Some(Noise { relative_rms, psnr }) = done.film.noise(done.exposure) {
-            println!(
+            say!(
                 "noise {:.2} % of the mean, {psnr:.1} dB at exposure {}",
                 100.0 * relative_rms,
                 done.exposure

@@ -6,7 +6,6 @@ mod reference;
 mod report;
 mod subjects;
 
-use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -22,7 +21,7 @@ use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading};
 use super::{cells, draw};
 use crate::arguments::{Reading, ReadingArguments, VolumeArgument};
 use crate::light_source::Computed;
-use crate::{camera, output, warnings};
+use crate::{camera, out_file, output};
 use judge::Judge;
 use reference::References;
 use report::{Fault, Field, Report, Table};
@@ -79,8 +78,7 @@ pub(crate) struct BenchPeers {
 impl BenchPeers {
     pub(crate) fn run(self) -> Result<()> {
         if let Some(folder) = &self.output {
-            fs::create_dir_all(folder)
-                .with_context(|| format!("cannot make {}", folder.display()))?;
+            out_file::check_folder(folder)?;
         }
         let wanted = |s: &&Subject| self.only.is_empty() || self.only.iter().any(|n| n == s.name);
         let subjects: Vec<&Subject> = SUBJECTS.iter().filter(wanted).collect();
@@ -109,7 +107,7 @@ impl BenchPeers {
         if self.json {
             return output::json(&serde_json::to_value(&report)?);
         }
-        print!("{}", report.text());
+        output::lines(&report.text());
         Ok(())
     }
 

@@ -8,6 +8,7 @@ use clap::Args;
 use lumencast_picture::{Loaded, Picture};
 
 use super::subjects::{SIZE, Subject};
+use crate::output::tell;
 
 /// Samples a pixel and bounces.
 const EFFORT: [&str; 4] = ["--spp", "1024", "--bounces", "4"];
@@ -48,7 +49,7 @@ impl References {
         };
         std::fs::create_dir_all(&self.references)
             .with_context(|| format!("cannot make {}", self.references.display()))?;
-        eprintln!("Mitsuba draws {}: this takes minutes.", path.display());
+        tell!("Mitsuba draws {}: this takes minutes.", path.display());
         let plain = path.with_extension("scene");
         self.python(&tools.join("conv.py"), |run| {
             run.arg(scene).arg(&plain);

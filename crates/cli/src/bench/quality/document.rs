@@ -3,14 +3,15 @@
 
 use std::fs;
 use std::io::ErrorKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Error, Result, bail, ensure};
 use lumencast_picture::ToneMap;
 
 use super::report::{Report, Row};
-use super::results::{plots, write_text};
+use super::results::plots;
 use super::sheet;
+use crate::out_file;
 
 /// Beside the document.
 const FOLDER: &str = "pictures";
@@ -18,6 +19,8 @@ const FOLDER: &str = "pictures";
 /// Finds out whether a section can be written, before what takes hours is measured for it.
 pub(super) fn check(name: &str, document: &Path) -> Result<()> {
     parse_name(name).map_err(Error::msg)?;
+    out_file::check(document)?;
+    out_file::check_folder(&pictures_beside(document))?;
     with_section(&read(document)?, name, "").map(drop)
 }
 
@@ -25,7 +28,7 @@ pub(super) fn check(name: &str, document: &Path) -> Result<()> {
 /// end. All else in the document stays as it is.
 pub(super) fn write(report: &Report, name: &str, document: &Path) -> Result<()> {
     let section = format!("{}\n{}", report.text(), show(report, name, document)?);
-    write_text(document, &with_section(&read(document)?, name, &section)?)
+    out_file::write(document, with_section(&read(document)?, name, &section)?.as_bytes())
 }
 
 /// A section's name, of which files are named too.
@@ -45,10 +48,13 @@ fn read(document: &Path) -> Result<String> {
     }
 }
 
+fn pictures_beside(document: &Path) -> PathBuf {
+    document.parent().unwrap_or(Path::new("")).join(FOLDER)
+}
+
 /// Writes what the section shows, and what shows it.
 fn show(report: &Report, name: &str, document: &Path) -> Result<String> {
-    let folder = document.parent().unwrap_or(Path::new("")).join(FOLDER);
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let folder = pictures_beside(document);
     let stem = format!("quality-{}", name.to_lowercase().replace(' ', "-"));
 
     let table = &report.table;
@@ -68,7 +74,7 @@ fn show(report: &Report, name: &str, document: &Path) -> Result<String> {
     if !report.resolutions.is_empty() {
         let of = ["frame-time", "psnr"].map(|what| format!("{stem}-{what}.svg"));
         for (plot, file) in plots(&report.resolutions).iter().zip(&of) {
-            write_text(&folder.join(file), &plot.svg())?;
+            out_file::write(&folder.join(file), plot.svg().as_bytes())?;
             text += &format!("![{name}: {} by resolution]({FOLDER}/{file})\n", plot.title);
         }
     }

@@ -9,11 +9,10 @@ mod report;
 mod results;
 mod sheet;
 
-use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use clap::Args;
 use glam::UVec2;
 use lumencast_light::Order;
@@ -23,7 +22,7 @@ use lumencast_shade::{Gpu, Renderer, Settings, Shading, Shadows};
 
 use crate::arguments::{ReadingArguments, SceneArguments, parse_positive};
 use crate::camera::{self, PictureArguments};
-use crate::output;
+use crate::{out_file, output};
 use field::{Canvas, Field};
 use reference::Judge;
 use report::{AtResolution, Report, Table};
@@ -118,10 +117,10 @@ struct Subject<'a> {
 impl BenchQuality {
     pub(crate) fn run(self) -> Result<()> {
         for folder in self.keep.iter().chain(&self.output) {
-            fs::create_dir_all(folder)
-                .with_context(|| format!("cannot make {}", folder.display()))?;
+            out_file::check_folder(folder)?;
         }
         let mut scene = self.scene.source.open()?;
+        out_file::check_apart(&self.document, &self.scene.source.files(&scene))?;
         let section = self.section.clone().unwrap_or_else(|| scene.name().to_owned());
         if let Some(document) = &self.document {
             document::check(&section, document)?;
@@ -162,7 +161,7 @@ impl BenchQuality {
         if self.json {
             return output::json(&serde_json::to_value(&report)?);
         }
-        print!("{}", report.text());
+        output::lines(&report.text());
         Ok(())
     }
 

@@ -1,14 +1,14 @@
 //! `quality.md`: the tables of a report with its pictures and plots beside it.
 
-use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use lumencast_picture::{Picture, ToneMap};
 
 use super::field::UPDATE;
 use super::plot::{Plot, Series};
 use super::report::{AtResolution, Report, Row};
+use crate::out_file;
 
 /// Writes quality.md and what it shows into a folder.
 pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
@@ -24,11 +24,11 @@ pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
     text += &gallery(report);
     if !report.resolutions.is_empty() {
         let [time, quality] = plots(&report.resolutions);
-        write_text(&folder.join("frame-time.svg"), &time.svg())?;
-        write_text(&folder.join("psnr.svg"), &quality.svg())?;
+        out_file::write(&folder.join("frame-time.svg"), time.svg().as_bytes())?;
+        out_file::write(&folder.join("psnr.svg"), quality.svg().as_bytes())?;
         text += "\n## By resolution\n\n![Frame time](frame-time.svg)\n![PSNR](psnr.svg)\n";
     }
-    write_text(&folder.join("quality.md"), &text)
+    out_file::write(&folder.join("quality.md"), text.as_bytes())
 }
 
 fn write_pictures(report: &Report, folder: &Path) -> Result<()> {
@@ -104,8 +104,4 @@ fn difference_of(row: &Row) -> String {
 
 fn file_name(row: &Row) -> String {
     row.name.replace(',', "").replace(' ', "-")
-}
-
-pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
-    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }
