@@ -26,12 +26,12 @@ pub enum PictureError {
         given: usize,
     },
     /// The file cannot be read.
-    #[error("cannot read {}: {source}", file.display())]
+    #[error("cannot read {}: {error}", file.display())]
     Read {
         /// As it was named.
         file: PathBuf,
         /// Why.
-        source: io::Error,
+        error: io::Error,
     },
     /// A file of another kind.
     #[error("{} is not a picture that is read here; give a PNG, OpenEXR or Radiance HDR file", file.display())]
@@ -40,20 +40,20 @@ pub enum PictureError {
         file: PathBuf,
     },
     /// Broken, cut off, or of a variant that is not read.
-    #[error("cannot decode {}: {source}; write it anew, OpenEXR with channels R, G and B", file.display())]
+    #[error("cannot decode {}: {error}; write it anew, OpenEXR with channels R, G and B", file.display())]
     Decode {
         /// As it was named.
         file: PathBuf,
         /// What the decoder says.
-        source: image::ImageError,
+        error: image::ImageError,
     },
     /// The file cannot be written.
-    #[error("cannot write {}: {source}", file.display())]
+    #[error("cannot write {}: {error}", file.display())]
     Write {
         /// As it was named.
         file: PathBuf,
         /// Why.
-        source: io::Error,
+        error: io::Error,
     },
 }
 

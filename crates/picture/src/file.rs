@@ -39,7 +39,7 @@ impl Loaded {
     /// The file cannot be read, is of another kind, is broken, or takes more than 3 GiB.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, PictureError> {
         let path = path.as_ref();
-        let fail = |source| PictureError::Read { file: path.into(), source };
+        let fail = |error| PictureError::Read { file: path.into(), error };
         let mut reader =
             ImageReader::open(path).map_err(fail)?.with_guessed_format().map_err(fail)?;
         let format = reader.format();
@@ -55,7 +55,7 @@ impl Loaded {
             ImageError::IoError(source) if source.kind() != io::ErrorKind::UnexpectedEof => {
                 fail(source)
             }
-            source => PictureError::Decode { file: path.into(), source },
+            error => PictureError::Decode { file: path.into(), error },
         })?;
         let picture = from_image(decoded)?;
         Ok(match format {
@@ -168,5 +168,5 @@ fn save(
             e => io::Error::other(e),
         })
     });
-    written.map_err(|source| PictureError::Write { file: path.into(), source })
+    written.map_err(|error| PictureError::Write { file: path.into(), error })
 }

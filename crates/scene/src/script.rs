@@ -32,12 +32,12 @@ pub struct Script {
 #[non_exhaustive]
 pub enum ScriptError {
     /// Not of a script's form.
-    #[error("{place}: {source}")]
+    #[error("{place}: {error}")]
     Json {
         /// Line or entry, from 1.
         place: String,
         /// What is wrong.
-        source: serde_json::Error,
+        error: serde_json::Error,
     },
     /// A time that is not finite, negative, or past the repetition.
     #[error("{place}: times are finite, not negative, and before the repetition")]
@@ -73,7 +73,7 @@ impl Script {
     pub fn parse(text: &str) -> Result<Self, ScriptError> {
         let mut script = Self::default();
         if text.trim_start().starts_with('[') {
-            let json = |source| ScriptError::Json { place: "script".into(), source };
+            let json = |error| ScriptError::Json { place: "script".into(), error };
             let values: Vec<serde_json::Value> = serde_json::from_str(text).map_err(json)?;
             for (index, value) in values.into_iter().enumerate() {
                 script.add(value, format!("entry {}", index + 1))?;
@@ -83,7 +83,7 @@ impl Script {
             for (index, line) in lines.filter(|(_, l)| !l.is_empty() && !l.starts_with('#')) {
                 let place = format!("line {}", index + 1);
                 let value = serde_json::from_str(line)
-                    .map_err(|source| ScriptError::Json { place: place.clone(), source })?;
+                    .map_err(|error| ScriptError::Json { place: place.clone(), error })?;
                 script.add(value, place)?;
             }
         }
@@ -101,7 +101,7 @@ impl Script {
             Some(_) => serde_json::from_value(value).map(|Repeat { repeat }| Entry::Repeat(repeat)),
             None => serde_json::from_value(value).map(Entry::At),
         };
-        match entry.map_err(|source| ScriptError::Json { place: place.clone(), source })? {
+        match entry.map_err(|error| ScriptError::Json { place: place.clone(), error })? {
             Entry::At(At { at, edit }) if at.is_finite() && at >= 0.0 => {
                 self.entries.push((at, edit));
             }

@@ -30,12 +30,12 @@ pub enum ServerError {
     )]
     Source(String),
     /// The folder of the page cannot be read.
-    #[error("cannot read the page in {folder}: {source}")]
+    #[error("cannot read the page in {folder}: {error}")]
     Page {
         /// The folder.
         folder: PathBuf,
         /// Why not.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// The network does not allow what was asked for.
     #[error(transparent)]

@@ -68,9 +68,9 @@ impl Server {
         gatherer: Box<dyn Gather>,
         config: ServerConfig,
     ) -> Result<Self, ServerError> {
-        let page = page::files(config.page.as_deref()).map_err(|source| ServerError::Page {
+        let page = page::files(config.page.as_deref()).map_err(|error| ServerError::Page {
             folder: config.page.clone().unwrap_or_default(),
-            source,
+            error,
         })?;
         let tick = Tick::new(scene, gatherer, config.tick, random_epoch())?;
         let ticked = RwLock::new(Ticked::at(Instant::now(), tick.period(), 0.0));

@@ -245,14 +245,14 @@ async fn keep_connected(
                 }
                 let ended = connection.closed().await;
                 estimate(None);
-                ended.err().map_or_else(|| "closed".to_owned(), |err| err.to_string())
+                ended.err().map_or_else(|| "closed".to_owned(), |err| said_once(&err))
             }
             Err(err) => {
                 if let Some(first) = first.take_if(|_| err.is_auth()) {
-                    let _ = first.send(Err(err.to_string()));
+                    let _ = first.send(Err(said_once(&err)));
                     return;
                 }
-                err.to_string()
+                said_once(&err)
             }
         };
         tracing::debug!(%reason, "not connected");
@@ -262,9 +262,23 @@ async fn keep_connected(
     }
 }
 
+/// An error's text without causes that its parts repeat one after the other.
+fn said_once(error: &impl std::fmt::Display) -> String {
+    let error = error.to_string();
+    let mut parts: Vec<&str> = error.split(": ").collect();
+    parts.dedup();
+    parts.join(": ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn causes_are_said_once() {
+        assert_eq!(said_once(&"no way: IO error: refused: refused"), "no way: IO error: refused");
+        assert_eq!(said_once(&"a: b: a"), "a: b: a");
+    }
 
     #[test]
     fn the_root_is_dialled_and_the_path_names_the_scene() {

@@ -7,14 +7,14 @@ use std::net::SocketAddr;
 #[non_exhaustive]
 pub enum Error {
     /// The server's address is taken or may not be used.
-    #[error("cannot listen on {address} ({protocol}): {source}; {advice}")]
+    #[error("cannot listen on {address} ({protocol}): {error}; {advice}")]
     Listen {
         /// The address asked for.
         address: SocketAddr,
         /// `UDP` or `TCP`.
         protocol: &'static str,
         /// What the system said.
-        source: std::io::Error,
+        error: std::io::Error,
         /// What to do about it.
         advice: String,
     },

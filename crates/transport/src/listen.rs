@@ -59,9 +59,9 @@ fn other_loopback(address: SocketAddr) -> Option<SocketAddr> {
     local.then(|| SocketAddr::from((Ipv6Addr::LOCALHOST, address.port())))
 }
 
-fn listen_error(address: SocketAddr, protocol: &'static str, source: io::Error) -> Error {
+fn listen_error(address: SocketAddr, protocol: &'static str, error: io::Error) -> Error {
     let port = address.port();
-    let advice = match source.kind() {
+    let advice = match error.kind() {
         io::ErrorKind::AddrInUse => {
             format!("another program uses port {port}: stop it, or choose another port")
         }
@@ -70,5 +70,5 @@ fn listen_error(address: SocketAddr, protocol: &'static str, source: io::Error) 
         }
         _ => "choose an address of this machine".to_owned(),
     };
-    Error::Listen { address, protocol, source, advice }
+    Error::Listen { address, protocol, error, advice }
 }
