@@ -261,6 +261,23 @@ impl Cache {
         Some(age.max(0.0))
     }
 
+    /// Whether all that is known is of `tick` or later: the state, with no tick missing before it, and the
+    /// light of every region. Ticks of another server's fields count something else: of those any light will
+    /// do.
+    pub fn has_reached(&self, tick: u64) -> bool {
+        let Some(catalog) = self.catalog.as_ref().filter(|_| !self.saved) else { return false };
+        let newest = |field: &Field, region: u32| {
+            let newest = self.fields.get(&field.id)?.get(&region)?.newest()?;
+            Some(newest.header.info.tick)
+        };
+        let is_lit = |field: &Field| {
+            let least = if self.is_own(field) { tick } else { 0 };
+            field.regions.iter().all(|region| newest(field, region.id) >= Some(least))
+        };
+        let state = self.state.as_ref().is_some_and(|state| state.tick >= tick);
+        state && self.server_edits().is_some() && catalog.fields.iter().all(is_lit)
+    }
+
     /// What happened to the scene since the last call, in order.
     pub fn scene_events(&mut self) -> Vec<SceneEvent> {
         self.edits.take_events()

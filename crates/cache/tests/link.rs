@@ -191,6 +191,48 @@ fn light_arrives_blended_with_its_age_and_version() {
 
 /// Passages take as long as was waited for what they lead to: with the first frame after layers have
 /// been dropped, and for frames that come together, the time in which they were made.
+/// State and light of both regions have to be there, with no tick missing; only another server's light need
+/// not be of that tick.
+#[test]
+fn a_tick_is_reached_once_everything_is() {
+    let mut server = Server::new(1);
+    let mut cache = Cache::new();
+    assert!(!cache.has_reached(0), "no catalog");
+    take_in(&mut cache, &server.catalog(), 0.0).unwrap();
+    for tick in 0..3_u32 {
+        for sent in server.tick(f64::from(tick) * TICK) {
+            assert!(!cache.has_reached(tick.into()));
+            take_in(&mut cache, &sent, f64::from(tick) * TICK).unwrap();
+        }
+        assert!(cache.has_reached(tick.into()) && !cache.has_reached(u64::from(tick) + 1));
+    }
+    let other = Field { id: 8, epoch: Some(Epoch(5)), ..server.catalog.fields[0].clone() };
+    server.catalog.fields.push(other);
+    take_in(&mut cache, &server.catalog(), 0.2).unwrap();
+    assert!(!cache.has_reached(2), "a field without light");
+    let mut elsewhere = Server::new(5);
+    for sent in elsewhere.tick(0.2) {
+        if let Sent::Probes { region, layer, bytes, .. } = sent {
+            cache.probes(8, region, layer, &bytes, 0.2).unwrap();
+        }
+    }
+    assert!(cache.has_reached(2), "its ticks are of another count");
+
+    // A state is missed: until a snapshot it is not known what the scene is.
+    server.tick(0.2);
+    while server.tick < 16 {
+        for sent in server.tick(0.2).into_iter() {
+            // Deltas of light miss a base.
+            let _ = take_in(&mut cache, &sent, 0.2);
+        }
+        assert!(!cache.has_reached(3));
+    }
+    for sent in server.tick(0.2) {
+        let _ = take_in(&mut cache, &sent, 0.2);
+    }
+    assert!(cache.server_edits().is_some());
+}
+
 #[test]
 fn passages_take_the_time_between_updates() {
     let mut server = Server::new(1);

@@ -41,6 +41,29 @@ impl SceneFiles {
 struct Start {
     root: String,
     files: Vec<String>,
+    tick: Option<u64>,
+}
+
+impl Start {
+    async fn of(url: &str, fetch: &Fetch) -> Result<Self, ClientError> {
+        let failed = |reason: String| ClientError::Download { url: url.to_owned(), reason };
+        let address = Url::parse(url).and_then(|base| base.join("/lumencast.json"));
+        let address = address.map_err(|error| failed(error.to_string()))?;
+        let start = fetch.get(&address).await?.all(START_BYTES).await?;
+        serde_json::from_slice(&start)
+            .map_err(|error| failed(format!("its /lumencast.json is no scene's: {error}")))
+    }
+}
+
+/// The tick that a server is at: once a session has [reached](crate::Session::reached) it, what is known is
+/// no older than this question.
+///
+/// # Errors
+/// A server that cannot be reached, or does not say.
+pub async fn current_tick(url: &str) -> Result<u64, ClientError> {
+    let reason = || "it does not tell its tick".to_owned();
+    let start = Start::of(url, &Fetch::new()?).await?;
+    start.tick.ok_or_else(|| ClientError::Download { url: url.to_owned(), reason: reason() })
 }
 
 /// Downloads the files of a server's scene; `progress` hears how many are there, of how many.
@@ -55,16 +78,14 @@ pub async fn download(
     let base = Url::parse(url).map_err(|error| failed(error.to_string()))?;
     let address = |path: &str| base.join(path).map_err(|error| failed(error.to_string()));
     let fetch = Fetch::new()?;
-    let start = fetch.get(&address("/lumencast.json")?).await?.all(START_BYTES).await?;
-    let Start { root, files } = serde_json::from_slice(&start)
-        .map_err(|error| failed(format!("its /lumencast.json is no scene's: {error}")))?;
+    let Start { root, files, .. } = Start::of(url, &fetch).await?;
     if files.len() > MOST_FILES {
         return Err(failed(format!("it has more than {MOST_FILES} files")));
     }
     let folder = tempfile::Builder::new()
         .prefix("lumencast-")
         .tempdir()
-        .map_err(|source| ClientError::Write { path: std::env::temp_dir(), source })?;
+        .map_err(|error| ClientError::Write { path: std::env::temp_dir(), error })?;
     let place = |name: &str| {
         below(folder.path(), name).ok_or_else(|| failed(format!("{name:?} is no name of a file")))
     };
@@ -76,7 +97,7 @@ pub async fn download(
         if let Ok(mut segments) = address.path_segments_mut() {
             segments.pop_if_empty().extend(name.split('/'));
         }
-        let wrote = |source| ClientError::Write { path: path.clone(), source };
+        let wrote = |error| ClientError::Write { path: path.clone(), error };
         std::fs::create_dir_all(path.parent().unwrap_or(folder.path())).map_err(wrote)?;
         let mut file = std::fs::File::create(&path).map_err(wrote)?;
         let mut fetched = fetch.get(&address).await?;

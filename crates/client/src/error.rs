@@ -28,12 +28,12 @@ pub enum ClientError {
         reason: String,
     },
     /// A file of the scene cannot be kept.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}: {error}", path.display())]
     Write {
         /// Where.
         path: PathBuf,
         /// Why not.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// The scene is none.
     #[error(transparent)]

@@ -27,7 +27,7 @@ mod replica;
 mod session;
 mod statistics;
 
-pub use download::{SceneFiles, download};
+pub use download::{SceneFiles, current_tick, download};
 pub use error::ClientError;
 pub use replica::Replica;
 pub use session::{Session, SessionOptions};

@@ -28,6 +28,11 @@ impl Replica {
         &self.scene
     }
 
+    /// The scene, which then follows no longer.
+    pub fn into_scene(self) -> Scene {
+        self.scene
+    }
+
     /// The scene as it is now.
     pub fn snapshot(&mut self) -> Arc<Snapshot> {
         self.scene.snapshot()

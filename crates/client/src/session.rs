@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use lumencast_cache::{Cache, Light, SceneEvent};
-use lumencast_codec::{Catalog, limits};
+use lumencast_codec::{Catalog, StateFrame, limits};
+use lumencast_scene::Edit;
 use lumencast_transport::{
     Client, ConnectOptions, ConnectionState, Error, Frame, ReadOptions, TrackReader,
 };
@@ -46,6 +47,8 @@ struct Shared {
     known: Mutex<Known>,
     /// Changes when another catalog has come.
     catalogs: watch::Sender<u64>,
+    /// Changes when anything has come.
+    news: watch::Sender<()>,
     eye: watch::Sender<Option<Vec3>>,
 }
 
@@ -76,8 +79,13 @@ impl Shared {
         let now = self.seconds(Instant::now());
         let mut known = self.lock();
         known.meter.bytes.add(frame.bytes.len() as f64, now);
+        known.meter.received += frame.bytes.len() as u64;
         match into(&mut known.cache, now) {
-            Ok(()) => true,
+            Ok(()) => {
+                drop(known);
+                self.news.send_replace(());
+                true
+            }
             Err(error) => {
                 tracing::debug!(%error, "a frame is dropped");
                 known.meter.dropped += 1;
@@ -99,6 +107,7 @@ impl Session {
             began: Instant::now(),
             known: Mutex::default(),
             catalogs: watch::Sender::new(0),
+            news: watch::Sender::new(()),
             eye: watch::Sender::new(None),
         });
         let mut tasks = JoinSet::new();
@@ -135,6 +144,27 @@ impl Session {
         self.shared.lock().cache.scene_time(now)
     }
 
+    /// Waits until the state and the light of every region are of this tick or later
+    /// ([`Cache::has_reached`]), for as long as it takes.
+    pub async fn reached(&self, tick: u64) {
+        let mut news = self.shared.news.subscribe();
+        while !self.shared.lock().cache.has_reached(tick) {
+            // The sender lives as long as this session.
+            let _ = news.changed().await;
+        }
+    }
+
+    /// The newest state that has come, without its edits.
+    pub fn state(&self) -> Option<StateFrame> {
+        self.shared.lock().cache.newest_state().cloned()
+    }
+
+    /// Edits that turn the scene as it stands in its file into the server's; nothing while a tick is
+    /// missing.
+    pub fn edits(&self) -> Option<Vec<Edit>> {
+        self.shared.lock().cache.server_edits().map(<[Edit]>::to_vec)
+    }
+
     /// Scene time of the newest state that has come, seconds.
     pub fn state_time(&self) -> Option<f64> {
         self.shared.lock().cache.newest_state().map(|state| state.time)
@@ -165,6 +195,7 @@ impl Session {
             ticks: meter.ticks.at(now),
             frames: meter.frames.at(now),
             bytes: meter.bytes.at(now),
+            received: meter.received,
             tick_ms: state.map(|state| state.tick_ms),
             samples: state.map(|state| state.samples),
             dropped: meter.dropped,

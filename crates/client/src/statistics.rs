@@ -14,6 +14,8 @@ pub struct Statistics {
     pub frames: f64,
     /// Bytes a second, of all tracks.
     pub bytes: f64,
+    /// Bytes of all frames so far.
+    pub received: u64,
     /// Milliseconds that the server's last tick took.
     pub tick_ms: Option<f64>,
     /// Samples a probe that it took.
@@ -62,6 +64,7 @@ pub(crate) struct Meter {
     pub(crate) ticks: Rate,
     pub(crate) frames: Rate,
     pub(crate) bytes: Rate,
+    pub(crate) received: u64,
     pub(crate) dropped: u64,
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
-use lumencast_client::{ClientError, Replica, Session, SessionOptions, download};
+use lumencast_client::{ClientError, Replica, Session, SessionOptions, current_tick, download};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_scene::{Scene, Script};
 use lumencast_server::{SampleRange, Server, ServerConfig};
@@ -134,6 +134,23 @@ async fn the_replica_is_the_servers_scene() {
     let folder = files.folder().to_owned();
     drop(files);
     assert!(!folder.exists(), "nothing is left behind");
+    server.end().await;
+}
+
+/// Whoever has reached the tick that the server tells knows of nothing older.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_reached_is_no_older_than_the_question() {
+    let server = Running::new("127.0.0.1:0", None).await;
+    for _ in 0..3 {
+        let session = session(&server).await;
+        let tick = current_tick(&server.address).await.unwrap();
+        tokio::time::timeout(STEP, session.reached(tick)).await.expect("light of now");
+        assert!(session.state().unwrap().tick >= tick);
+        assert_eq!(session.edits(), Some(Vec::new()));
+        let light = session.light(Instant::now(), |light| light.tick);
+        assert!(light >= Some(tick), "{light:?}, asked at {tick}");
+        assert!(session.statistics(Instant::now()).received > 100);
+    }
     server.end().await;
 }
 

@@ -1,5 +1,6 @@
 //! What the server says over HTTP: the page, the scene's files, its health and its counters.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
@@ -36,6 +37,8 @@ pub(crate) struct Shared {
     pub(crate) scene: String,
     /// The scene's glTF file under `/scene/`.
     pub(crate) root: String,
+    /// The number of the tick under way, or else of the last.
+    pub(crate) tick: AtomicU64,
     /// When a tick ended last, and when the next should have.
     pub(crate) ticked: RwLock<Ticked>,
 }
@@ -83,6 +86,7 @@ async fn start(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
     };
     let start = serde_json::json!({
         "scene": shared.scene, "root": shared.root, "broadcast": shared.scene, "files": files,
+        "tick": shared.tick.load(Ordering::Relaxed),
     });
     ([(header::CONTENT_TYPE, "application/json")], start.to_string())
 }

@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -80,6 +80,7 @@ impl Server {
             scene_files: RwLock::new(scene_files(tick.scene())),
             scene: tick.scene().name().to_owned(),
             root: tick.scene().root_file().to_owned(),
+            tick: AtomicU64::new(0),
             ticked,
         });
         let network =
@@ -172,6 +173,7 @@ fn beat(
         let started = now();
         beat.start(started);
         let mail = inbox.lock().unwrap_or_else(PoisonError::into_inner).take(started);
+        shared.tick.store(tick.number(), Ordering::Relaxed);
         let report = tick.step(started, mail, &mut publisher);
         // With the log's time, from which pages measure the way to them.
         tracing::debug!(tick = report.tick, late = report.late, "tick published");

@@ -203,6 +203,11 @@ impl Tick {
         LightField::new(self.volumes().cloned().collect())
     }
 
+    /// The number of the next tick.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
     /// Seconds from one tick to the next.
     pub fn period(&self) -> f64 {
         self.options.period
