@@ -73,7 +73,7 @@ pub(crate) struct View {
     /// for; 0 takes none. Also in the panel.
     #[arg(long, value_name = "METRES", default_value_t = 0.0, value_parser = parse_occlusion)]
     occlusion: f32,
-    /// Saves a picture as soon as there is light, and ends.
+    /// Saves a picture as soon as there is light, and ends; needs no display.
     #[arg(long, value_name = "FILE.png")]
     screenshot: Option<PathBuf>,
     #[command(flatten)]
@@ -108,7 +108,11 @@ impl View {
         };
         let opened = shown.and_then(|world| {
             let options = self.options(&*world)?;
-            Ok(lumencast_window::open(world, options)?)
+            match &self.screenshot {
+                Some(file) => lumencast_window::shoot(world, &options, file)?,
+                None => lumencast_window::open(world, options)?,
+            }
+            Ok(())
         });
         let ended = server.map_or(Ok(()), |server| runtime.block_on(server.end()));
         runtime.shutdown_timeout(GRACE);
@@ -133,18 +137,22 @@ impl View {
             exposure: lumencast_window::Exposure::new(self.exposure.0),
             panel: true,
         };
-        Ok(Options {
-            size: self.size,
-            view,
-            controls,
-            screenshots: PathBuf::from("."),
-            once: self.screenshot.clone(),
-        })
+        Ok(Options { size: self.size, view, controls, screenshots: PathBuf::from(".") })
+    }
+
+    /// The scene, which the picture is not to be written over.
+    fn scene(&self) -> Result<Scene> {
+        let scene = self.scene.source.open()?;
+        let mut inputs = self.scene.source.files(&scene);
+        let light = self.light.as_deref().filter(|light| !is_address(light));
+        inputs.extend(light.map(PathBuf::from).into_iter().chain(self.tick.edits.clone()));
+        out_file::check_apart(&self.screenshot, &inputs)?;
+        Ok(scene)
     }
 
     /// A scene under a saved field.
     fn saved(&self, file: &Path) -> Result<Box<dyn World>> {
-        let scene = self.scene.source.open()?;
+        let scene = self.scene()?;
         let name = file.display().to_string();
         let (catalog, volumes) = light_source::light(&name)?;
         light_source::check_fits(&name, &catalog, &scene);
@@ -153,7 +161,7 @@ impl View {
 
     /// A scene from here under a server's light.
     fn under_a_servers_light(&self, runtime: &Runtime, url: &str) -> Result<Box<dyn World>> {
-        let scene = self.scene.source.open()?;
+        let scene = self.scene()?;
         let session = runtime.block_on(connect(url))?;
         if let Some(catalog) = session.catalog() {
             light_source::check_fits(url, &catalog, &scene);
@@ -177,8 +185,8 @@ impl View {
 
     /// A scene whose light is computed here, by a server of its own.
     fn here(&self, runtime: &Runtime) -> Result<(Box<dyn World>, Running)> {
-        let scene = self.scene.source.open()?;
-        let spinner = output::spinner("Starting to compute its light".into());
+        let spinner = output::spinner(format!("Loading {}", self.scene.source.scene));
+        let scene = self.scene()?;
         let replica = scene.pristine(0.0);
         let loopback = std::net::SocketAddr::from(([127, 0, 0, 1], 0));
         let mut config = ServerConfig::new(lumencast_transport::ServerConfig::new(loopback));

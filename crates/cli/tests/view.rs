@@ -1,11 +1,11 @@
-//! `lumencast view`: a window, on a display without a screen.
+//! `lumencast view`: pictures without a display, and a window on a display without a screen.
 
 mod common;
 
 use std::io::{BufRead as _, BufReader};
 use std::process::{Child, Command, Stdio};
 
-use common::{Folder, Serving, run, run_with};
+use common::{Folder, Program, Serving, run, run_with};
 use lumencast_picture::Loaded;
 
 /// An X server without a screen, until it is dropped. `cargo xtask test` installs it.
@@ -47,11 +47,23 @@ fn colored(picture: &std::path::Path) -> (usize, usize) {
     (count(0, 1), count(1, 0))
 }
 
+const NOWHERE: [(&str, &str); 2] = [("DISPLAY", ""), ("WAYLAND_DISPLAY", "")];
+
+#[test]
+fn a_window_opens_and_shows_a_picture() {
+    let display = Display::new();
+    let environment = [
+        ("DISPLAY", display.name.as_str()),
+        ("WAYLAND_DISPLAY", ""),
+        ("RUST_LOG", "lumencast_window=debug"),
+    ];
+    let small = ["view", "cornell", "--volume", "1x1x1", "--size", "320x200"];
+    Program::start_with(&small, &environment).wait_for("the window shows a picture");
+}
+
 /// From a saved field, from a server in the same program, and from another server.
 #[test]
-fn shows_a_field_and_a_server() {
-    let display = Display::new();
-    let environment = [("DISPLAY", display.name.as_str())];
+fn pictures_of_a_field_and_a_server_need_no_display() {
     let folder = Folder::new("view");
     let field = folder.0.join("cornell.light");
     let field = field.to_str().expect("text");
@@ -69,7 +81,7 @@ fn shows_a_field_and_a_server() {
         let own = ["--size", "320x200", "--multisampling", "1", "--screenshot", shot];
         let arguments: Vec<&str> =
             ["view"].into_iter().chain(what.iter().copied()).chain(own).collect();
-        let ran = run_with(&arguments, &environment);
+        let ran = run_with(&arguments, &NOWHERE);
         assert_eq!(ran.code, Some(0), "{name}: {ran:?}");
         let (red, green) = colored(&picture);
         assert!(red > 1000 && green > 1000, "{name}: {red} red and {green} green pixels");
@@ -79,9 +91,11 @@ fn shows_a_field_and_a_server() {
 #[test]
 fn says_what_is_missing() {
     let folder = Folder::new("view-missing");
-    let nowhere = [("DISPLAY", ""), ("WAYLAND_DISPLAY", "")];
-    run_with(&["view", "cornell", "--volume", "1x1x1"], &nowhere)
-        .failed_saying(&["DISPLAY", "lumencast render"]);
+    let ran = run_with(&["view", "cornell", "--volume", "1x1x1"], &NOWHERE);
+    ran.failed_saying(&["DISPLAY", "--screenshot", "lumencast render"]);
+    for place in [".rs:", "registry", "os error at"] {
+        assert!(!ran.stderr.contains(place), "{place}: {ran:?}");
+    }
     let wrong = folder.0.join("shot.jpg");
     run(&["view", "cornell", "--screenshot", wrong.to_str().expect("text")])
         .failed_saying(&["shot.jpg", ".png"]);
@@ -92,7 +106,6 @@ fn says_what_is_missing() {
 /// told.
 #[test]
 fn light_of_another_scene_is_told() {
-    let nowhere = [("DISPLAY", ""), ("WAYLAND_DISPLAY", "")];
     let folder = Folder::new("view-elsewhere");
     let field = folder.0.join("elsewhere.light");
     let field = field.to_str().expect("text");
@@ -102,7 +115,7 @@ fn light_of_another_scene_is_told() {
     let server = Serving::start("cornell", &volume);
     let url = format!("http://{}/cornell", server.address);
     for light in [field, &url] {
-        run_with(&["view", "cornell", "--light", light], &nowhere).failed_saying(&[
+        run_with(&["view", "cornell", "--light", light], &NOWHERE).failed_saying(&[
             "warning",
             light,
             "no part of this scene",

@@ -218,7 +218,10 @@ impl Gpu {
     }
 
     /// Whether a picture of this size can be drawn.
-    pub(crate) fn check_size(&self, size: UVec2) -> Result<(), ShadeError> {
+    ///
+    /// # Errors
+    /// [`ShadeError::Size`].
+    pub fn check_size(&self, size: UVec2) -> Result<(), ShadeError> {
         let limit = self.device.limits().max_texture_dimension_2d;
         if size.min_element() == 0 || size.max_element() > limit {
             return Err(ShadeError::Size { width: size.x, height: size.y, limit });
@@ -236,7 +239,10 @@ impl Gpu {
     }
 
     /// Waits until everything submitted is done.
-    pub(crate) fn finish(&self, during: &'static str) -> Result<(), ShadeError> {
+    ///
+    /// # Errors
+    /// Where the device was lost, or has failed otherwise.
+    pub fn finish(&self, during: &'static str) -> Result<(), ShadeError> {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|error| ShadeError::Failed { during, reason: error.to_string() })?;

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use glam::UVec2;
 use lumencast_shade::ShadeError;
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
@@ -27,18 +26,27 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// # Errors
 /// Where there is no display or no adapter, or where the device is lost again and again.
 pub fn open(world: Box<dyn World>, options: Options) -> Result<(), WindowError> {
-    let display = |error: winit::error::EventLoopError| WindowError::Display(error.to_string());
+    let display = |error: winit::error::EventLoopError| WindowError::Display(reason(&error));
     let events = EventLoop::new().map_err(display)?;
     let mut app = App {
         world: Some(world),
         options,
         began: Instant::now(),
         shown: None,
+        showing: false,
         lost: 0,
         failure: None,
     };
     events.run_app(&mut app).map_err(display)?;
     app.failure.map_or(Ok(()), Err)
+}
+
+/// What the platform says, without the place in winit's source that its errors begin with: that is a path
+/// of the machine where this was built.
+fn reason(error: &dyn std::error::Error) -> String {
+    let said = error.to_string();
+    let place = said.strip_prefix("os error at ").and_then(|rest| rest.split_once(": "));
+    place.map_or(said.clone(), |(_, reason)| reason.to_owned())
 }
 
 struct App {
@@ -47,6 +55,8 @@ struct App {
     options: Options,
     began: Instant,
     shown: Option<Shown>,
+    /// Whether it has shown a picture.
+    showing: bool,
     /// Devices lost since a picture was shown.
     lost: u32,
     failure: Option<WindowError>,
@@ -72,7 +82,7 @@ impl Shown {
             .with_inner_size(size);
         let window = events
             .create_window(attributes)
-            .map_err(|error| WindowError::Display(error.to_string()))?;
+            .map_err(|error| WindowError::Display(reason(&error)))?;
         let window = Arc::new(window);
         let (surface, gpu) = Surface::new(&window, events.owned_display_handle())?;
         let stage = Stage::new(gpu, surface.format(), world, options);
@@ -124,6 +134,9 @@ impl App {
         let Some(shown) = &mut self.shown else { return };
         match shown.frame(now) {
             Ok(true) => {
+                if !std::mem::replace(&mut self.showing, true) {
+                    tracing::debug!("the window shows a picture");
+                }
                 self.lost = 0;
                 events.set_control_flow(ControlFlow::Poll);
                 shown.window.request_redraw();
@@ -141,18 +154,6 @@ impl App {
             }
             Err(error) => self.fail(events, error),
         }
-    }
-
-    /// Saves the one picture that was asked for, once it is there.
-    fn save_once(&mut self, events: &ActiveEventLoop) {
-        let (Some(file), Some(shown)) = (&self.options.once, &mut self.shown) else { return };
-        if !shown.stage.is_settled() {
-            return;
-        }
-        let size: UVec2 = shown.surface.size();
-        let saved = shown.stage.screenshot(size, file);
-        self.failure = saved.err();
-        events.exit();
     }
 }
 
@@ -172,7 +173,6 @@ impl ApplicationHandler for App {
         let Some(shown) = &mut self.shown else { return };
         if event == WindowEvent::RedrawRequested {
             self.redraw(events);
-            self.save_once(events);
             return;
         }
         // What it asks for comes with the next frame, which is never far.
@@ -185,6 +185,23 @@ impl ApplicationHandler for App {
     fn about_to_wait(&mut self, _: &ActiveEventLoop) {
         if let Some(shown) = &self.shown {
             shown.window.request_redraw();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_tell_no_place_in_the_source() {
+        let said = [
+            ("os error at /home/builder/winit/src/linux/mod.rs:765: no display", "no display"),
+            ("os error at C:\\winit\\src\\mod.rs:7: a: b", "a: b"),
+            ("it is not supported", "it is not supported"),
+        ];
+        for (error, told) in said {
+            assert_eq!(reason(&std::io::Error::other(error)), told);
         }
     }
 }

@@ -17,7 +17,7 @@ pub enum WindowError {
     /// There is no display to open a window on.
     #[error(
         "no window can be opened: {0}. Is there a display (DISPLAY or WAYLAND_DISPLAY)? Without one, \
-         lumencast render --lighting field draws pictures"
+         lumencast view --screenshot saves what it would show, and lumencast render draws pictures"
     )]
     Display(String),
     /// The adapter cannot show pictures in a window.

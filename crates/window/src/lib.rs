@@ -3,7 +3,7 @@
 //!
 //! What is shown is a [`World`]: a scene with its light, saved ([`Still`]) or from a
 //! server ([`Live`]). [`open`] shows it in a window of the platform's; a [`Stage`] is the same without the
-//! window, for tests and for programs with windows of their own.
+//! window, for tests and for programs with windows of their own, and [`shoot`] saves a picture of it.
 
 #![forbid(unsafe_code)]
 
@@ -13,6 +13,7 @@ mod error;
 mod exposure;
 mod live;
 mod panel;
+mod shot;
 mod stage;
 mod statistics;
 mod surface;
@@ -29,6 +30,7 @@ pub use error::WindowError;
 pub use exposure::Exposure;
 pub use live::Live;
 pub use panel::Controls;
+pub use shot::shoot;
 pub use stage::Stage;
 pub use world::{Still, World};
 
@@ -43,6 +45,4 @@ pub struct Options {
     pub controls: Controls,
     /// The folder where screenshots are saved.
     pub screenshots: PathBuf,
-    /// A picture to be saved as soon as there is light; then the window closes.
-    pub once: Option<PathBuf>,
 }

@@ -305,9 +305,14 @@ impl Stage {
         changes.free.drain().collect()
     }
 
+    /// Whether light has come and has settled.
+    pub(crate) fn has_settled_light(&self) -> bool {
+        self.world.is_settled()
+    }
+
     /// Whether what is seen is what is meant: light has settled and exposure is known.
     pub fn is_settled(&self) -> bool {
-        self.world.is_settled() && self.controls.exposure.is_known()
+        self.has_settled_light() && self.controls.exposure.is_known()
     }
 
     /// Saves the picture without the panel, smoother than it is shown.

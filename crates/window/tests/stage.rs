@@ -49,8 +49,7 @@ impl Test {
             exposure: Exposure::new(None),
             panel: true,
         };
-        let options =
-            Options { size: SIZE, view: None, controls, screenshots: folder.clone(), once: None };
+        let options = Options { size: SIZE, view: None, controls, screenshots: folder.clone() };
         let scene = Scene::open("cornell").unwrap();
         let world = Still::new(scene, LightField::default(), "nowhere".into());
         let gpu = Gpu::new().unwrap();

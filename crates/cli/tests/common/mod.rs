@@ -136,6 +136,28 @@ impl Program {
         }
     }
 
+    /// Reads what it tells until a line holds this.
+    #[track_caller]
+    pub fn wait_for(&mut self, word: &str) {
+        let stderr = self.0.stderr.take().expect("piped, and not taken yet");
+        let (send, lines) = mpsc::channel();
+        thread::spawn(move || {
+            BufReader::new(stderr)
+                .lines()
+                .map_while(Result::ok)
+                .try_for_each(|line| send.send(line))
+        });
+        let began = Instant::now();
+        let mut told = Vec::new();
+        while let Ok(line) = lines.recv_timeout(PATIENCE.saturating_sub(began.elapsed())) {
+            if line.contains(word) {
+                return;
+            }
+            told.push(line);
+        }
+        panic!("nothing tells of {word:?}: {told:#?}");
+    }
+
     /// Sends it Ctrl-C.
     pub fn interrupt(&self) {
         let pid = self.0.id().to_string();
