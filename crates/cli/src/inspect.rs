@@ -6,16 +6,15 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use clap::Args;
 use glam::Vec3;
-use lumencast_codec::{Catalog, LightFile, StateFrame};
+use lumencast_codec::{Catalog, LightFile};
 use lumencast_light::ProbeVolume;
-use lumencast_scene::{MeshId, Scene};
-use serde_json::{Map, Value, json};
+use lumencast_scene::{NodeInfo, Scene};
+use serde_json::{Value, json};
 
-use crate::{
-    light_source,
-    output::{self, say},
-    remote,
-};
+use crate::output::{self, say};
+use crate::remote::Seen;
+use crate::words::{entry_in_words, in_words, label};
+use crate::{light_source, remote};
 
 /// Says what is in a file (.light, .gltf, .glb), a built-in scene, or a running server.
 #[derive(Debug, Args)]
@@ -36,8 +35,7 @@ pub(crate) struct Inspect {
 impl Inspect {
     pub(crate) fn run(self) -> Result<()> {
         let report = if light_source::is_address(&self.what) {
-            let seen = remote::look(&self.what)?;
-            light_report(&seen.catalog, &seen.volumes, seen.bytes, seen.state.as_ref())
+            server_report(&remote::look_at_scene(&self.what)?)
         } else if let Some(bytes) = light_file(Path::new(&self.what))? {
             let read = || -> Result<_> {
                 let file = LightFile::read(&bytes)?;
@@ -45,7 +43,7 @@ impl Inspect {
                 Ok((file, volumes))
             };
             let (file, volumes) = read().with_context(|| self.what.clone())?;
-            light_report(&file.catalog, &volumes, bytes.len() as u64, None)
+            light_report(&file.catalog, &volumes, bytes.len() as u64)
         } else {
             scene_report(&mut Scene::open(&self.what)?)
         };
@@ -74,12 +72,7 @@ fn light_file(path: &Path) -> Result<Option<Vec<u8>>> {
     Ok(Some(bytes))
 }
 
-fn light_report(
-    catalog: &Catalog,
-    volumes: &[ProbeVolume],
-    bytes: u64,
-    state: Option<&StateFrame>,
-) -> Value {
+fn light_report(catalog: &Catalog, volumes: &[ProbeVolume], bytes: u64) -> Value {
     let fields: Vec<Value> = catalog
         .fields
         .iter()
@@ -100,23 +93,28 @@ fn light_report(
             })
         })
         .collect();
-    let mut report = json!({
+    json!({
         "epoch": catalog.epoch,
         "scene": catalog.scene,
         "tick_seconds": catalog.tick_seconds,
         "bytes": bytes,
         "fields": fields,
+    })
+}
+
+/// A server's light, with its state and the lights of its scene.
+fn server_report(seen: &Seen) -> Value {
+    let mut report = light_report(&seen.catalog, &seen.volumes, seen.bytes);
+    let state = &seen.state;
+    report["state"] = json!({
+        "tick": state.tick,
+        "time": state.time,
+        "version": state.version,
+        "tick_ms": state.tick_ms,
+        "samples": state.samples,
+        "edits_since_load": seen.edits,
     });
-    if let Some(state) = state {
-        report["state"] = json!({
-            "tick": state.tick,
-            "time": state.time,
-            "version": state.version,
-            "tick_ms": state.tick_ms,
-            "samples": state.samples,
-            "edits_since_load": state.snapshot.as_ref().map(|s| s.edits.len()),
-        });
-    }
+    report["lights"] = seen.scene.as_ref().map(lights).into();
     report
 }
 
@@ -141,20 +139,10 @@ fn scene_report(scene: &mut Scene) -> Value {
         .drawn_nodes()
         .map(|n| json!({ "node": n.id, "name": n.name, "parent": n.parent, "mesh": n.mesh }))
         .collect();
-    let lights: Vec<Value> = scene
-        .drawn_nodes()
-        .filter_map(|node| {
-            let light = node.light?;
-            Some(json!({ "node": node.id, "name": node.name, "light": light }))
-        })
-        .collect();
-    let shown: BTreeSet<MeshId> = scene.drawn_nodes().filter_map(|node| node.mesh).collect();
-    let meshes: Vec<Value> = shown
-        .into_iter()
-        .filter_map(|id| Some((id, scene.meshes().get(id.0 as usize)?)))
-        .map(|(id, mesh)| {
-            json!({ "mesh": id, "name": mesh.name, "triangles": mesh.triangle_count() })
-        })
+    let meshes: Vec<Value> = scene
+        .meshes()
+        .iter()
+        .map(|mesh| json!({ "name": mesh.name, "triangles": mesh.triangle_count() }))
         .collect();
     let cameras: Vec<Value> = scene
         .cameras()
@@ -182,7 +170,7 @@ fn scene_report(scene: &mut Scene) -> Value {
         "nodes": nodes,
         "meshes": meshes,
         "materials": scene.materials().len(),
-        "lights": lights,
+        "lights": lights(scene),
         "cameras": cameras,
         "animations": animations,
         "environment": scene.environment(),
@@ -192,38 +180,32 @@ fn scene_report(scene: &mut Scene) -> Value {
     })
 }
 
+/// The punctual lights of a scene.
+fn lights(scene: &Scene) -> Vec<Value> {
+    let light = |node: NodeInfo<'_>| {
+        let light = node.light?;
+        Some(json!({ "node": node.id, "name": node.name, "light": light }))
+    };
+    scene.nodes().filter_map(light).collect()
+}
+
 /// The report for people: a line for each plain value, a block for each list.
 fn print_report(report: &Value) {
-    for (key, value) in report.as_object().into_iter().flatten() {
+    const SHOWN: usize = 40;
+    let Some(report) = report.as_object() else { return };
+    for (key, value) in report {
         match value {
+            Value::Null => {}
             Value::Array(entries) => {
-                say!("{key} ({})", entries.len());
-                const SHOWN: usize = 40;
+                say!("{} ({})", label(key), entries.len());
                 for entry in entries.iter().take(SHOWN) {
-                    say!("  {}", in_words(entry));
+                    say!("  {}", entry_in_words(key, entry));
                 }
                 if entries.len() > SHOWN {
                     say!("  … and {} more (--json lists all)", entries.len() - SHOWN);
                 }
             }
-            value => say!("{key}: {}", in_words(value)),
+            _ => say!("{}: {}", label(key), in_words(key, report)),
         }
-    }
-}
-
-/// A value without the punctuation of JSON.
-fn in_words(value: &Value) -> String {
-    let pairs = |map: &Map<String, Value>| {
-        let known = map.iter().filter(|(_, value)| !value.is_null());
-        known.map(|(k, v)| format!("{k} {}", in_words(v))).collect::<Vec<_>>().join(", ")
-    };
-    match value {
-        Value::String(text) => text.clone(),
-        Value::Object(map) => pairs(map),
-        Value::Array(list) => {
-            let words: Vec<_> = list.iter().map(in_words).collect();
-            format!("[{}]", words.join(" "))
-        }
-        other => other.to_string(),
     }
 }

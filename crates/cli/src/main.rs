@@ -24,7 +24,7 @@ mod render;
 mod serve;
 mod token;
 mod view;
-mod warnings;
+mod words;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

@@ -1,108 +1,113 @@
-//! A look at a running server: its catalog, its state, and each region's newest light.
+//! A look at a running server: its catalog, its state, its light and its scene, as they are now.
 
-use std::collections::BTreeMap;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use bytes::Bytes;
-use lumencast_codec::{Catalog, Field, ProbeDecoder, Region, RegionLight, StateFrame, limits};
+use lumencast_client::{Replica, Session, SessionOptions, current_tick, download};
+use lumencast_codec::{Catalog, StateFrame};
 use lumencast_light::ProbeVolume;
-use lumencast_transport::{Client, ConnectOptions, ReadOptions, TrackReader};
+use lumencast_scene::Scene;
+use lumencast_transport::ConnectOptions;
+use tokio::runtime::Runtime;
 
-/// How long a server may take to show its light.
+use crate::output::{self, tell};
+use crate::printable::printable_error;
+
+/// How long a server may take to show its light, besides two of its ticks.
 const PATIENCE: Duration = Duration::from_secs(15);
 
 /// How long the connection may take.
 const CONNECTION: Duration = Duration::from_secs(5);
 
+/// How long threads may take to end.
+const GRACE: Duration = Duration::from_secs(1);
+
+/// Longer than light takes to pass from one update to the next.
+const SETTLED: Duration = Duration::from_secs(3600);
+
 /// What there was to see.
 pub(crate) struct Seen {
     pub(crate) catalog: Catalog,
     pub(crate) volumes: Vec<ProbeVolume>,
-    pub(crate) state: Option<StateFrame>,
+    /// Where it was asked for, and could be had.
+    pub(crate) scene: Option<Scene>,
+    pub(crate) state: StateFrame,
+    /// Edits that made the scene what it is.
+    pub(crate) edits: usize,
     /// Bytes of the frames read.
     pub(crate) bytes: u64,
 }
 
-/// Connects to the address of a scene and reads one update of every field, not much older than the state: as
-/// far as the server's last snapshot lies back, at most.
+/// Connects to the address of a scene and reads its light and its state, no older than this question.
 pub(crate) fn look(url: &str) -> Result<Seen> {
+    looking(|runtime| runtime.block_on(read(url)).map(|(_, seen)| seen))
+}
+
+/// The same, with the scene as it is now.
+pub(crate) fn look_at_scene(url: &str) -> Result<Seen> {
+    looking(|runtime| {
+        let (session, mut seen) = runtime.block_on(read(url))?;
+        match scene(runtime, url, &session) {
+            Ok(scene) => seen.scene = Some(scene),
+            Err(error) => {
+                tell!("warning: what is in the scene is not known: {}", printable_error(&error));
+            }
+        }
+        Ok(seen)
+    })
+}
+
+fn looking(look: impl FnOnce(&Runtime) -> Result<Seen>) -> Result<Seen> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
         .enable_all()
         .build()
         .context("cannot start the network threads")?;
-    let seen = runtime.block_on(async {
-        let mut options = ConnectOptions::default();
-        options.timeout = CONNECTION;
-        let client = Client::connect(url, options).await?;
-        match tokio::time::timeout(PATIENCE, read(&client)).await {
-            Ok(seen) => seen,
-            Err(_) => bail!("{url}: connected, but no light came within {PATIENCE:?}"),
-        }
-    });
-    runtime.shutdown_timeout(Duration::from_secs(1));
+    let seen = look(&runtime);
+    runtime.shutdown_timeout(GRACE);
     seen
 }
 
-async fn read(client: &Client) -> Result<Seen> {
-    let frame = first(client, "catalog").await?;
-    let mut bytes = frame.len() as u64;
-    let catalog = Catalog::decode(&frame).context("the catalog")?;
-    let frame = first(client, "state").await?;
-    bytes += frame.len() as u64;
-    let state = StateFrame::decode(&frame).context("the state")?;
-
-    let mut volumes: BTreeMap<u32, ProbeVolume> = BTreeMap::new();
-    for field in &catalog.fields {
-        let volume = field.dark();
-        let volume = volumes.entry(field.id).or_insert(volume);
-        for &region in &field.regions {
-            let (light, size) = region_light(client, field, region, state.tick).await?;
-            bytes += size;
-            let probes = region.probes(field.grid.resolution);
-            for (probe, sh) in probes.zip(light.coefficients.chunks(field.order.coefficients())) {
-                volume.probe_mut(probe).copy_from_slice(sh);
-            }
-        }
+async fn read(url: &str) -> Result<(Session, Seen)> {
+    let mut connection = ConnectOptions::default();
+    connection.timeout = CONNECTION;
+    let mut options = SessionOptions::default();
+    options.connection = connection;
+    let session = Session::connect(url, options).await?;
+    // A session that joins hears of ticks since the last snapshot: what it has heard is not yet what is.
+    let now = current_tick(url).await.unwrap_or_else(|error| {
+        tell!("warning: what is told may be some seconds old: {error}");
+        0
+    });
+    let period = session.catalog().map_or(0.0, |catalog| catalog.tick_seconds);
+    let patience = PATIENCE + Duration::try_from_secs_f64(2.0 * period).unwrap_or_default();
+    if tokio::time::timeout(patience, session.reached(now)).await.is_err() {
+        bail!("{url}: connected, but no light of now came within {patience:?}");
     }
-    Ok(Seen { catalog, volumes: volumes.into_values().collect(), state: Some(state), bytes })
+    let what = || format!("{url}: it has gone");
+    let seen = Seen {
+        catalog: session.catalog().with_context(what)?,
+        volumes: session.light(Instant::now() + SETTLED, |light| light.field.volumes().to_vec()),
+        scene: None,
+        state: session.state().with_context(what)?,
+        edits: session.edits().map_or(0, |edits| edits.len()),
+        bytes: session.statistics(Instant::now()).received,
+    };
+    Ok((session, seen))
 }
 
-/// A region's light, of this tick or a later one, and the bytes of the frames read. Groups of layer 0 begin
-/// with a keyframe; but of a region that nobody has watched for a while, what comes first is what was seen
-/// when somebody last did.
-async fn region_light(
-    client: &Client,
-    field: &Field,
-    region: Region,
-    since: u64,
-) -> Result<(RegionLight, u64)> {
-    let track = format!("f{}/r{}/l0", field.id, region.id);
-    let mut decoder = ProbeDecoder::new(region.size, field.order);
-    let mut reader = subscribe(client, &track);
-    let mut bytes = 0;
-    loop {
-        let frame = next(&mut reader, &track).await?;
-        bytes += frame.len() as u64;
-        let light = decoder.decode(&frame).with_context(|| track.clone())?;
-        if light.header.info.tick >= since {
-            return Ok((light, bytes));
-        }
+/// The server's scene as its edits have left it.
+fn scene(runtime: &Runtime, url: &str, session: &Session) -> Result<Scene> {
+    let bar = output::bar(0, "Loading the scene");
+    let files = runtime.block_on(download(url, |done, all| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    }))?;
+    bar.finish_and_clear();
+    let mut replica = Replica::new(Scene::load(files.root())?);
+    replica.update(session, Instant::now());
+    if replica.missed() > 0 {
+        tell!("warning: {} edits of the server cannot be followed here", replica.missed());
     }
-}
-
-/// The first frame of a track.
-async fn first(client: &Client, track: &str) -> Result<Bytes> {
-    next(&mut subscribe(client, track), track).await
-}
-
-fn subscribe(client: &Client, track: &str) -> TrackReader {
-    let options = ReadOptions::default().with_max_frame(limits::FRAME_BYTES);
-    client.subscribe(client.scene(), track, options)
-}
-
-async fn next(reader: &mut TrackReader, track: &str) -> Result<Bytes> {
-    let frame = reader.next().await?;
-    Ok(frame.with_context(|| format!("the server has no track {track}"))?.bytes)
+    Ok(replica.into_scene())
 }

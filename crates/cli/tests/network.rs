@@ -357,6 +357,35 @@ fn inspect_shows_a_running_server() {
     run(&["inspect", &nobody]).failed_saying(&[&nobody]);
 }
 
+/// Ticks are slow here: a look at what the last snapshot held would be seconds behind.
+#[test]
+fn inspect_tells_what_is_and_not_what_was() {
+    let server = Serving::start("cornell", &[&SMALL[..], &["--rate", "5"]].concat());
+    limited(async {
+        let mut follower = Follower::connect(&server).await;
+        let mut editor = follower.editor("a");
+        for (edits, intensity) in [(1, 123.5), (2, 23_456.0)] {
+            let seq = editor.send(dim(lamp(), intensity));
+            let source = Some(("a".to_owned(), seq));
+            let accepted = |state: &StateFrame| {
+                state.edits.iter().any(|edit| edit.source == source).then_some(state.tick)
+            };
+            let tick = follower.until(accepted).await;
+            let seen = run(&["inspect", &server.url(), "--json"]).json();
+            assert!(seen["state"]["tick"].as_u64() >= Some(tick), "{tick}: {seen}");
+            assert!(seen["state"]["edits_since_load"].as_u64() >= Some(1), "{edits}: {seen}");
+            let light = seen["lights"].as_array().and_then(|lights| lights.first());
+            let light = light.unwrap_or_else(|| panic!("no light: {seen}"));
+            assert_eq!((&light["name"], &light["node"]), (&"lamp".into(), &lamp().0.into()));
+            assert_eq!(light["light"]["intensity"], intensity);
+        }
+    });
+    let words = run(&["inspect", &server.url()]).stdout;
+    for said in ["lights (1)", "intensity 23,456 cd", "name lamp", "period: 0.2 s", "cd/m²"] {
+        assert!(words.contains(said), "{said}: {words}");
+    }
+}
+
 /// An address at which nobody listens.
 fn free_address() -> std::net::SocketAddr {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");

@@ -1,0 +1,182 @@
+//! Reports for people: numbers as people write them, with units, and without the punctuation of JSON.
+
+use serde_json::{Map, Number, Value};
+
+use crate::output;
+
+/// The most digits of a number that count: an f32 has a little over seven.
+const DIGITS: i32 = 6;
+
+/// What a number is of.
+#[derive(Clone, Copy)]
+enum Unit {
+    /// Nothing, or what its name says.
+    Plain,
+    /// The number of a thing, not an amount.
+    Name,
+    Bytes,
+    /// Given in radians.
+    Angle,
+    Of(&'static str),
+}
+
+/// A value in words; `key` is its name in `map`.
+pub(crate) fn in_words(key: &str, map: &Map<String, Value>) -> String {
+    map.get(key).map(|value| words(value, unit(key, map, Unit::Plain))).unwrap_or_default()
+}
+
+/// An entry of a list that is called `key`.
+pub(crate) fn entry_in_words(key: &str, value: &Value) -> String {
+    words(value, unit(key, &Map::new(), Unit::Plain))
+}
+
+/// The name of a value, for people.
+pub(crate) fn label(key: &str) -> String {
+    match key {
+        "tick_seconds" => "period".into(),
+        "tick_ms" => "tick took".into(),
+        key => key.replace('_', " "),
+    }
+}
+
+/// The unit of a value, or that of what it is a part of.
+fn unit(key: &str, map: &Map<String, Value>, whole: Unit) -> Unit {
+    match key {
+        "bytes" => Unit::Bytes,
+        "tick_seconds" | "time" | "seconds" => Unit::Of("s"),
+        "tick_ms" => Unit::Of("ms"),
+        "c0" | "zenith" | "horizon" | "ground" | "radiance" => Unit::Of("cd/m²"),
+        "bounds" | "center" | "size" | "position" | "radius" | "range" | "metres" => Unit::Of("m"),
+        "angle" | "inner" | "outer" => Unit::Angle,
+        "intensity" if map.get("type").is_some_and(|kind| kind == "directional") => Unit::Of("lx"),
+        "intensity" => Unit::Of("cd"),
+        "node" | "parent" | "mesh" | "animation" | "id" | "tick" | "version" => Unit::Name,
+        _ => whole,
+    }
+}
+
+fn words(value: &Value, of: Unit) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Object(map) => {
+            let known = map.iter().filter(|(_, value)| !value.is_null());
+            let pair = |(key, value): (&String, &Value)| {
+                format!("{} {}", label(key), words(value, unit(key, map, of)))
+            };
+            known.map(pair).collect::<Vec<_>>().join(", ")
+        }
+        Value::Array(list) => {
+            let (each, after) = match of {
+                Unit::Of(name) if !list.is_empty() => (Unit::Plain, format!(" {name}")),
+                of => (of, String::new()),
+            };
+            let words: Vec<_> = list.iter().map(|value| words(value, each)).collect();
+            format!("[{}]{after}", words.join(" "))
+        }
+        Value::Number(number) => measure(number, of),
+        other => other.to_string(),
+    }
+}
+
+fn measure(number: &Number, of: Unit) -> String {
+    let value = number.as_f64().unwrap_or(f64::NAN);
+    match (of, number.as_u64()) {
+        (Unit::Name, _) => number.to_string(),
+        (Unit::Bytes, Some(bytes)) => output::bytes(bytes),
+        (Unit::Angle, _) => format!("{}°", in_digits(value.to_degrees())),
+        (Unit::Of(name), _) => format!("{} {name}", in_digits(value)),
+        (Unit::Plain | Unit::Bytes, _) if number.is_f64() => in_digits(value),
+        (Unit::Plain | Unit::Bytes, _) => thousands(&number.to_string()),
+    }
+}
+
+/// A number with the digits of it that count.
+fn in_digits(value: f64) -> String {
+    let exponent = value.abs().log10().floor();
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 { "0".into() } else { value.to_string() };
+    }
+    if !(-4.0..15.0).contains(&exponent) {
+        return format!("{value:.*e}", DIGITS as usize - 1)
+            .split_once('e')
+            .map(|(digits, power)| format!("{}e{power}", without_zeros(digits)))
+            .unwrap_or_default();
+    }
+    let decimals = (DIGITS - 1 - exponent as i32).max(0) as usize;
+    thousands(without_zeros(&format!("{value:.decimals$}")))
+}
+
+/// Without zeros that say nothing at the end of a fraction.
+fn without_zeros(digits: &str) -> &str {
+    match digits.contains('.') {
+        true => digits.trim_end_matches('0').trim_end_matches('.'),
+        false => digits,
+    }
+}
+
+/// Thousands apart.
+fn thousands(digits: &str) -> String {
+    let (sign, digits) = digits.split_at(usize::from(digits.starts_with('-')));
+    let (whole, fraction) = digits.split_at(digits.find('.').unwrap_or(digits.len()));
+    let mut apart = String::from(sign);
+    for (i, digit) in whole.chars().enumerate() {
+        if i > 0 && (whole.len() - i).is_multiple_of(3) {
+            apart.push(',');
+        }
+        apart.push(digit);
+    }
+    apart + fraction
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn numbers_are_written_as_people_write_them() {
+        for (number, written) in [
+            (1.500_000_02, "1.5"),
+            (f64::from(0.1_f32), "0.1"),
+            (-1_234.567_8, "-1,234.57"),
+            (262_144.0, "262,144"),
+            (999_999.96, "1,000,000"),
+            (99.999_999_9, "100"),
+            (0.000_25, "0.00025"),
+            (0.0, "0"),
+            (1.5e-7, "1.5e-7"),
+            (3.0e20, "3e20"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(in_digits(number), written);
+        }
+        assert_eq!(thousands("1234567"), "1,234,567");
+        assert_eq!(thousands("-123"), "-123");
+    }
+
+    #[test]
+    fn values_have_units() {
+        let light = json!({ "node": 1234, "name": "lamp", "light": {
+            "type": "spot", "intensity": 1500.5, "outer": std::f32::consts::FRAC_PI_4, "range": null,
+        }});
+        let said = entry_in_words("lights", &light);
+        for part in ["node 1234", "name lamp", "intensity 1,500.5 cd", "outer 45°", "type spot"] {
+            assert!(said.split(", ").any(|words| words.ends_with(part)), "{said}");
+        }
+        assert!(!said.contains("range"), "{said}");
+        let report = json!({
+            "bounds": { "max": [1.0, 2000.0, f64::from(0.3_f32)] }, "bytes": 12_345, "tick": 12_345,
+            "state": { "tick_ms": 31.25, "time": 8.04 }, "triangles": 262_144,
+        });
+        let map = report.as_object().expect("an object");
+        for (key, said) in [
+            ("bounds", "max [1 2,000 0.3] m"),
+            ("bytes", "12.3 KB"),
+            ("tick", "12345"),
+            ("state", "tick took 31.25 ms, time 8.04 s"),
+            ("triangles", "262,144"),
+        ] {
+            assert_eq!(in_words(key, map), said);
+        }
+    }
+}
