@@ -15,6 +15,7 @@ mod fingerprint;
 mod inspect;
 mod interrupt;
 mod light_source;
+mod manual;
 mod out_file;
 mod output;
 mod printable;
@@ -29,7 +30,7 @@ mod words;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::field::MakeExt as _;
 use tracing_subscriber::fmt::format;
@@ -71,6 +72,9 @@ enum Command {
     Compare(compare::Compare),
     Doctor(doctor::Doctor),
     Token(token::Token),
+    Completions(manual::Completions),
+    #[command(name = "man")]
+    Manual(manual::Manual),
     #[command(subcommand)]
     Bench(bench::Bench),
 }
@@ -99,6 +103,8 @@ fn main() -> ExitCode {
         Command::Compare(command) => command.run(),
         Command::Doctor(command) => command.run(),
         Command::Token(command) => command.run(),
+        Command::Completions(command) => command.run(Cli::command()),
+        Command::Manual(command) => command.run(Cli::command()),
         Command::Bench(command) => command.run(),
     };
     match result {
@@ -132,7 +138,6 @@ fn log() {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory as _;
 
     /// No two arguments of a command have one name, and so on.
     #[test]

@@ -19,6 +19,8 @@ fn help_shows_examples_and_the_version_is_told() {
         &["compare", "--help"],
         &["doctor", "--help"],
         &["token", "--help"],
+        &["completions", "--help"],
+        &["man", "--help"],
         &["render", "--help"],
         &["bench", "tick", "--help"],
         &["bench", "rays", "--help"],
@@ -461,4 +463,79 @@ fn ends_quietly_when_nobody_reads_on() {
         assert_eq!(ran.status.code(), Some(141), "{arguments:?}");
         assert_eq!(String::from_utf8_lossy(&ran.stderr), "", "{arguments:?}");
     }
+}
+
+/// Commands that fail by what the system says: files that are not there, or are no files.
+#[test]
+fn errors_say_each_cause_once() {
+    let folder = Folder::new("causes");
+    let here = |name: &str| folder.0.join(name).to_str().expect("text").to_owned();
+    let [none, light, picture, out] = ["none", "none.light", "none.png", "out.png"].map(here);
+    let broken = folder.file("broken.png", b"\x89PNG\r\n\x1a\nno more");
+    let script = folder.file("script.jsonl", b"{\"at\": 0, \"edit\": {\"edit\": \"explode\"}}\n");
+    let toml = folder.triangles("toml", &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 1.0);
+    folder.file("toml.lumencast.toml", b"[environment]\ntype = \"cellar\"\n");
+    let words = folder.file("words.light", b"no light");
+    let free = ["serve", "cornell", "--listen", "127.0.0.1:0", "--volume", "1x1x1"];
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let taken = taken.local_addr().expect("an address").to_string();
+    for arguments in [
+        &["inspect", &none][..],
+        &["inspect", &light],
+        &["inspect", &words],
+        &["inspect", &toml],
+        &["inspect", "http://127.0.0.1:9/x"],
+        &["compare", &picture, &picture],
+        &["compare", &broken, &broken],
+        &["render", "cornell", "--light", &light, "-o", &out],
+        &["render", "cornell", "--light", &words, "-o", &out],
+        &["render", &none, "-o", &out],
+        &["view", &none, "--screenshot", &out],
+        &["bake", "cornell", "-o", "/proc/none"],
+        &["token", "a", "--token-key", &words],
+        &["serve", "cornell", "--listen", &taken, "--volume", "1x1x1"],
+        &[&free[..], &["--edits", &script]].concat(),
+        &[&free[..], &["--edits", &none]].concat(),
+        &[&free[..], &["--token-key", &none]].concat(),
+        &[&free[..], &["--page", &none]].concat(),
+        &[&free[..], &["--tls-cert", &none, "--tls-key", &none]].concat(),
+    ] {
+        let ran = run(arguments);
+        assert_eq!(ran.code, Some(1), "{arguments:?}: {ran:?}");
+        let begin = ran.stderr.rfind("error: ").unwrap_or_else(|| panic!("{arguments:?}: {ran:?}"));
+        let error = ran.stderr[begin..].trim_end();
+        let parts: Vec<&str> = error.split(": ").collect();
+        for (i, part) in parts.iter().enumerate() {
+            assert!(!parts[..i].contains(part), "{part:?} twice: {error}");
+        }
+        assert!(error.matches("(os error").count() <= 1, "{error}");
+    }
+}
+
+#[test]
+fn shells_complete_commands_and_man_shows_them() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let ran = run(&["completions", shell]);
+        assert_eq!(ran.code, Some(0), "{shell}: {ran:?}");
+        for word in ["lumencast", "bake", "environment"] {
+            assert!(ran.stdout.contains(word), "{shell}: {word}");
+        }
+    }
+    assert_eq!(run(&["completions", "abacus"]).code, Some(2));
+    let page = run(&["man"]).stdout;
+    assert!(page.contains(".TH") && page.contains("lumencast\\-bake"), "{page}");
+
+    let folder = Folder::new("man");
+    let ran = run(&["man", "-o", folder.0.join("man1").to_str().expect("text")]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let page = |name: &str| std::fs::read_to_string(folder.0.join("man1").join(name));
+    for (name, word) in [
+        ("lumencast.1", "bench"),
+        ("lumencast-bake.1", "samples"),
+        ("lumencast-bench-tick.1", "seconds"),
+    ] {
+        let page = page(name).unwrap_or_else(|error| panic!("{name}: {error}; {ran:?}"));
+        assert!(page.contains(".TH") && page.contains(word), "{name}");
+    }
+    assert!(page("lumencast-help.1").is_err());
 }

@@ -5,11 +5,11 @@
 
 mod common;
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use common::{Folder, run, run_with};
+use common::{Folder, Serving, run, run_with};
 use serde_json::{Value, json};
 
 /// So much work that a test which does it does not end in time.
@@ -153,6 +153,8 @@ fn output_that_cannot_be_printed_is_an_error() {
         &[&["render", "cornell", "-o", picture], &small[..]].concat(),
         &["compare", picture, picture],
         &["token", "cornell", "--token-key", key, "--generate"],
+        &["completions", "bash"],
+        &["man"],
         &["serve", "cornell", "--listen", "127.0.0.1:0", "--volume", "1x1x1"],
         &["serve", "cornell", "--listen", "127.0.0.1:0", "--volume", "1x1x1", "--json"],
         &["bench", "tick", "cornell", "--volume", "1x1x1", "--seconds", "0.1"],
@@ -240,5 +242,12 @@ fn names_steer_no_terminal() {
         }
     }
     assert!(shown >= 10, "names are shown all the same: {shown}");
-    drop(File::open(&odd).expect("it was there"));
+
+    let server = Serving::start(&scene, &["--volume", "1x1x1"]);
+    for arguments in [&["inspect", &server.url()][..], &["inspect", &server.url(), "--json"]] {
+        let ran = run(arguments);
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        assert!(ran.stdout.contains("0;title"), "its light's name is shown: {ran:?}");
+        assert!(!(ran.stdout + &ran.stderr).contains(steers));
+    }
 }
