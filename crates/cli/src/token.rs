@@ -7,6 +7,7 @@ use anyhow::{Result, ensure};
 use clap::Args;
 use lumencast_transport::Key;
 
+use crate::out_file;
 use crate::output::say;
 
 /// Issues a token that lets its bearer edit a scene.
@@ -37,8 +38,10 @@ impl Token {
         let path = &self.token_key;
         let key = if self.generate {
             ensure!(!path.exists(), "{} exists: leave --generate out to use it", path.display());
+            out_file::check(path)?;
             let key = Key::generate()?;
-            key.write(path)?;
+            // Part of a key is of no use, and would be taken for one.
+            key.write(path).inspect_err(|_| drop(std::fs::remove_file(path)))?;
             key
         } else {
             ensure!(path.exists(), "{} does not exist: --generate makes it", path.display());

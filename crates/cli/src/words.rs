@@ -59,7 +59,7 @@ fn words(value: &Value, of: Unit) -> String {
     match value {
         Value::String(text) => text.clone(),
         Value::Object(map) => {
-            let known = map.iter().filter(|(_, value)| !value.is_null());
+            let known = map.iter().filter(|(_, value)| !value.is_null() && *value != "");
             let pair = |(key, value): (&String, &Value)| {
                 format!("{} {}", label(key), words(value, unit(key, map, of)))
             };
@@ -157,13 +157,13 @@ mod tests {
     #[test]
     fn values_have_units() {
         let light = json!({ "node": 1234, "name": "lamp", "light": {
-            "type": "spot", "intensity": 1500.5, "outer": std::f32::consts::FRAC_PI_4, "range": null,
+            "type": "spot", "intensity": 1500.5, "outer": std::f32::consts::FRAC_PI_4, "range": null, "note": "",
         }});
         let said = entry_in_words("lights", &light);
         for part in ["node 1234", "name lamp", "intensity 1,500.5 cd", "outer 45°", "type spot"] {
             assert!(said.split(", ").any(|words| words.ends_with(part)), "{said}");
         }
-        assert!(!said.contains("range"), "{said}");
+        assert!(!said.contains("range") && !said.contains("note"), "{said}");
         let report = json!({
             "bounds": { "max": [1.0, 2000.0, f64::from(0.3_f32)] }, "bytes": 12_345, "tick": 12_345,
             "state": { "tick_ms": 31.25, "time": 8.04 }, "triangles": 262_144,

@@ -62,6 +62,20 @@ fn a_full_disk_and_a_crash_leave_the_old_file() {
 }
 
 #[test]
+fn part_of_a_key_is_not_left() {
+    let folder = Folder::new("part-of-key");
+    let key = folder.0.join("key.jwk");
+    let limited = "ulimit -f 0; trap '' XFSZ; exec \"$0\" token a --generate --token-key \"$1\"";
+    let ran = Command::new("sh")
+        .args(["-c", limited, env!("CARGO_BIN_EXE_lumencast"), text(&key)])
+        .output()
+        .expect("a shell");
+    assert_eq!(ran.status.code(), Some(1), "{ran:?}");
+    assert!(String::from_utf8_lossy(&ran.stderr).contains("key.jwk"), "{ran:?}");
+    assert_eq!(files(&folder), [] as [PathBuf; 0]);
+}
+
+#[test]
 fn devices_and_links_are_written_to_and_stay() {
     let folder = Folder::new("devices");
     let small = ["bake", "cornell", "--volume", "1x1x1", "--samples", "1", "-o"];

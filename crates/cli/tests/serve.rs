@@ -13,6 +13,7 @@ fn answers_over_http() {
     assert_eq!(start.status, 200);
     let start: serde_json::Value = serde_json::from_slice(&start.body).expect("JSON");
     assert_eq!((&start["scene"], &start["broadcast"]), (&"cornell".into(), &"cornell".into()));
+    assert!(start["tick"].is_u64(), "{start}");
 
     let root = start["root"].as_str().expect("a name");
     let scene = server.get(&format!("/scene/{root}"));
