@@ -18,6 +18,7 @@ Examples:
   lumencast completions zsh > ~/.zfunc/_lumencast
   lumencast completions fish > ~/.config/fish/completions/lumencast.fish")]
 pub(crate) struct Completions {
+    /// The shell that is to complete what is typed.
     shell: Shell,
 }
 
@@ -43,7 +44,9 @@ pub(crate) struct Manual {
 }
 
 impl Manual {
-    pub(crate) fn run(self, mut program: Command) -> Result<()> {
+    pub(crate) fn run(self, program: Command) -> Result<()> {
+        // `help` has no page; every command has --help.
+        let mut program = program.disable_help_subcommand(true);
         // Gives commands of commands their whole names.
         program.build();
         let Some(folder) = &self.output else { return print(page(&program)?) };
@@ -57,13 +60,12 @@ fn print(bytes: Vec<u8>) -> Result<()> {
     Ok(())
 }
 
-/// The pages of a command and of those below it that people are told of.
+/// The pages of a command and of those below it.
 fn write(command: &Command, folder: &Path) -> Result<()> {
     let path = folder.join(name(command)).with_extension("1");
     out_file::write(&path, &page(command)?)?;
     say!("{}", path.display());
-    let below = command.get_subcommands().filter(|c| !c.is_hide_set() && c.get_name() != "help");
-    below.into_iter().try_for_each(|below| write(below, folder))
+    command.get_subcommands().try_for_each(|below| write(below, folder))
 }
 
 fn name(command: &Command) -> &str {
