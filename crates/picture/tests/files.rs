@@ -1,9 +1,10 @@
 //! Files written and read again.
 
+use std::io::Write as _;
 use std::path::PathBuf;
 
 use glam::Vec3;
-use lumencast_picture::{Loaded, Picture, PictureError, ToneMap};
+use lumencast_picture::{Loaded, Picture, PictureError, ToneMap, check_place, write_whole};
 
 /// A folder of this test's own, removed at its end.
 struct Folder(PathBuf);
@@ -127,4 +128,39 @@ fn a_failed_write_leaves_what_was_there() {
     assert!(matches!(ramp().write_exr(folder.at("a.exr")), Err(PictureError::Write { .. })));
     assert_eq!(std::fs::read_dir(&folder.0).expect("a folder").count(), 1);
     assert!(folder.at("a.exr/inside").exists());
+}
+
+#[test]
+fn what_is_there_stays_until_all_is_written() {
+    let folder = Folder::new("whole");
+    let path = folder.at("a");
+    let count = || std::fs::read_dir(&folder.0).expect("a folder").count();
+    for place in [folder.at("no/such/folder"), folder.0.clone(), folder.at("..")] {
+        assert!(check_place(&place).is_err(), "{}", place.display());
+    }
+    check_place(&path).expect("a place");
+    assert_eq!(count(), 0, "nothing is left of the trial");
+
+    let write = |bytes: &[u8], end: std::io::Result<()>| {
+        write_whole(&path, |out| out.write_all(bytes).and(end))
+    };
+    write(b"old", Ok(())).expect("written");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let only_mine = std::fs::Permissions::from_mode(0o600);
+        std::fs::set_permissions(&path, only_mine).expect("its owner's");
+    }
+    check_place(&path).expect("a file that may be written");
+    write(b"new", Err(std::io::Error::other("no more"))).expect_err("it fails");
+    assert_eq!(std::fs::read(&path).expect("there"), b"old");
+    write(b"new", Ok(())).expect("written");
+    assert_eq!(std::fs::read(&path).expect("there"), b"new");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let mode = std::fs::metadata(&path).expect("there").permissions().mode();
+        assert_eq!(mode & 0o777, 0o600, "as it was");
+    }
+    assert_eq!(count(), 1);
 }
