@@ -14,6 +14,14 @@ pub enum WindowError {
     /// A picture cannot be saved.
     #[error(transparent)]
     Picture(#[from] PictureError),
+    /// There is nothing to take a picture of.
+    #[error("no light has come and settled within {} s. {notice}", patience.as_secs())]
+    NoLight {
+        /// How long it was waited for.
+        patience: std::time::Duration,
+        /// What the world says.
+        notice: String,
+    },
     /// There is no display to open a window on.
     #[error(
         "no window can be opened: {0}. Is there a display (DISPLAY or WAYLAND_DISPLAY)? Without one, \

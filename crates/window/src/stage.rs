@@ -305,6 +305,11 @@ impl Stage {
         changes.free.drain().collect()
     }
 
+    /// What people should know of the world.
+    pub(crate) fn notice(&self) -> String {
+        self.world.notice().unwrap_or_default()
+    }
+
     /// Whether light has come and has settled.
     pub(crate) fn has_settled_light(&self) -> bool {
         self.world.is_settled()
