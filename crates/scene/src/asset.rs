@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::Affine3A;
+use glam::{Affine3A, DAffine3};
 
 use crate::animation::Curve;
 use crate::settings::Settings;
@@ -38,7 +38,7 @@ pub(crate) struct AssetNode {
     pub(crate) parent_from_node: Trs,
     pub(crate) mesh: Option<u32>,
     /// Where the mesh is shown, relative to the node; once, at the node, where absent.
-    pub(crate) instances: Option<Arc<[Affine3A]>>,
+    pub(crate) instances: Option<Arc<[DAffine3]>>,
     pub(crate) skin: Option<u32>,
     pub(crate) camera: Option<u32>,
     pub(crate) light: Option<Light>,

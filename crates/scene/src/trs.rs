@@ -31,10 +31,10 @@ impl Trs {
     }
 
     pub(crate) fn is_within_limits(&self) -> bool {
-        let largest = self.translation.abs().max(self.scale.abs()).max_element();
+        let largest = self.translation.abs().max(self.scale.as_dvec3().abs()).max_element();
         let is_finite =
             self.translation.is_finite() && self.rotation.is_finite() && self.scale.is_finite();
-        is_finite && largest <= limits::EXTENT
+        is_finite && largest <= f64::from(limits::EXTENT)
     }
 
     /// Takes a matrix apart as three.js does: a mirroring one gets a negative x scale. The flag

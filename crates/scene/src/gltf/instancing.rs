@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::{Affine3A, Quat, Vec3};
+use glam::{DAffine3, DVec3, Quat, Vec3};
 
 use super::accessor::Accessors;
 use super::node::describe;
@@ -70,7 +70,7 @@ fn transforms(
     accessors: Accessors<'_>,
     attributes: &BTreeMap<String, usize>,
     count: u64,
-) -> Result<Arc<[Affine3A]>, Fault> {
+) -> Result<Arc<[DAffine3]>, Fault> {
     let index = |name: &str| attributes.get(name).copied();
     let translations = match index("TRANSLATION") {
         Some(index) => accessors.floats::<3>(index).at(|| "TRANSLATION".into())?,
@@ -84,7 +84,7 @@ fn transforms(
         Some(index) => accessors.floats::<3>(index).at(|| "SCALE".into())?,
         None => Vec::new(),
     };
-    accessors.budget.geometry::<Affine3A>(count as usize)?;
+    accessors.budget.geometry::<DAffine3>(count as usize)?;
     let transform = |i: usize| {
         let rotation = match rotations.get(i) {
             None => Quat::IDENTITY,
@@ -93,12 +93,12 @@ fn transforms(
             })?,
         };
         let trs = Trs {
-            translation: translations.get(i).map_or(Vec3::ZERO, |t| Vec3::from(*t)),
+            translation: translations.get(i).map_or(DVec3::ZERO, |t| Vec3::from(*t).as_dvec3()),
             rotation,
             scale: scales.get(i).map_or(Vec3::ONE, |s| Vec3::from(*s)),
         };
         match trs.is_within_limits() {
-            true => Ok(trs.affine()),
+            true => Ok(trs.precise()),
             false => Err(invalid(format!(
                 "the transform of instance {i} is not finite or over {:e}",
                 limits::EXTENT

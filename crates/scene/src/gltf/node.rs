@@ -1,6 +1,6 @@
 //! Nodes, lights and cameras of a glTF.
 
-use glam::{Mat4, Quat, Vec3};
+use glam::{DMat4, DVec3, Quat, Vec3};
 
 use super::json;
 use crate::asset::{AssetNode, Camera, Projection, Skin};

@@ -7,7 +7,7 @@ use glam::{Affine3A, DAffine3, Mat3A, Vec3, Vec3A};
 
 use super::Scene;
 use super::nodes::{Node, PlacedSkin};
-use crate::trs::{is_in_world, is_invertible};
+use crate::trs::is_invertible;
 use crate::{Deformation, Instance, Mesh, NodeId, PlacedLight, Pose, Snapshot};
 
 /// Deformations by node, kept while they stay as they are.
@@ -58,15 +58,9 @@ impl Scene {
 
     pub(super) fn instances(&self, deformations: &mut Deformations) -> Vec<Instance> {
         let mut instances = Vec::new();
-        for (id, node, world) in self.nodes.shown() {
-            match &node.instances {
-                None => instances.extend(self.instance(id, node, world, deformations)),
-                Some(places) => {
-                    let worlds = places.iter().map(|place| world * *place).filter(is_in_world);
-                    let of_world = |world| self.instance(id, node, world, deformations);
-                    instances.extend(worlds.filter_map(of_world));
-                }
-            }
+        for (id, node, place) in self.nodes.shown() {
+            let of_place = |place| self.instance(id, node, &place, deformations);
+            instances.extend(node.places(&place).filter_map(of_place));
         }
         instances
     }
@@ -123,10 +117,11 @@ impl Scene {
         placed.skin.joints.iter().map(world_from_rest).collect()
     }
 
-    /// Every punctual light that is shown in the scene, also those without intensity.
+    /// Every punctual light that is shown in the scene, also those without intensity; as in a snapshot,
+    /// their places are relative to [`Snapshot::origin`].
     pub fn lights(&self) -> Vec<PlacedLight> {
-        let shown = self.nodes.shown();
-        shown.into_iter().filter_map(|(id, node, world)| place_light(id, node, &world)).collect()
+        let shown = self.nodes.shown().into_iter();
+        shown.filter_map(|(id, node, place)| place_light(id, node, &place.as_affine3a())).collect()
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::{Affine3A, DAffine3};
+use glam::Affine3A;
 
 use super::capture::Deformations;
 use super::nodes::{Node, Nodes, PlacedSkin};
@@ -123,18 +123,19 @@ impl Scene {
     /// Makes places relative to the scene's own middle, and warns of what is lost all the same.
     fn choose_origin(&mut self) {
         let mut boxes = HashMap::new();
-        let lump = |(_, node, place): (NodeId, &Node, DAffine3)| {
-            let mesh = &self.meshes[node.mesh?.0 as usize];
-            let lump = match &node.skin {
-                None => {
-                    Lump::placed(boxes.entry(node.mesh).or_insert_with(|| mesh.bounds()), &place)
-                }
+        let mut lumps = Vec::new();
+        for (_, node, place) in self.nodes.shown() {
+            let Some(id) = node.mesh else { continue };
+            let mesh = &self.meshes[id.0 as usize];
+            let bounds = boxes.entry(id).or_insert_with(|| mesh.bounds());
+            let lump = |place| match &node.skin {
+                None => Lump::placed(bounds, &place),
                 Some(skin) => self.lump_of_joints(skin),
             };
-            let lump = Lump { triangles: mesh.triangle_count(), ..lump };
-            (lump.min.is_finite() && lump.max.is_finite()).then_some(lump)
-        };
-        let lumps: Vec<_> = self.nodes.placed().into_iter().filter_map(lump).collect();
+            let triangles = mesh.triangle_count();
+            let placed = node.places(&place).map(|place| Lump { triangles, ..lump(place) });
+            lumps.extend(placed.filter(|lump| lump.min.is_finite() && lump.max.is_finite()));
+        }
         let origin = origin::of_scene(&lumps);
         self.nodes.set_origin(origin);
         self.warnings.extend(origin::warnings(&lumps, origin));

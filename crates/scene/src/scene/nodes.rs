@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DAffine3, Vec3};
 
 use crate::asset::Skin;
-use crate::trs::Trs;
+use crate::trs::{Trs, is_in_world};
 use crate::{Light, MeshId, NodeId};
 
 /// A node of the scene.
@@ -18,7 +18,7 @@ pub(crate) struct Node {
     pub(crate) parent_from_node: Trs,
     pub(crate) mesh: Option<MeshId>,
     /// Where the mesh is shown, relative to the node; once, at the node, where absent.
-    pub(crate) instances: Option<Arc<[Affine3A]>>,
+    pub(crate) instances: Option<Arc<[DAffine3]>>,
     pub(crate) skin: Option<PlacedSkin>,
     pub(crate) light: Option<Light>,
     /// Model and index of its camera.
@@ -47,11 +47,22 @@ pub(crate) struct Nodes {
     next: u32,
     /// Of all nodes that have a list of them.
     instances: usize,
+    /// The point of the world that places are relative to.
+    origin: Vec3,
 }
 
 impl Node {
     fn instance_count(&self) -> usize {
         self.instances.as_ref().map_or(0, |instances| instances.len())
+    }
+
+    /// Where its mesh is shown when the node is there: once, or for each instance that has a place in
+    /// the world.
+    pub(crate) fn places(&self, node: &DAffine3) -> impl Iterator<Item = DAffine3> {
+        let once = self.instances.is_none().then_some(*node);
+        let instances = self.instances.as_deref().unwrap_or_default();
+        let placed = instances.iter().map(move |place| *node * *place);
+        once.into_iter().chain(placed.filter(|place| is_in_world(&place.as_affine3a())))
     }
 }
 
@@ -154,38 +165,41 @@ impl Nodes {
         self.place_of_world() * place
     }
 
-    /// Nodes of the scene, parents first, with their place in the world.
-    pub(crate) fn placed(&self) -> Vec<(NodeId, &Node, Affine3A)> {
-        let roots = self.roots.iter().map(|root| (*root, Affine3A::IDENTITY));
-        self.placed_below(roots, |_| true)
+    /// Nodes of the scene, parents first, with their places.
+    pub(crate) fn placed(&self) -> Vec<(NodeId, &Node, DAffine3)> {
+        self.placed_below(self.tops(), |_| true)
     }
 
     /// Those of them that are neither hidden nor below a hidden node.
-    pub(crate) fn shown(&self) -> Vec<(NodeId, &Node, Affine3A)> {
-        let roots = self.roots.iter().map(|root| (*root, Affine3A::IDENTITY));
-        self.placed_below(roots, |node| !node.hidden)
+    pub(crate) fn shown(&self) -> Vec<(NodeId, &Node, DAffine3)> {
+        self.placed_below(self.tops(), |node| !node.hidden)
+    }
+
+    /// The roots, with what they are placed in.
+    fn tops(&self) -> impl Iterator<Item = (NodeId, DAffine3)> {
+        self.roots.iter().map(|root| (*root, self.place_of_world()))
     }
 
     /// A node and all below it, parents first, with their places.
     pub(crate) fn placed_from(&self, id: NodeId) -> Vec<(NodeId, &Node, DAffine3)> {
         let parent = self.nodes.get(&id).and_then(|n| n.parent);
-        let world = parent.map_or(Affine3A::IDENTITY, |parent| self.world_from_node(parent));
-        self.placed_below([(id, world)].into_iter(), |_| true)
+        let place = parent.map_or(self.place_of_world(), |parent| self.place_of(parent));
+        self.placed_below([(id, place)].into_iter(), |_| true)
     }
 
     fn placed_below(
         &self,
-        tops: impl Iterator<Item = (NodeId, Affine3A)>,
+        tops: impl Iterator<Item = (NodeId, DAffine3)>,
         wanted: impl Fn(&Node) -> bool,
-    ) -> Vec<(NodeId, &Node, Affine3A)> {
+    ) -> Vec<(NodeId, &Node, DAffine3)> {
         let mut placed = Vec::with_capacity(self.nodes.len());
         let mut open: Vec<_> = tops.collect();
         open.reverse();
-        while let Some((id, world_from_parent)) = open.pop() {
+        while let Some((id, parent)) = open.pop() {
             let Some(node) = self.nodes.get(&id).filter(|node| wanted(node)) else { continue };
-            let world = world_from_parent * node.parent_from_node.affine();
-            placed.push((id, node, world));
-            open.extend(node.children.iter().rev().map(|child| (*child, world)));
+            let place = parent * node.parent_from_node.precise();
+            placed.push((id, node, place));
+            open.extend(node.children.iter().rev().map(|child| (*child, place)));
         }
         placed
     }

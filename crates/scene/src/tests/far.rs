@@ -71,8 +71,52 @@ fn places_keep_their_digits() {
         // Whatever else has a place has it in the world.
         let bounds = scene.bounds();
         assert!((bounds.min - far.as_vec3()).abs().max_element() <= 0.5, "{bounds:?}");
-        assert!(scene.volumes()[0].grid.distance(far.as_vec3()) < 1.0);
     }
+}
+
+/// A triangle as the instances of one node, which are these from it.
+fn instanced(far: DVec3, steps: &[Vec3]) -> Writer {
+    let mut w = Writer::default();
+    let positions = w.floats("VEC3", &TRIANGLE);
+    w.add("meshes", json!({ "primitives": [{ "attributes": { "POSITION": positions } }] }));
+    let translations = w.vectors(steps);
+    let extensions =
+        json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": translations } } });
+    w.node(json!({ "mesh": 0, "translation": far.to_array(), "extensions": extensions }));
+    w
+}
+
+/// Instances of a node in map coordinates are as far from each other as the file says.
+#[test]
+fn instances_keep_their_digits() {
+    let steps = [Vec3::ZERO, Vec3::new(0.011, 0.0, 0.003), Vec3::new(-0.25, 7.013, 40.002)];
+    for far in [DVec3::new(1e6 + 0.37, 120.2, -0.61), DVec3::new(-1e6 - 0.02, 0.3, 1e6 + 0.3)] {
+        let mut scene = load(instanced(far, &steps));
+        let snapshot = scene.snapshot();
+        assert!(snapshot.origin.as_dvec3().distance(far) < 1024.0, "{}", snapshot.origin);
+        assert_eq!(snapshot.instances.len(), steps.len());
+        for (n, step) in steps.iter().enumerate() {
+            let found = place(&snapshot, n, Vec3::ZERO);
+            let apart = found - place(&snapshot, 0, Vec3::ZERO);
+            assert!(apart.distance(step.as_dvec3()) < 1e-4, "{apart} {step}");
+            assert!(found.distance(far + step.as_dvec3()) < 1e-3, "{found}");
+        }
+    }
+}
+
+/// The origin is where a node's instances are, wherever the node is, and not where a hidden node is.
+#[test]
+fn the_origin_is_about_what_is_shown() {
+    let far = Vec3::X * 1e6;
+    let mut scene = load(instanced(DVec3::ZERO, &[far, far + Vec3::Y]));
+    assert!(scene.snapshot().origin.distance(far) < 1024.0);
+    assert!(scene.warnings().join("\n").contains("1000 km"), "{:?}", scene.warnings());
+
+    let mut hidden = at(far.as_dvec3());
+    hidden["extensions"] = json!({ "KHR_node_visibility": { "visible": false } });
+    let mut scene = load(triangles(&[hidden.clone(), at(DVec3::ZERO), hidden]));
+    assert_eq!(scene.snapshot().origin, Vec3::ZERO);
+    assert!(!scene.warnings().join("\n").contains("km"), "{:?}", scene.warnings());
 }
 
 /// Vertices that lie far from their mesh's origin are where the file has them.

@@ -4,6 +4,7 @@ mod bad_input;
 mod deforming;
 mod edits;
 mod exporters;
+mod far;
 mod files;
 mod geometry;
 mod mended;
