@@ -10,7 +10,8 @@ use crate::{Offset, Order, ProbeVolume};
 ///
 /// Where a volume ends, light passes smoothly into the next coarser one over the outermost half
 /// cell, or into those that abut: on a shared face the mean of both counts. Beyond all volumes the
-/// nearest one's border counts.
+/// nearest one's border counts. A surface's point counts where its light is read, half a cell in front
+/// of it at least ([`ProbeVolume::place`]), so that a wall in a shared face parts them.
 ///
 /// ```
 /// use glam::{Quat, UVec3, Vec3};
@@ -53,6 +54,11 @@ impl LightField {
         &mut self.volumes
     }
 
+    /// The volumes as they are.
+    pub fn into_volumes(self) -> Vec<ProbeVolume> {
+        self.volumes
+    }
+
     /// All light convolved by a lobe, or through a window (see [`crate::zh`]).
     #[must_use]
     pub fn convolved(mut self, bands: &Bands) -> Self {
@@ -78,42 +84,49 @@ impl LightField {
         self
     }
 
+    /// How much each volume counts for a point of a surface with a world `normal` (zero in free space):
+    /// their numbers and shares above 0, together 1. None where there is no volume.
+    pub fn shares(&self, position: Vec3, normal: Vec3) -> Vec<(usize, f32)> {
+        let volumes = &self.volumes;
+        let places: Vec<Vec3> = volumes.iter().map(|v| v.place(position, normal)).collect();
+        let each = || volumes.iter().map(|v| &v.grid).zip(&places);
+        let mut unclaimed = 1.0;
+        let mut shares: Vec<f32> = each()
+            .map(|(grid, place)| {
+                let claimed = unclaimed * grid.weight(*place);
+                unclaimed -= claimed;
+                claimed
+            })
+            .collect();
+        if unclaimed > 0.0 {
+            let reaches: Vec<f32> = each().map(|(grid, place)| grid.reach(*place)).collect();
+            let all: f32 = reaches.iter().sum();
+            let distances = each().map(|(grid, place)| grid.beyond(*place)).enumerate();
+            if all > 0.0 {
+                shares
+                    .iter_mut()
+                    .zip(&reaches)
+                    .for_each(|(s, reach)| *s += unclaimed * reach / all);
+            } else if let Some((nearest, _)) = distances.min_by(|a, b| a.1.total_cmp(&b.1)) {
+                shares[nearest] += unclaimed;
+            }
+        }
+        shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0).collect()
+    }
+
     /// Light at a world position on a surface with a world `normal` (zero in free space); `None`
     /// when there is no volume.
     pub fn sample(&self, position: Vec3, normal: Vec3) -> Option<Sh> {
-        if self.volumes.is_empty() {
-            return None;
+        if let [only] = &self.volumes[..] {
+            return Some(only.sample(position, normal));
         }
         // Of the lowest order; what is added raises it to its own.
-        let mut light = Sh::dark(Order::L1);
-        let mut add = |volume: &ProbeVolume, weight: f32| {
-            if weight > 0.0 {
-                light.add_scaled(&volume.sample(position, normal), weight);
-            }
-        };
-        let mut left = 1.0;
-        for volume in &self.volumes {
-            let weight = left * volume.grid.weight(position);
-            add(volume, weight);
-            left -= weight;
-            if left <= 0.0 {
-                return Some(light);
-            }
-        }
-        let reach: f32 = self.volumes.iter().map(|volume| volume.grid.reach(position)).sum();
-        if reach > 0.0 {
-            for volume in &self.volumes {
-                add(volume, left * volume.grid.reach(position) / reach);
-            }
-        } else {
-            add(self.nearest(position)?, left);
-        }
-        Some(light)
-    }
-
-    fn nearest(&self, position: Vec3) -> Option<&ProbeVolume> {
-        let distance = |volume: &ProbeVolume| volume.grid.distance(position);
-        self.volumes.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        let dark = (!self.volumes.is_empty()).then(|| Sh::dark(Order::L1));
+        self.shares(position, normal).into_iter().fold(dark, |light, (volume, share)| {
+            let mut light = light?;
+            light.add_scaled(&self.volumes[volume].sample(position, normal), share);
+            Some(light)
+        })
     }
 
     /// Irradiance on a surface, lux; black when there is no volume.
@@ -199,6 +212,44 @@ mod tests {
                 assert!(worst <= steepest, "{cells} {y}: {worst}");
             }
             assert!((read(&field, 0.0) - 1.5).abs() < 1e-6, "the mean on the face");
+        }
+    }
+
+    /// The sides of a wall belong to the volumes that they face, however near to the face it stands, and
+    /// wherever light is read.
+    #[test]
+    fn a_wall_in_a_shared_face_parts_the_volumes() {
+        let field = LightField::new(vec![
+            uniform(0, Vec3::X * -2.0, 4.0, 4, 1.0),
+            uniform(1, Vec3::X * 2.0, 4.0, 4, 2.0),
+        ]);
+        for offset in [Offset::NONE, Offset::Cells(0.125), Offset::HALF_CELL, Offset::Metres(0.2)] {
+            let field = field.clone().read_at(offset);
+            for (x, normal, own) in [(-0.1, Vec3::NEG_X, 1.0), (0.1, Vec3::X, 2.0)] {
+                for x in [x, 0.0, 0.5 * x] {
+                    let light = field.sample(Vec3::X * x, normal).unwrap();
+                    assert!((light.coefficients[0].x - own).abs() < 1e-6, "{offset:?} {x}");
+                }
+                // What crosses the wall still passes smoothly.
+                let floor = field.sample(Vec3::ZERO, Vec3::Y).unwrap();
+                assert_eq!(floor.coefficients[0].x, 1.5);
+            }
+        }
+    }
+
+    #[test]
+    fn shares_add_up_to_one() {
+        let field = LightField::new(vec![
+            uniform(0, Vec3::X * -2.0, 4.0, 4, 1.0),
+            uniform(1, Vec3::X * 2.0, 4.0, 2, 2.0),
+            uniform(2, Vec3::ZERO, 20.0, 5, 3.0),
+        ]);
+        for x in -120..=120 {
+            for normal in [Vec3::ZERO, Vec3::X, Vec3::new(-0.6, 0.8, 0.0)] {
+                let shares = field.shares(Vec3::new(x as f32 * 0.1, 1.9, 0.0), normal);
+                let sum: f32 = shares.iter().map(|(_, share)| share).sum();
+                assert!((sum - 1.0).abs() < 1e-6, "{x}: {shares:?}");
+            }
         }
     }
 

@@ -53,14 +53,17 @@ impl Grid {
 
     /// Distance of a world position from the box, metres; 0 inside.
     pub fn distance(&self, position: Vec3) -> f32 {
-        let local = self.rotation.inverse() * (position - self.center);
-        (local.abs() - 0.5 * self.size).max(Vec3::ZERO).length()
+        self.beyond(self.cell_from_world(position))
     }
 
-    /// How much a world position belongs to the box: 1 inside the outermost probes' centres, falling
+    /// Distance of a place in cells from the box, metres; 0 inside.
+    pub fn beyond(&self, cell: Vec3) -> f32 {
+        (self.outside(cell) * self.spacing()).length()
+    }
+
+    /// How much a place in cells belongs to the box: 1 inside the outermost probes' centres, falling
     /// smoothly (3t² − 2t³) to 0 at the border, half a cell farther out.
-    pub fn weight(&self, position: Vec3) -> f32 {
-        let cell = self.cell_from_world(position);
+    pub fn weight(&self, cell: Vec3) -> f32 {
         let to_border = (cell + 0.5).min(self.resolution.as_vec3() - 0.5 - cell);
         // An axis of one cell reaches from border to border: half of it is half a cell.
         let t = (2.0 * to_border).clamp(Vec3::ZERO, Vec3::ONE);
@@ -69,10 +72,13 @@ impl Grid {
 
     /// How much of what no box claims belongs to this one: 1 inside and on the border, falling
     /// linearly to 0 half a cell outside.
-    pub fn reach(&self, position: Vec3) -> f32 {
-        let cell = self.cell_from_world(position);
-        let outside = (-0.5 - cell).max(cell + 0.5 - self.resolution.as_vec3()).max(Vec3::ZERO);
-        (1.0 - 2.0 * outside).max(Vec3::ZERO).element_product()
+    pub fn reach(&self, cell: Vec3) -> f32 {
+        (1.0 - 2.0 * self.outside(cell)).max(Vec3::ZERO).element_product()
+    }
+
+    /// By how many cells a place lies outside the box, along each axis.
+    fn outside(&self, cell: Vec3) -> Vec3 {
+        (-0.5 - cell).max(cell + 0.5 - self.resolution.as_vec3()).max(Vec3::ZERO)
     }
 }
 
@@ -89,12 +95,24 @@ pub struct Corners {
 }
 
 impl ProbeVolume {
+    /// Where a point of a surface counts as lying when volumes share it, in cells: moved along its
+    /// world `normal` (zero in free space) as far as light is read, and half a cell at least. So the two
+    /// sides of a wall in which volumes meet belong to the volumes that they face.
+    pub fn place(&self, position: Vec3, normal: Vec3) -> Vec3 {
+        self.moved(position, normal, self.offset.in_cells(&self.grid).max(Vec3::splat(0.5)))
+    }
+
+    /// A world position in cells, moved by so many of them along a world normal.
+    fn moved(&self, position: Vec3, normal: Vec3, cells: Vec3) -> Vec3 {
+        let out = self.grid.rotation.inverse() * normal.normalize_or_zero();
+        self.grid.cell_from_world(position) + cells * out
+    }
+
     /// Where light is read for a point of a surface with a world `normal` (zero in free space).
     /// Points that are not finite read the first probe.
     pub fn corners(&self, position: Vec3, normal: Vec3) -> Corners {
         let grid = &self.grid;
-        let out = grid.rotation.inverse() * normal.normalize_or_zero();
-        let cell = grid.cell_from_world(position) + self.offset.in_cells(grid) * out;
+        let cell = self.moved(position, normal, self.offset.in_cells(grid));
         let last = (grid.resolution - 1).as_vec3();
         let clamped = if cell.is_finite() { cell.clamp(Vec3::ZERO, last) } else { Vec3::ZERO };
         let low = clamped.floor();

@@ -40,14 +40,25 @@ fn cell_of(number: u32, position: vec3f) -> vec3f {
     return transform_point(volumes[number].cell_from_world, position);
 }
 
-// How much a cell's position belongs to the box (Grid::weight).
+// A normal along the box's axes.
+fn out_of(number: u32, normal: vec3f) -> vec3f {
+    return transform_vector(volumes[number].cell_from_world, normal) * volumes[number].spacing;
+}
+
+// Where a surface's point counts as lying when volumes share it (ProbeVolume::place).
+fn place_of(number: u32, position: vec3f, normal: vec3f) -> vec3f {
+    let cells = max(volumes[number].offset, vec3f(0.5));
+    return cell_of(number, position) + cells * out_of(number, normal);
+}
+
+// How much a place in cells belongs to the box (Grid::weight).
 fn weight_in(resolution: vec3f, cell: vec3f) -> f32 {
     let t = clamp(2.0 * min(cell + 0.5, resolution - 0.5 - cell), vec3f(0.0), vec3f(1.0));
     let s = t * t * (3.0 - 2.0 * t);
     return s.x * s.y * s.z;
 }
 
-// By how many cells a position lies outside the box.
+// By how many cells a place lies outside the box.
 fn outside(resolution: vec3f, cell: vec3f) -> vec3f {
     return max(max(-0.5 - cell, cell + 0.5 - resolution), vec3f(0.0));
 }
@@ -59,9 +70,9 @@ fn reach_of(resolution: vec3f, cell: vec3f) -> f32 {
 }
 
 // Where the texture is read for a surface: in cells, clamped to the outermost probes.
-fn sampled_cell(number: u32, cell: vec3f, normal: vec3f) -> vec3f {
-    let out = transform_vector(volumes[number].cell_from_world, normal) * volumes[number].spacing;
-    return clamp(cell + volumes[number].offset * out, vec3f(0.0), volumes[number].resolution - 1.0);
+fn sampled_cell(number: u32, position: vec3f, normal: vec3f) -> vec3f {
+    let cell = cell_of(number, position) + volumes[number].offset * out_of(number, normal);
+    return clamp(cell, vec3f(0.0), volumes[number].resolution - 1.0);
 }
 
 // A group of four coefficients, three texels of four channels each, weighed.
@@ -121,12 +132,12 @@ fn volume_light(number: u32, cell: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
 fn field_light(position: vec3f, normal: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
     if field.count == 1u {
         // All that there is has all of every point.
-        let light = volume_light(0u, sampled_cell(0u, cell_of(0u, position), normal), a, b);
+        let light = volume_light(0u, sampled_cell(0u, position, normal), a, b);
         return TwoLobes(max(light.a, vec3f(0.0)), max(light.b, vec3f(0.0)));
     }
     var unclaimed = 1.0;
     for (var i = 0u; i < field.count && unclaimed > 0.0; i++) {
-        unclaimed -= unclaimed * weight_in(volumes[i].resolution, cell_of(i, position));
+        unclaimed -= unclaimed * weight_in(volumes[i].resolution, place_of(i, position, normal));
     }
     var reach = 0.0;
     var nearest = 0u;
@@ -134,10 +145,10 @@ fn field_light(position: vec3f, normal: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
         var least = 3.4e38;
         for (var i = 0u; i < field.count; i++) {
             let resolution = volumes[i].resolution;
-            let cell = cell_of(i, position);
-            reach += reach_of(resolution, cell);
-            // Metres (Grid::distance).
-            let distance = length(outside(resolution, cell) * volumes[i].spacing);
+            let place = place_of(i, position, normal);
+            reach += reach_of(resolution, place);
+            // Metres (Grid::beyond).
+            let distance = length(outside(resolution, place) * volumes[i].spacing);
             if distance < least {
                 nearest = i;
                 least = distance;
@@ -148,16 +159,16 @@ fn field_light(position: vec3f, normal: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
     var left = 1.0;
     for (var i = 0u; i < field.count && left + unclaimed > 0.0; i++) {
         let resolution = volumes[i].resolution;
-        let cell = cell_of(i, position);
-        let claimed = left * weight_in(resolution, cell);
+        let place = place_of(i, position, normal);
+        let claimed = left * weight_in(resolution, place);
         left -= claimed;
         var share = select(0.0, 1.0, i == nearest);
         if reach > 0.0 {
-            share = reach_of(resolution, cell) / reach;
+            share = reach_of(resolution, place) / reach;
         }
         let weight = claimed + unclaimed * share;
         if weight > 0.0 {
-            let light = volume_light(i, sampled_cell(i, cell, normal), a, b);
+            let light = volume_light(i, sampled_cell(i, position, normal), a, b);
             sum.a += weight * light.a;
             sum.b += weight * light.b;
         }
