@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
-use lumencast_gather::fit::{FitSettings, Surroundings};
+use lumencast_gather::fit::{FitSettings, Part, Surroundings, fit};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Place, Receiver, Sums};
-use lumencast_light::{Grid, Offset, Order, ProbeVolume, VolumeId};
+use lumencast_light::{Grid, LightField, Offset, Order, ProbeVolume, VolumeId};
 use lumencast_scene::{Environment, Light, LightKind, Material, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -37,23 +37,39 @@ fn look(scene: &Arc<Snapshot>, grid: Grid, bounces: u32) -> (ProbeVolume, Surrou
     (volume, Surroundings::new(&gather(job)))
 }
 
-/// The volume fitted to what its surroundings receive.
-fn fitted(
-    scene: &Arc<Snapshot>,
-    volume: &ProbeVolume,
-    around: &Surroundings,
-    bounces: u32,
-    settings: &FitSettings,
-) -> ProbeVolume {
+/// What a volume's surroundings receive.
+fn known(scene: &Arc<Snapshot>, around: &Surroundings, bounces: u32) -> Vec<Option<Vec3>> {
     let (numbers, receivers): (Vec<usize>, Vec<Receiver>) = around.receivers(256).unzip();
     let lit = gather(Job { bounces, ..Job::new(scene.clone(), receivers) });
     let mut known = vec![None; around.points().len()];
     for (number, sums) in numbers.into_iter().zip(&lit) {
         known[number] = Some(irradiance(sums));
     }
-    let mut result = volume.clone();
-    around.fit(&mut result, volume, |point| known[point], settings);
-    result
+    known
+}
+
+/// The fit of a single volume to what is known of its surroundings, beginning from `start`.
+fn fit_one(
+    start: &ProbeVolume,
+    gathered: &ProbeVolume,
+    around: &Surroundings,
+    known: impl Fn(usize) -> Option<Vec3>,
+) -> ProbeVolume {
+    let irradiance = (0..around.points().len()).map(known).collect();
+    let mut light = LightField::new(vec![start.clone()]);
+    fit(&mut light, &[Part { gathered, around, irradiance }], &FitSettings::default());
+    light.into_volumes().remove(0)
+}
+
+/// The volume fitted to what its surroundings receive.
+fn fitted(
+    scene: &Arc<Snapshot>,
+    volume: &ProbeVolume,
+    around: &Surroundings,
+    bounces: u32,
+) -> ProbeVolume {
+    let known = known(scene, around, bounces);
+    fit_one(volume, volume, around, |point| known[point])
 }
 
 /// Two rooms with a wall between them that is thinner than a cell: a lamp shines in one, the other
@@ -106,7 +122,7 @@ fn wall(scene: &Arc<Snapshot>, volume: &ProbeVolume, normal: Vec3) -> [f32; 2] {
 fn light_does_not_leak_through_a_wall_within_a_cell() {
     let scene = rooms();
     let (gathered, around) = look(&scene, grid_of_rooms(), 3);
-    let volume = fitted(&scene, &gathered, &around, 3, &FitSettings::default());
+    let volume = fitted(&scene, &gathered, &around, 3);
     let [leaked, nothing] = wall(&scene, &gathered, Vec3::X);
     let [left, _] = wall(&scene, &volume, Vec3::X);
     let [before, bright] = wall(&scene, &gathered, Vec3::NEG_X);
@@ -117,12 +133,68 @@ fn light_does_not_leak_through_a_wall_within_a_cell() {
     assert!(after < 0.5 * before, "{after} of {before} is left");
 }
 
+/// Two volumes that meet in the wall are fitted together, since clients read them together: the floor
+/// beside the wall, where both count, comes nearer on either side.
+#[test]
+fn volumes_that_meet_in_a_wall_are_fitted_together() {
+    let scene = rooms();
+    let whole = grid_of_rooms();
+    let part = |from: f32, to: f32| Grid {
+        center: Vec3::X * 0.5 * (from + to),
+        size: whole.size.with_x(to - from),
+        resolution: UVec3::new(3, 2, 3),
+        ..whole
+    };
+    let grids = [part(-3.0, 0.2), part(0.2, 3.0)];
+    let looks: Vec<_> = (0..)
+        .zip(grids)
+        .map(|(id, grid)| {
+            let (mut volume, around) = look(&scene, grid, 3);
+            volume.id = VolumeId(id);
+            (volume, around)
+        })
+        .collect();
+    let gathered = LightField::new(looks.iter().map(|(volume, _)| volume.clone()).collect());
+    let mut light = gathered.clone();
+    let parts: Vec<Part<'_>> = light
+        .volumes()
+        .iter()
+        .map(|volume| {
+            let (gathered, around) = &looks[volume.id.0 as usize];
+            Part { gathered, around, irradiance: known(&scene, around, 3) }
+        })
+        .collect();
+    fit(&mut light, &parts, &FitSettings::default());
+    let at = |i: u32| {
+        let x = 0.2 + if i < 30 { -0.4 } else { 0.1 } + 0.3 * (i % 5) as f32 / 4.0;
+        Vec3::new(x, -1.0, 0.45 * (i % 30 / 5) as f32 - 1.1)
+    };
+    let receiver = |i: u32| Receiver {
+        place: Place::Lumel { position: at(i), normal: Vec3::Y, footprint: [Vec3::ZERO; 2] },
+        samples: 1024,
+    };
+    let lit = gather(Job::new(scene.clone(), (0..60).map(receiver).collect::<Vec<_>>()));
+    let bright = (0..30).map(|i| irradiance(&lit[i]).y).sum::<f32>() / 30.0;
+    assert!(bright > 0.0 && lit[30..].iter().all(|sums| irradiance(sums) == Vec3::ZERO));
+    // As it is displayed.
+    let code = |irradiance: f32| (irradiance.max(0.0) / bright).powf(1.0 / 2.2);
+    let off = |light: &LightField| {
+        let squares = (0..60).map(|i| {
+            let read = code(light.irradiance(at(i), Vec3::Y).y);
+            (read - code(irradiance(&lit[i as usize]).y)).powi(2)
+        });
+        (squares.sum::<f32>() / 60.0).sqrt()
+    };
+    assert!(off(&gathered) > 0.1, "without a fit it leaks");
+    assert!(off(&light) < off(&gathered), "{} {}", off(&light), off(&gathered));
+}
+
 /// Bands that only specular light reads are those that were gathered; the others, the fit's of L2.
 #[test]
 fn higher_bands_stay() {
     let scene = rooms();
     let (low, around) = look(&scene, grid_of_rooms(), 1);
-    let fitted_low = fitted(&scene, &low, &around, 1, &FitSettings::default());
+    let fitted_low = fitted(&scene, &low, &around, 1);
     for order in [Order::L3, Order::L4] {
         let mut gathered = ProbeVolume::dark(VolumeId(0), low.grid, order);
         for probe in 0..low.grid.probe_count() {
@@ -130,12 +202,12 @@ fn higher_bands_stay() {
             light.fill(Vec3::splat(0.3));
             light[..9].copy_from_slice(low.probe(probe));
         }
-        let mut volume = ProbeVolume::dark(VolumeId(0), low.grid, order);
-        let irradiance = |point: usize| {
+        let dark = ProbeVolume::dark(VolumeId(0), low.grid, order);
+        let known = |point: usize| {
             let at = around.points()[point]?;
             Some(fitted_low.sample(at.position, at.normal).irradiance(at.normal))
         };
-        around.fit(&mut volume, &gathered, irradiance, &FitSettings::default());
+        let volume = fit_one(&dark, &gathered, &around, known);
         let scale = mean(low.grid, &fitted_low);
         for probe in 0..low.grid.probe_count() {
             let (all, own) = (volume.probe(probe), gathered.probe(probe));
@@ -157,7 +229,7 @@ fn it_is_fitted_for_where_clients_read() {
     let here = gathered.offset;
     for [own, other] in [[here, Offset::NONE], [Offset::NONE, here]] {
         let gathered = gathered.clone().read_at(own);
-        let volume = fitted(&scene, &gathered, &around, 3, &FitSettings::default());
+        let volume = fitted(&scene, &gathered, &around, 3);
         assert_eq!(volume.offset, own);
         let right = wall(&scene, &volume, Vec3::NEG_X)[0];
         let wrong = wall(&scene, &volume.read_at(other), Vec3::NEG_X)[0];
@@ -176,7 +248,7 @@ fn what_is_right_stays() {
     let scene = stage.snapshot();
     let grid = Grid { size: Vec3::splat(3.0), resolution: UVec3::splat(3), ..grid_of_rooms() };
     let (gathered, around) = look(&scene, grid, 0);
-    let volume = fitted(&scene, &gathered, &around, 0, &FitSettings::default());
+    let volume = fitted(&scene, &gathered, &around, 0);
     assert!(around.points().iter().flatten().count() > 100);
     for probe in 0..grid.probe_count() {
         for (c, g) in volume.probe(probe).iter().zip(gathered.probe(probe)) {
@@ -188,18 +260,36 @@ fn what_is_right_stays() {
 #[test]
 fn without_light_or_surfaces_it_is_what_was_gathered() {
     let (gathered, around) = look(&Stage::default().snapshot(), grid_of_rooms(), 3);
-    let mut volume = gathered.clone();
-    volume.coefficients.fill(Vec3::ONE);
-    around.fit(&mut volume, &gathered, |_| None, &FitSettings::default());
-    assert_eq!(volume, gathered);
+    let mut other = gathered.clone();
+    other.coefficients.fill(Vec3::ONE);
+    assert_eq!(fit_one(&other, &gathered, &around, |_| None), gathered);
     let scene = rooms();
     let (mut gathered, around) = look(&scene, grid_of_rooms(), 3);
     gathered.coefficients.fill(Vec3::ZERO);
-    let mut volume = gathered.clone();
-    around.fit(&mut volume, &gathered, |_| Some(Vec3::ZERO), &FitSettings::default());
-    assert_eq!(volume, gathered);
-    around.fit(&mut volume, &gathered, |_| Some(Vec3::NAN), &FitSettings::default());
-    assert_eq!(volume, gathered);
+    for irradiance in [Vec3::ZERO, Vec3::NAN] {
+        assert_eq!(fit_one(&gathered, &gathered, &around, |_| Some(irradiance)), gathered);
+    }
+}
+
+/// In units of another mean, as bright as the sun and as dim as the stars.
+#[test]
+fn light_may_have_any_scale() {
+    let scene = rooms();
+    let (gathered, around) = look(&scene, grid_of_rooms(), 1);
+    let lit = known(&scene, &around, 1);
+    let fit_scaled = |scale: f32| {
+        let mut gathered = gathered.clone();
+        gathered.coefficients.iter_mut().for_each(|c| *c *= scale);
+        fit_one(&gathered, &gathered, &around, |point| Some(lit[point]? * scale))
+    };
+    let one = fit_scaled(1.0);
+    let largest = one.coefficients.iter().map(|c| c.abs().max_element()).fold(0.0, f32::max);
+    // Powers of two, by which nothing is rounded.
+    for scale in [-40, 40].map(|power| 2f32.powi(power)) {
+        for (c, expected) in fit_scaled(scale).coefficients.iter().zip(&one.coefficients) {
+            assert!((c / scale - expected).abs().max_element() < 1e-4 * largest);
+        }
+    }
 }
 
 /// From 1 m above a floor whose front is below, and 2 m below a ceiling whose front is below too.
