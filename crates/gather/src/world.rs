@@ -218,6 +218,23 @@ impl World {
         }
     }
 
+    /// A point of an emissive triangle or a direction of an environment picture, to be reached for from
+    /// a place in space.
+    pub(crate) fn source(&self, from: Vec3, choice: f32, u: Vec2) -> Option<AreaSource> {
+        Some(match self.lights.sample_area(from, choice, u)? {
+            AreaSample::Sky { direction, radiance, pdf } => {
+                let ray = Ray { origin: from, direction, t_max: f32::INFINITY };
+                AreaSource { ray, radiance, pdf, target: None }
+            }
+            AreaSample::Emitter(e) => AreaSource {
+                ray: Ray::reaching(from, e.position - from),
+                radiance: self.emitted(&e),
+                pdf: e.pdf,
+                target: Some((e.instance, e.primitive, e.triangle)),
+            },
+        })
+    }
+
     /// The punctual lights.
     pub(crate) fn placed_lights(&self) -> &[PlacedLight] {
         &self.snapshot.lights
@@ -357,6 +374,19 @@ impl World {
         };
         coverage * spot.emission()
     }
+}
+
+/// A source of light with an extent, as it is seen from somewhere.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AreaSource {
+    /// Towards it, as far as nothing may lie on the way.
+    pub(crate) ray: Ray,
+    /// cd/m².
+    pub(crate) radiance: Vec3,
+    /// Density per steradian with which it was chosen.
+    pub(crate) pdf: f32,
+    /// Its triangle.
+    pub(crate) target: Option<Itself>,
 }
 
 /// Names a hit's triangle.

@@ -88,6 +88,39 @@ fn lumels_under_a_constant_sky() {
     }
 }
 
+/// A lamp of a hand's breadth, which one direction in some thousands meets: receivers reach for it, so
+/// that few samples tell its light.
+#[test]
+fn small_lamps_are_reached_for() {
+    let (size, height, radiance) = (0.05, 2.0, 1000.0);
+    let mut stage = Stage::default();
+    let lamp = stage.material(lambert(BLACK, Vec3::splat(radiance)));
+    let corner = Vec3::new(-0.5 * size, height, -0.5 * size);
+    stage.quad(corner, Vec3::X * size, Vec3::Z * size, lamp);
+    // Hides the lamp from the second half of the receivers.
+    let black = stage.material(Material { double_sided: true, ..lambert(BLACK, BLACK) });
+    stage.quad(Vec3::new(3.0, 1.0, -5.0), Vec3::Z * 10.0, Vec3::X * 10.0, black);
+    let at = |n: u32| Vec3::new(if n < 8 { 0.1 * n as f32 } else { 15.0 }, 0.0, 0.0);
+    let samples = 64;
+    let lumel = |position| Place::Lumel { position, normal: Vec3::Y, footprint: [BLACK; 2] };
+    let places = (0..16).flat_map(|n| [lumel(at(n)), Place::Probe { position: at(n) }]);
+    let receivers: Vec<_> = places.map(|place| Receiver { place, samples }).collect();
+    let sums = gather(Job { bounces: 0, ..Job::new(stage.snapshot(), receivers) });
+    for (n, pair) in (0..16).zip(sums.chunks_exact(2)) {
+        let to = Vec3::new(0.0, height, 0.0) - at(n);
+        let cosine = to.normalize().y;
+        // Small enough to be a point: L A cos θ/d² of solid angle.
+        let intensity = radiance * size * size * cosine / to.length_squared();
+        let [lumel, c0] = [0, 1].map(|k| pair[k].sum[0].x / samples as f32);
+        if n < 8 {
+            check(lumel, intensity * cosine, 1.2 * intensity, 0.03);
+            check(c0, intensity * 0.282_095, intensity, 0.03);
+        } else {
+            assert_eq!((lumel, c0), (0.0, 0.0), "{n}");
+        }
+    }
+}
+
 /// Irradiance of unit radiance from a rectangle, of which one corner lies straight above: `a` and `b`
 /// are its sides over its height, as are their signs.
 fn corner(a: f32, b: f32) -> f32 {

@@ -45,6 +45,11 @@ impl Lights {
             && matches!(self.sky, Sky::Constant(radiance) if radiance == Vec3::ZERO)
     }
 
+    /// Whether there are sources that [`Lights::sample_area`] finds.
+    pub(crate) fn are_sampled(&self) -> bool {
+        self.sky.is_sampled() || !self.emitters.is_empty()
+    }
+
     /// Chance that an area sample is of the environment.
     fn sky_chance(&self) -> f32 {
         match (self.sky.is_sampled(), self.emitters.is_empty()) {

@@ -1,4 +1,9 @@
-//! A receiver's samples: where each looks, and what its light is multiplied by.
+//! A receiver's samples: where each looks, what its light is multiplied by, and which source it reaches
+//! for.
+//!
+//! A small lamp is met by few directions, and fills a receiver's light with noise. So each sample also
+//! reaches for a point of an emissive triangle, or of an environment picture, as a path's vertices do;
+//! both ways of finding a source are weighed by the power heuristic.
 
 use std::f32::consts::PI;
 
@@ -6,9 +11,11 @@ use glam::{Mat3, Quat, Vec3};
 use lumencast_light::{Order, sh};
 
 use super::integrator::Look;
+use crate::accel::Ray;
 use crate::bsdf::frame;
-use crate::sampling::{Sampler, cosine_hemisphere, lattice};
+use crate::sampling::{Sampler, cosine_hemisphere, lattice, power_heuristic};
 use crate::surface::gamma;
+use crate::world::{Passing, World};
 use crate::{Job, Place};
 
 /// Of a lumel's size, how far off the surface its samples start.
@@ -20,6 +27,17 @@ pub(super) struct Aim {
     samples: u32,
     seed: u64,
     receiver: u32,
+    /// Whether there are sources to reach for.
+    reaches: bool,
+}
+
+/// A source that a sample reaches for.
+pub(super) struct Reach {
+    /// Towards it, as far as nothing may lie on the way.
+    pub(super) ray: Ray,
+    pub(super) passing: Passing,
+    /// Its radiance over the density with which it was chosen, weighed.
+    pub(super) light: Vec3,
 }
 
 enum Prepared {
@@ -38,10 +56,10 @@ enum Prepared {
 }
 
 impl Aim {
-    /// `extent` is the scene's largest coordinate, metres, from its origin: where surfaces are is known
-    /// to some ulps of it only, and where receivers are to one of their coordinates in the world.
-    pub(super) fn new(job: &Job, receiver: u32, extent: f32) -> Self {
-        let (seed, origin) = (job.seed, job.scene.origin);
+    /// Of a receiver of a job in its world. Where surfaces are is known to some ulps of its largest
+    /// coordinate only, from its origin; where receivers are, to one of theirs in the world.
+    pub(super) fn new(job: &Job, receiver: u32, world: &World) -> Self {
+        let (seed, extent, origin) = (job.seed, world.extent(), world.origin());
         let place = match job.receivers[receiver as usize].place {
             Place::Probe { position } => {
                 let (position, turn) = (position - origin, lattice::turn(seed, receiver));
@@ -61,7 +79,8 @@ impl Aim {
                 }
             }
         };
-        Self { place, samples: job.receivers[receiver as usize].samples, seed, receiver }
+        let samples = job.receivers[receiver as usize].samples;
+        Self { place, samples, seed, receiver, reaches: world.lights.are_sampled() }
     }
 
     pub(super) fn look(&self, sample: u32) -> Look {
@@ -74,7 +93,44 @@ impl Aim {
                 (position + at.x * a + at.y * b, direction.normalize())
             }
         };
-        Look { origin, direction, sampler }
+        let pdf = if self.reaches { self.density(direction) } else { f32::INFINITY };
+        Look { origin, direction, pdf, sampler }
+    }
+
+    /// The source that a sample reaches for; none where there are none, or that one cannot be seen.
+    pub(super) fn reach(&self, sample: u32, world: &World) -> Option<Reach> {
+        /// Sets the numbers apart from those of the sample's path.
+        const APART: u64 = 0x5ea7_1ab5;
+        if !self.reaches {
+            return None;
+        }
+        let origin = self.look(sample).origin;
+        let mut sampler = Sampler::new(self.seed ^ APART, self.receiver, sample);
+        let source = world.source(origin, sampler.number(), sampler.square())?;
+        let weight = power_heuristic(source.pdf, self.density(source.ray.direction)) / source.pdf;
+        let light = source.radiance * weight;
+        let is_seen = light.is_finite() && light != Vec3::ZERO;
+        let passing = Passing { ends: [None, source.target], key: sampler.key() };
+        is_seen.then_some(Reach { ray: source.ray, passing, light })
+    }
+
+    /// Density per steradian with which samples look in a direction.
+    fn density(&self, direction: Vec3) -> f32 {
+        match &self.place {
+            Prepared::Probe { .. } => 0.25 / PI,
+            Prepared::Lumel { frame, .. } => frame.z_axis.dot(direction).max(0.0) / PI,
+        }
+    }
+
+    /// What radiance from a direction is multiplied by where it is integrated, the first
+    /// [`Place::terms`] numbers.
+    pub(super) fn integrand(&self, direction: Vec3) -> [f32; sh::MAX_COEFFICIENTS] {
+        match &self.place {
+            Prepared::Probe { order, .. } => sh::basis(*order, direction),
+            Prepared::Lumel { frame, .. } => {
+                [frame.z_axis.dot(direction).max(0.0); sh::MAX_COEFFICIENTS]
+            }
+        }
     }
 
     /// What the light of a sample is multiplied by, the first [`Place::terms`] numbers: the inverse

@@ -60,6 +60,9 @@ pub(crate) struct Look {
     pub(crate) origin: Vec3,
     /// Unit.
     pub(crate) direction: Vec3,
+    /// Density per steradian with which that was chosen, where sources are reached for from the origin
+    /// too ([`super::aim::Aim::reach`]); infinite where they are not.
+    pub(crate) pdf: f32,
     /// The numbers of the path that begins here.
     pub(crate) sampler: Sampler,
 }
@@ -210,11 +213,6 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// The largest coordinate of the world, metres.
-    pub(crate) fn extent(&self) -> f32 {
-        self.world.extent()
-    }
-
     /// Light arriving at each origin from its direction, scattered at most `bounces` times, in order.
     /// Punctual lights are seen only through the surfaces that they light.
     pub(crate) fn radiance(
@@ -242,7 +240,7 @@ impl<'a> Integrator<'a> {
             segment: Segment {
                 ray: Ray { origin: look.origin, direction: look.direction, t_max: f32::INFINITY },
                 from: None,
-                pdf: f32::INFINITY,
+                pdf: look.pdf,
                 left: (Vec3::ZERO, f32::INFINITY),
             },
             throughput: Vec3::ONE,
@@ -251,6 +249,21 @@ impl<'a> Integrator<'a> {
         self.hits.resize(self.paths.len(), None);
         self.alive.clear();
         self.alive.extend(0..self.paths.len() as u32);
+    }
+
+    /// Which of these rays nothing lies on.
+    pub(crate) fn arrive(&mut self, rays: &[(Ray, Passing)]) -> Vec<bool> {
+        self.rays += rays.len() as u64;
+        let mut free = vec![true; rays.len()];
+        let each = rays.iter().zip(0..).map(|((ray, _), n)| (*ray, n));
+        let passing = |n: u32| rays[n as usize].1;
+        self.world.occluded(each, &mut self.stacks, passing, |n, found| free[n as usize] = !found);
+        free
+    }
+
+    /// The world that paths go through.
+    pub(crate) fn world(&self) -> &'a World {
+        self.world
     }
 
     /// Gives each path a point that the beam lights.
@@ -393,7 +406,7 @@ mod tests {
         (0..300).map(|sample| {
             let mut sampler = Sampler::new(8, 0, sample);
             let direction = sphere(sampler.square()).normalize();
-            Look { origin: Vec3::new(0.1, 0.4, 1.0), direction, sampler }
+            Look { origin: Vec3::new(0.1, 0.4, 1.0), direction, pdf: f32::INFINITY, sampler }
         })
     }
 

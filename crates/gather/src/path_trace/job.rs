@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use lumencast_light::sh;
 use rayon::prelude::*;
 
-use super::aim::Aim;
+use super::aim::{Aim, Reach};
 use super::integrator::{Integrator, Look, Paths, Seen};
 use crate::world::World;
 use crate::{Job, Sums, SurfacePoint};
@@ -114,17 +114,41 @@ fn batches(tiles: &[Tile]) -> Vec<&[Tile]> {
 }
 
 fn trace(job: &Job, batch: &[Tile], integrator: &mut Integrator<'_>) -> Vec<TileSums> {
-    let extent = integrator.extent();
-    let aims: Vec<Aim> = batch.iter().map(|tile| Aim::new(job, tile.receiver, extent)).collect();
-    let looks = batch.iter().zip(&aims);
-    let looks = looks.flat_map(|(tile, aim)| (tile.first..tile.end).map(|s| aim.look(s)));
-    let mut seen = integrator.radiance(looks);
-    let sum = |(tile, aim)| sum(job, tile, aim, &mut seen);
+    let world = integrator.world();
+    let aims: Vec<Aim> = batch.iter().map(|tile| Aim::new(job, tile.receiver, world)).collect();
+    let samples = || {
+        let tiles = batch.iter().zip(&aims);
+        tiles.flat_map(|(tile, aim)| (tile.first..tile.end).map(move |sample| (aim, sample)))
+    };
+    let sources = samples().map(|(aim, sample)| aim.reach(sample, world)).collect();
+    let mut reached = reach(integrator, sources);
+    let mut seen = integrator.radiance(samples().map(|(aim, sample)| aim.look(sample)));
+    let sum = |(tile, aim)| sum(job, tile, aim, &mut seen, &mut reached);
     batch.iter().zip(&aims).map(sum).collect()
 }
 
+/// The direction and the light of each sample's source, where it has one and nothing hides it.
+fn reach(
+    integrator: &mut Integrator<'_>,
+    sources: Vec<Option<Reach>>,
+) -> impl Iterator<Item = Option<(Vec3, Vec3)>> + use<> {
+    let rays: Vec<_> =
+        sources.iter().flatten().map(|source| (source.ray, source.passing)).collect();
+    let mut arrives = integrator.arrive(&rays).into_iter();
+    sources.into_iter().map(move |source| {
+        let source = source.filter(|_| arrives.next() == Some(true))?;
+        Some((source.ray.direction, source.light))
+    })
+}
+
 /// Sums up what a tile's samples have seen, which come next.
-fn sum(job: &Job, tile: &Tile, aim: &Aim, seen: &mut impl Iterator<Item = Seen>) -> TileSums {
+fn sum(
+    job: &Job,
+    tile: &Tile,
+    aim: &Aim,
+    seen: &mut impl Iterator<Item = Seen>,
+    reached: &mut impl Iterator<Item = Option<(Vec3, Vec3)>>,
+) -> TileSums {
     let count = job.receivers[tile.receiver as usize].place.terms(job.order);
     let mut t = TileSums {
         sum: [Vec3::ZERO; sh::MAX_COEFFICIENTS],
@@ -133,12 +157,14 @@ fn sum(job: &Job, tile: &Tile, aim: &Aim, seen: &mut impl Iterator<Item = Seen>)
         surfaces: Vec::new(),
         backs: 0,
     };
-    for (sample, seen) in (tile.first..tile.end).zip(seen) {
+    for ((sample, seen), reached) in (tile.first..tile.end).zip(seen).zip(reached) {
         let radiance = seen.radiance();
         let terms = aim.terms(sample);
         let terms = &terms[..count];
+        let source = reached.map(|(direction, light)| (aim.integrand(direction), light));
         for (k, factor) in terms.iter().enumerate() {
-            let term = *factor * radiance;
+            let reached = source.map_or(Vec3::ZERO, |(integrand, light)| integrand[k] * light);
+            let term = *factor * radiance + reached;
             t.sum[k] += term;
             t.squares[k] += term * term;
         }

@@ -29,7 +29,12 @@ fn look(scene: &Arc<Snapshot>, origin: Vec3, direction: Vec3, paths: Paths<'_>) 
     let (groups, samples) = (32, 512);
     let means: Vec<Vec3> = (0..groups)
         .map(|group| {
-            let look = |s| Look { origin, direction, sampler: Sampler::new(4, group, s) };
+            let look = |s| Look {
+                origin,
+                direction,
+                pdf: f32::INFINITY,
+                sampler: Sampler::new(4, group, s),
+            };
             let seen = integrator.radiance((0..samples).map(look));
             seen.map(|seen| seen.radiance()).sum::<Vec3>() / samples as f32
         })
@@ -294,7 +299,7 @@ fn paths_do_not_depend_on_each_other() {
     let look = |sample| {
         let mut sampler = Sampler::new(3, 0, sample);
         let direction = crate::sampling::sphere(sampler.square());
-        Look { origin: Vec3::new(0.5, 0.2, 0.0), direction, sampler }
+        Look { origin: Vec3::new(0.5, 0.2, 0.0), direction, pdf: f32::INFINITY, sampler }
     };
     let mut integrator = Integrator::new(&world, paths);
     let together: Vec<_> = integrator.radiance((0..100).map(look)).collect();
@@ -318,7 +323,7 @@ fn sound_scenes_lose_no_light() {
         let look = |sample| {
             let mut sampler = Sampler::new(9, 0, sample);
             let direction = crate::sampling::sphere(sampler.square());
-            Look { origin, direction, sampler }
+            Look { origin, direction, pdf: f32::INFINITY, sampler }
         };
         LOST.set(0);
         let seen: Vec3 = integrator.radiance((0..4096).map(look)).map(|s| s.radiance()).sum();
@@ -429,7 +434,8 @@ fn lambert_model_takes_only_base_colour() {
     let paths = Paths::new(1);
     let mut integrator = Integrator::new(&world, paths);
     for (origin, direction) in [(Vec3::Y, down()), (Vec3::NEG_Y, -down())] {
-        let look = |s| Look { origin, direction, sampler: Sampler::new(1, 1, s) };
+        let look =
+            |s| Look { origin, direction, pdf: f32::INFINITY, sampler: Sampler::new(1, 1, s) };
         for seen in integrator.radiance((0..64).map(look)) {
             assert!((seen.radiance() - Vec3::splat(0.5)).abs().max_element() < 1e-5);
         }

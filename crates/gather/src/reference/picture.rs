@@ -283,7 +283,7 @@ impl Renderer {
             let mut sampler = Sampler::new(seed, pixel.y * s.size.x + pixel.x, sample);
             let place = pixel.as_vec2() + 0.5 + s.filter.place(sampler.square());
             let (origin, direction) = rays.through(place / s.size.as_vec2());
-            Look { origin, direction, sampler }
+            Look { origin, direction, pdf: f32::INFINITY, sampler }
         }
     }
 }

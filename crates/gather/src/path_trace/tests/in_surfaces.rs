@@ -36,6 +36,7 @@ fn floor_seen(stage: &Stage, place: impl Fn(&mut Sampler) -> Vec3) -> Vec<(Vec3,
     let looks = points.iter().zip(0..).map(|(point, n)| Look {
         origin: point - 0.01 * down(),
         direction: down(),
+        pdf: f32::INFINITY,
         sampler: Sampler::new(2, 2, n),
     });
     let mut integrator = Integrator::new(&world, Paths::new(1));

@@ -221,7 +221,12 @@ fn found_either_way_it_is_direct_light() {
     let world = World::new(stage.snapshot(), model, Kernel::detect(), &mut WorldCache::default());
     let paths = Paths::new(3);
     let mut integrator = Integrator::new(&world, paths);
-    let look = |i| Look { origin: Vec3::Y, direction: down(), sampler: Sampler::new(4, 0, i) };
+    let look = |i| Look {
+        origin: Vec3::Y,
+        direction: down(),
+        pdf: f32::INFINITY,
+        sampler: Sampler::new(4, 0, i),
+    };
     for seen in integrator.radiance((0..256).map(look)) {
         assert!(seen.direct.x > 0.0 && seen.indirect == BLACK, "{seen:?}");
     }
