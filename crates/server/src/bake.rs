@@ -1,4 +1,5 @@
-//! Converged light, without a clock: the same fields as a running server's, averaged to the end.
+//! Converged light, without a clock: the same fields as a running server's, averaged until their noise
+//! does not show.
 
 use std::sync::Arc;
 
@@ -8,47 +9,125 @@ use lumencast_light::ProbeVolume;
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
-use crate::field::Field;
+use crate::field::{Brought, Field, publish};
+use crate::noise;
 use crate::tick::{GatherOptions, look};
 
-/// Samples of a probe in one job: enough to keep every core busy, few enough to show progress.
-const SAMPLES_A_PASS: u32 = 64;
+/// Samples of a probe in one job: enough to spread directions well, few enough to show progress.
+const SAMPLES_A_PASS: u32 = 256;
 /// Rounds and steps of a fit to surfaces: more change nothing that can be seen.
 const FIT_EFFORT: (u32, u32) = (4, 64);
+/// The same of what tells the noise.
+const LOOK_EFFORT: (u32, u32) = (2, 32);
+/// Passes after which the noise is looked at first.
+const FIRST_LOOK: u32 = 4;
+/// From one look at the noise to the next, samples become at most so many times as many, since noise
+/// that is large tells little about how many are needed.
+const MOST_GROWTH: f32 = 4.0;
+/// And at least so many times, since a look takes as long as a fit.
+const LEAST_GROWTH: f32 = 1.25;
 
-/// Gathers `samples` samples for every probe of `volumes` and averages them, and as many for the
-/// surfaces about it where probes are fitted; `options.blend` plays no part. `progress` is told the
-/// share done, 0 to 1, after every pass.
+/// How long light is computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Samples of a probe, at most.
+    pub samples: u32,
+    /// The noise at which it ends sooner: root of the mean square of what noise adds to surfaces as they
+    /// are displayed, in codes of 0 to 255 where the brightest are white. All samples are taken unless
+    /// it is given.
+    pub noise: Option<f32>,
+}
+
+impl Effort {
+    /// So many samples, however noisy they are.
+    #[must_use]
+    pub fn of_samples(samples: u32) -> Self {
+        Self { samples, noise: None }
+    }
+}
+
+/// How far a computation is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Done {
+    /// Share of the samples that will be taken, as far as that is known: 0 to 1.
+    pub share: f32,
+    /// As in [`Effort::noise`]; nothing before it was looked at first.
+    pub noise: Option<f32>,
+}
+
+/// Light that was computed once.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Baked {
+    /// In the order in which they were asked for; pieces of a volume follow one another.
+    pub volumes: Vec<ProbeVolume>,
+    /// Samples of a probe.
+    pub samples: u32,
+    /// As in [`Effort::noise`], where that was asked for.
+    pub noise: Option<f32>,
+}
+
+/// Gathers light for every probe of `volumes`, and as many samples for the surfaces about it where
+/// probes are fitted, and averages it; `options.blend` plays no part. `progress` is told after every
+/// pass how far it is.
 ///
-/// The light's error falls with the root of `samples`: four times the samples, half the noise.
+/// The noise falls with the root of the samples. It is known from a half of them: as the mean of two
+/// independent halves differs from either by half of what they differ by, what is fitted to one half
+/// lies as far from the whole as the whole does from light without noise.
 ///
 /// # Errors
-/// A volume that makes no sense, or more than the wire format carries; nothing is gathered then.
+/// A volume that makes no sense, or more than the wire format carries: nothing is gathered then. A
+/// gatherer that gave up.
 pub fn bake(
     scene: &Arc<Snapshot>,
     volumes: &[VolumeSpec],
     gatherer: &mut dyn Gather,
-    samples: u32,
+    effort: Effort,
     options: GatherOptions,
-    mut progress: impl FnMut(f32),
-) -> Result<Vec<ProbeVolume>, ServerError> {
+    mut progress: impl FnMut(Done),
+) -> Result<Baked, ServerError> {
     let mean = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
     let mut fields = Field::all(volumes, &GatherOptions { blend: mean, ..options })?;
-    look(&mut fields, gatherer, scene);
-    let passes = samples.div_ceil(SAMPLES_A_PASS).max(1);
-    for pass in 0..passes {
-        let first = u64::from(samples) * u64::from(pass) / u64::from(passes);
-        let last = u64::from(samples) * u64::from(pass + 1) / u64::from(passes);
-        let samples = (last - first).max(1) as u32;
-        for field in &mut fields {
-            let seed = u64::from(pass) << 8 | u64::from(field.id().0);
-            let ticket = gatherer.submit(field.job(scene.clone(), None, samples, options, seed));
-            if let Some(gathered) = gatherer.wait(ticket) {
-                field.blend(&gathered);
+    if !look(&mut fields, gatherer, scene).is_empty() {
+        return Err(ServerError::Gather);
+    }
+    let mut half = effort.noise.map(|_| fields.clone());
+    let most = effort.samples.max(1);
+    let mut done = Done { share: 0.0, noise: None };
+    let (mut samples, mut pass) = (0, 0);
+    // Until then the noise is not looked at.
+    let mut until = effort.noise.map_or(most, |_| most.min(FIRST_LOOK * SAMPLES_A_PASS));
+    while samples < most {
+        let now = SAMPLES_A_PASS.min(most - samples);
+        for (number, field) in fields.iter_mut().enumerate() {
+            let seed = pass << 8 | u64::from(field.id().0);
+            let (job, points) = field.job(scene.clone(), None, now, options, seed);
+            let ticket = gatherer.submit(job);
+            let gathered = gatherer.wait(ticket).ok_or(ServerError::Gather)?;
+            let brought = Brought { gathered, points };
+            field.blend(&brought);
+            if let Some(half) = half.as_mut().filter(|_| pass % 2 == 0) {
+                half[number].blend(&brought);
             }
         }
-        progress((pass + 1) as f32 / passes as f32);
+        (samples, pass) = (samples + now, pass + 1);
+        if samples >= until
+            && let Some((wanted, half)) = effort.noise.zip(half.as_mut())
+        {
+            publish(&mut fields, LOOK_EFFORT);
+            publish(half, LOOK_EFFORT);
+            let noise = noise::shown(&fields, half);
+            done.noise = Some(noise);
+            if noise <= wanted {
+                break;
+            }
+            let growth = (noise / wanted).powi(2).clamp(LEAST_GROWTH, MOST_GROWTH);
+            until = (samples as f32 * growth).min(most as f32) as u32;
+        }
+        done.share = samples as f32 / until.max(samples) as f32;
+        progress(done);
     }
-    fields.iter_mut().for_each(|field| field.publish(FIT_EFFORT));
-    Ok(fields.into_iter().map(Field::into_volume).collect())
+    publish(&mut fields, FIT_EFFORT);
+    progress(Done { share: 1.0, ..done });
+    let volumes = fields.into_iter().map(Field::into_volume).collect();
+    Ok(Baked { volumes, samples, noise: done.noise })
 }

@@ -29,6 +29,9 @@ pub enum ServerError {
         max = lumencast_codec::limits::SOURCE_BYTES
     )]
     Source(String),
+    /// Light that was being computed is not coming.
+    #[error("the gatherer gave up a job; its log says why")]
+    Gather,
     /// The folder of the page cannot be read.
     #[error("cannot read the page in {folder}: {error}")]
     Page {

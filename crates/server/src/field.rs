@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::{IVec3, Vec3};
 use lumencast_codec::{self as codec, EncodedRegion, ProbeEncoder, UpdateInfo, limits};
 use lumencast_gather::blend::History;
+use lumencast_gather::fit::{FitSettings, Part, fit};
 use lumencast_gather::{Gathered, Job, Receiver};
 use lumencast_light::{LightField, ProbeVolume, VolumeId};
 use lumencast_scene::{Snapshot, VolumeSpec};
@@ -18,6 +19,7 @@ use crate::walls::Buried;
 ///
 /// Costs, in memory, for a probe of L2: 108 bytes of published light, twice that of
 /// reconstructions, and 432 of history.
+#[derive(Clone)]
 pub(crate) struct Field {
     /// What arrives at the probes: the history's estimates, with probes inside walls filled in.
     arriving: ProbeVolume,
@@ -30,6 +32,13 @@ pub(crate) struct Field {
     encoder: ProbeEncoder,
     /// Number of the next update.
     update: u64,
+}
+
+/// What a [job](Field::job) has brought.
+pub(crate) struct Brought {
+    pub(crate) gathered: Gathered,
+    /// The numbers of the points that it gathered at.
+    pub(crate) points: Vec<usize>,
 }
 
 impl Field {
@@ -97,6 +106,17 @@ impl Field {
         self.positions.len()
     }
 
+    /// Where its light matters: points of the surfaces that it knows, with their normals, or all
+    /// directions along the axes at probes that are not inside walls.
+    pub(crate) fn places(&self) -> Vec<(Vec3, Vec3)> {
+        if let Some(surfaces) = &self.surfaces {
+            return surfaces.places().collect();
+        }
+        let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+        let open = self.positions.iter().zip(self.buried.open()).filter(|(_, open)| *open);
+        open.flat_map(|(&position, _)| axes.map(|axis| (position, axis))).collect()
+    }
+
     /// Number of probes inside walls.
     pub(crate) fn buried_count(&self) -> usize {
         self.buried.count()
@@ -116,7 +136,8 @@ impl Field {
         }
     }
 
-    /// What to gather for every probe, and for the surfaces about them.
+    /// What to gather for every probe and, at the points whose numbers come with it, for the surfaces
+    /// about them.
     pub(crate) fn job(
         &mut self,
         scene: Arc<Snapshot>,
@@ -124,15 +145,15 @@ impl Field {
         samples: u32,
         options: GatherOptions,
         seed: u64,
-    ) -> Job {
+    ) -> (Job, Vec<usize>) {
         let probe = |&position: &Vec3| Receiver::probe(position, samples);
         let mut receivers: Vec<_> = self.positions.iter().map(probe).collect();
-        if let Some(surfaces) = &mut self.surfaces {
-            receivers.extend(surfaces.receivers(samples));
-        }
+        let (points, at_points) =
+            self.surfaces.as_mut().map(|surfaces| surfaces.receivers(samples)).unwrap_or_default();
+        receivers.extend(at_points);
         let GatherOptions { bounces, clamp, .. } = options;
         let order = self.volume.order;
-        Job { previous, order, bounces, clamp, seed, ..Job::new(scene, receivers) }
+        (Job { previous, order, bounces, clamp, seed, ..Job::new(scene, receivers) }, points)
     }
 
     /// The scene was edited: light may be another from now on.
@@ -142,8 +163,9 @@ impl Field {
     }
 
     /// Blends new light into the histories.
-    pub(crate) fn blend(&mut self, gathered: &Gathered) {
-        let (probes, points) = gathered.sums.split_at(self.positions.len());
+    pub(crate) fn blend(&mut self, brought: &Brought) {
+        let Brought { gathered, points } = brought;
+        let (probes, at_points) = gathered.sums.split_at(self.positions.len());
         self.history.update(probes);
         for probe in 0..self.history.len() {
             self.arriving.probe_mut(probe).copy_from_slice(self.history.coefficients(probe));
@@ -151,16 +173,7 @@ impl Field {
         self.buried.record(probes.iter().map(|sums| sums.back_face_fraction));
         self.buried.fill(&mut self.arriving);
         if let Some(surfaces) = &mut self.surfaces {
-            surfaces.blend(points);
-        }
-    }
-
-    /// Brings up to date what is to be published. Where probes are fitted, it takes the effort of so
-    /// many rounds of so many steps.
-    pub(crate) fn publish(&mut self, effort: (u32, u32)) {
-        match &self.surfaces {
-            Some(surfaces) => surfaces.fit(&mut self.volume, &self.arriving, effort),
-            None => self.volume.coefficients.copy_from_slice(&self.arriving.coefficients),
+            surfaces.blend(points, at_points);
         }
     }
 
@@ -178,6 +191,34 @@ impl Field {
         };
         self.update += 1;
         self.encoder.encode(&self.volume, info, watched)
+    }
+}
+
+/// Brings up to date what fields publish: what arrives at their probes or, where they are fitted, the
+/// fit of all of them, with the effort of so many rounds of so many steps.
+pub(crate) fn publish(fields: &mut [Field], (rounds, steps): (u32, u32)) {
+    let mut light = LightField::new(fields.iter().map(|field| field.volume.clone()).collect());
+    let field = |volume: &ProbeVolume| fields.iter().find(|field| field.id() == volume.id);
+    let ordered: Vec<&Field> = light.volumes().iter().filter_map(field).collect();
+    let surfaces: Option<Vec<&Surfaces>> = ordered.iter().map(|f| f.surfaces.as_ref()).collect();
+    let Some(surfaces) = surfaces else {
+        fields.iter_mut().for_each(|field| field.volume.clone_from(&field.arriving));
+        return;
+    };
+    let each = ordered.into_iter().zip(surfaces);
+    let parts: Vec<Part<'_>> = each
+        .map(|(field, surfaces)| Part {
+            gathered: &field.arriving,
+            around: surfaces.around(),
+            irradiance: surfaces.irradiance(),
+        })
+        .collect();
+    let settings = FitSettings { rounds, steps, ..FitSettings::default() };
+    fit(&mut light, &parts, &settings);
+    for volume in light.into_volumes() {
+        if let Some(field) = fields.iter_mut().find(|field| field.id() == volume.id) {
+            field.volume = volume;
+        }
     }
 }
 

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
 use lumencast_gather::blend::{BlendSettings, History};
-use lumencast_gather::fit::{FitSettings, Surroundings};
+use lumencast_gather::fit::Surroundings;
 use lumencast_gather::{Job, Receiver, Sums, SurfacePoint};
-use lumencast_light::ProbeVolume;
 use lumencast_scene::Snapshot;
 
 use crate::tick::FitOptions;
@@ -24,6 +24,7 @@ const MOST_POINTS: usize = 1 << 20;
 const SAMPLES_A_TURN: u32 = 4;
 
 /// Points of surfaces, with what is known of the light there.
+#[derive(Clone)]
 pub(crate) struct Surfaces {
     /// A probe.
     points: u32,
@@ -31,8 +32,6 @@ pub(crate) struct Surfaces {
     /// Where the points were when their histories began.
     began: Vec<Option<SurfacePoint>>,
     history: History,
-    /// The points that the job under way gathers at.
-    gathered: Vec<usize>,
     /// [`Snapshot::version`] of the scene that was looked at.
     seen: Option<u64>,
     /// Number of the next turn.
@@ -48,15 +47,14 @@ impl Surfaces {
             around: Surroundings::default(),
             began: vec![None; points],
             history: History::new(blend, points, 1),
-            gathered: Vec::new(),
             seen: None,
             turn: 0,
         }
     }
 
     /// What to ask for to find the surfaces of a scene; `None` while it is the one that was seen.
-    pub(crate) fn look(&self, scene: &Arc<Snapshot>, probes: &[glam::Vec3]) -> Option<Job> {
-        let probe = |position: &glam::Vec3| Receiver::probe(*position, self.points);
+    pub(crate) fn look(&self, scene: &Arc<Snapshot>, probes: &[Vec3]) -> Option<Job> {
+        let probe = |position: &Vec3| Receiver::probe(*position, self.points);
         (self.seen != Some(scene.version)).then(|| Job {
             bounces: 0,
             surfaces: true,
@@ -85,16 +83,13 @@ impl Surfaces {
     }
 
     /// Where to gather next, `samples` a probe in all: at all points, or at those whose turn it is.
-    pub(crate) fn receivers(&mut self, samples: u32) -> Vec<Receiver> {
+    pub(crate) fn receivers(&mut self, samples: u32) -> (Vec<usize>, Vec<Receiver>) {
         let points = self.points;
         let turns = (SAMPLES_A_TURN * points).div_ceil(samples.max(1)).max(1);
         let each = (samples * turns).div_ceil(points);
         let turn = self.turn % turns as usize;
         self.turn += 1;
-        let all = self.around.receivers(each).filter(|(point, _)| point % turns as usize == turn);
-        let (gathered, receivers) = all.unzip();
-        self.gathered = gathered;
-        receivers
+        self.around.receivers(each).filter(|(point, _)| point % turns as usize == turn).unzip()
     }
 
     /// The scene was edited: light may be another from now on.
@@ -102,24 +97,27 @@ impl Surfaces {
         self.history.expect_change();
     }
 
-    /// Blends in what arrived at the [receivers](Self::receivers).
-    pub(crate) fn blend(&mut self, sums: &[Sums]) {
-        self.history.update_at(self.gathered.drain(..), sums);
+    /// Blends in what arrived at points.
+    pub(crate) fn blend(&mut self, points: &[usize], sums: &[Sums]) {
+        self.history.update_at(points.iter().copied(), sums);
     }
 
-    /// Fits a volume that holds the last fit to the light that was gathered at its probes and here,
-    /// with the effort of so many rounds of so many steps.
-    pub(crate) fn fit(
-        &self,
-        volume: &mut ProbeVolume,
-        gathered: &ProbeVolume,
-        (rounds, steps): (u32, u32),
-    ) {
-        let settings = FitSettings { rounds, steps, ..FitSettings::default() };
-        let irradiance = |point| {
-            let known = self.history.effective_samples(point) > 0.0;
-            known.then(|| self.history.coefficients(point)[0])
-        };
-        self.around.fit(volume, gathered, irradiance, &settings);
+    /// What the probes see.
+    pub(crate) fn around(&self) -> &Surroundings {
+        &self.around
+    }
+
+    /// The points that count, with their normals.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
+        let points = self.around.points().iter().enumerate();
+        let counting = points.filter(|(number, _)| self.around.counts(*number));
+        counting.filter_map(|(_, point)| point.map(|at| (at.position, at.normal)))
+    }
+
+    /// The irradiance at each point, lux; nothing where none was gathered.
+    pub(crate) fn irradiance(&self) -> Vec<Option<Vec3>> {
+        let known = |point| self.history.effective_samples(point) > 0.0;
+        let irradiance = |point| known(point).then(|| self.history.coefficients(point)[0]);
+        (0..self.history.len()).map(irradiance).collect()
     }
 }

@@ -15,7 +15,7 @@ use lumencast_light::ProbeVolume;
 /// Share of back faces above which a probe is taken to be inside a wall, and below which it is
 /// taken to be outside again; between the two it stays what it was, so that noise does not make it
 /// blink. Nothing needs more than a few tens of samples to tell such shares apart.
-const BURIED_ABOVE: f32 = 0.3;
+pub(crate) const BURIED_ABOVE: f32 = 0.3;
 const OPEN_BELOW: f32 = 0.2;
 /// Weight of one tick in the running mean of the share, once the first ticks have been averaged.
 const MEMORY: f32 = 0.1;
@@ -47,6 +47,11 @@ impl Buried {
     /// Number of probes inside walls.
     pub(crate) fn count(&self) -> usize {
         self.buried.iter().filter(|b| **b).count()
+    }
+
+    /// Whether each probe is outside of walls.
+    pub(crate) fn open(&self) -> impl Iterator<Item = bool> {
+        self.buried.iter().map(|buried| !buried)
     }
 
     /// Fills the probes inside walls from their neighbours, ring by ring.

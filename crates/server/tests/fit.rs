@@ -8,7 +8,8 @@ use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::ProbeVolume;
 use lumencast_scene::{Edit, LightSpec, NodeId, Scene, Transform, VolumeSpec};
 use lumencast_server::{
-    FitOptions, GatherOptions, Mail, Outlet, Received, SampleRange, Tick, TickOptions, bake,
+    Done, Effort, FitOptions, GatherOptions, Mail, Outlet, Received, SampleRange, Tick,
+    TickOptions, bake,
 };
 
 const FIT: FitOptions = FitOptions { points: 16 };
@@ -45,8 +46,9 @@ fn gather(fit: Option<FitOptions>) -> GatherOptions {
 
 fn baked(scene: &mut Scene, fit: Option<FitOptions>) -> ProbeVolume {
     let snapshot: Arc<_> = scene.snapshot();
-    let light = bake(&snapshot, &volumes(), &mut tracer(), 4096, gather(fit), |_| ());
-    light.expect("a volume").remove(0)
+    let effort = Effort::of_samples(4096);
+    let light = bake(&snapshot, &volumes(), &mut tracer(), effort, gather(fit), |_| ());
+    light.expect("a volume").volumes.remove(0)
 }
 
 /// Root of the mean square of the differences of irradiance on the floor and three walls, over the
@@ -116,6 +118,34 @@ fn ticks_come_to_what_is_baked() {
     let plain = baked(&mut scene(), None);
     let [near, far] = [&fitted, &plain].map(|light| difference(stepped.light(), light));
     assert!(near < 0.12 && far > 3.0 * near, "{near} {far}");
+}
+
+/// Light goes on until its noise is as low as asked for, or to the samples allowed; and what it tells of
+/// its noise is true.
+#[test]
+fn baking_ends_by_its_noise() {
+    let snapshot = scene().snapshot();
+    for fit in [None, Some(FIT)] {
+        let light = |effort: Effort, told: &mut Vec<Done>| {
+            let progress = |done| told.push(done);
+            bake(&snapshot, &volumes(), &mut tracer(), effort, gather(fit), progress)
+                .expect("light")
+        };
+        let mut told = Vec::new();
+        let rough = light(Effort { samples: 1 << 20, noise: Some(4.0) }, &mut told);
+        assert!(rough.samples < 1 << 18 && rough.noise.is_some_and(|noise| noise <= 4.0));
+        assert_eq!(told.last().map(|done| (done.share, done.noise)), Some((1.0, rough.noise)));
+        assert!(told.windows(2).all(|pair| pair[0].share <= 1.0));
+        let noise = |samples| {
+            light(Effort { samples, noise: Some(1e-6) }, &mut Vec::new()).noise.expect("noise")
+        };
+        let ratio = noise(1024) / noise(16_384);
+        assert!(ratio > 2.0, "16 times the samples, a quarter of the noise at most: {ratio}");
+    }
+    let off =
+        bake(&snapshot, &volumes(), &mut tracer(), Effort::of_samples(300), gather(None), |_| ())
+            .expect("light");
+    assert_eq!((off.samples, off.noise), (300, None));
 }
 
 /// A lamp four times as bright, and a box that stands elsewhere: light of the old scene is gone soon,

@@ -10,7 +10,7 @@ use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
 use lumencast_picture::{Loaded, PIXELS_PER_DEGREE, Pair, Picture, ToneMap, flip};
 use lumencast_scene::{Environment, Light, LightKind, Material, Scene, Snapshot, View, VolumeSpec};
-use lumencast_server::{GatherOptions, bake};
+use lumencast_server::{Effort, GatherOptions, bake};
 use lumencast_shade::{Materials, Settings, Shading, Shadows};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -85,8 +85,9 @@ fn cornell() -> Drawn {
     let mut tracer = CpuPathTracer::new(Options::default()).unwrap();
     let snapshot = scene.snapshot();
     let options = GatherOptions::default();
-    let light = bake(&snapshot, &[volume], &mut tracer, 1024, options, |_| ()).unwrap();
-    Drawn { scene: snapshot, light: LightField::new(light), view, exposure: 2.0 }
+    let effort = Effort::of_samples(1024);
+    let light = bake(&snapshot, &[volume], &mut tracer, effort, options, |_| ()).unwrap();
+    Drawn { scene: snapshot, light: LightField::new(light.volumes), view, exposure: 2.0 }
 }
 
 /// Two rows of balls, metal and plastic, smooth to rough, and a glass one, under a sun, a lamp and a

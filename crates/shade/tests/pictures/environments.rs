@@ -9,7 +9,7 @@ use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::reference::Parts;
 use lumencast_light::{Grid, LightField, Order};
 use lumencast_scene::{Environment, HdrImage, Projection, Snapshot, View, VolumeSpec};
-use lumencast_server::{GatherOptions, bake};
+use lumencast_server::{Effort, GatherOptions, bake};
 use lumencast_shade::{Lighting, Settings};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -117,10 +117,11 @@ fn light_is_turned_as_the_tracers() {
     let lit = |name: &str, environment: Environment| -> Difference {
         let mut tracer = CpuPathTracer::new(Options::default()).unwrap();
         let alone = scene(environment, false);
-        let light = bake(&alone, &[volume], &mut tracer, 16_384, GatherOptions::default(), |_| ());
+        let effort = Effort::of_samples(16_384);
+        let light = bake(&alone, &[volume], &mut tracer, effort, GatherOptions::default(), |_| ());
         let scene = scene(alone.environment.clone(), true);
         let mut renderer = renderer(&scene, &settings);
-        renderer.set_light(&LightField::new(light.unwrap())).unwrap();
+        renderer.set_light(&LightField::new(light.unwrap().volumes)).unwrap();
         let picture = renderer.pictures(&[view], &settings).unwrap().remove(0);
         difference(name, &picture, &reference, 0.03)
     };
