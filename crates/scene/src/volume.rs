@@ -4,7 +4,7 @@ use glam::{UVec3, Vec3};
 use lumencast_light::{Grid, Order};
 use serde::{Deserialize, Serialize};
 
-use crate::{Aabb, limits};
+use crate::limits;
 
 /// A probe volume as a scene asks for it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,31 +18,6 @@ pub struct VolumeSpec {
 }
 
 impl VolumeSpec {
-    /// The volume of a scene that asks for none: its bounds, cut into nearly cubic cells, as many as
-    /// `probes` allows. Probes stand at the centres of cells, so the outermost are half a cell
-    /// inside. A side of less than a tenth of the longest is widened to that, about its middle.
-    pub fn around(bounds: Aabb, probes: u32) -> Self {
-        let extent = bounds.max - bounds.min;
-        let size = extent.max(Vec3::splat((0.1 * extent.max_element()).max(1e-3)));
-        let most = UVec3::new(u32::MAX, u32::MAX, limits::VOLUME_DEPTH);
-        let probes = u64::from(probes.max(1)).min(limits::PROBES);
-        let mut cell = (size.element_product() / probes as f32).cbrt();
-        let resolution = loop {
-            let resolution = (size / cell).round().as_uvec3().max(UVec3::ONE).min(most);
-            if cells(resolution) <= probes {
-                break resolution;
-            }
-            cell *= 1.02;
-        };
-        let grid = Grid {
-            center: 0.5 * (bounds.min + bounds.max),
-            rotation: glam::Quat::IDENTITY,
-            size,
-            resolution,
-        };
-        Self { grid, order: Order::default() }
-    }
-
     /// Whether it makes sense; the reason when it does not.
     pub fn check(&self) -> Result<(), String> {
         let Grid { center, rotation, size, resolution } = self.grid;
@@ -101,33 +76,6 @@ mod tests {
     use super::*;
     use glam::Quat;
     use lumencast_light::{LightField, ProbeVolume, VolumeId};
-
-    #[test]
-    fn volumes_around_bounds_have_near_cubic_cells_within_the_budget() {
-        for (size, probes) in [
-            (Vec3::new(29.8, 12.4, 18.3), 512),
-            (Vec3::splat(2.0), 512),
-            (Vec3::new(100.0, 0.0, 100.0), 512),
-            (Vec3::new(1.0, 1.0, 1000.0), 65_536),
-            (Vec3::ZERO, 8),
-        ] {
-            let bounds = Aabb { min: Vec3::ONE, max: Vec3::ONE + size };
-            let volume = VolumeSpec::around(bounds, probes);
-            volume.check().expect("a sound volume");
-            let n = volume.grid.probe_count();
-            assert!(n <= probes as usize, "{size}: {n}");
-            let margin = 0.05 * size.max_element() + 1e-3;
-            let inside =
-                |p: Vec3| p.cmpge(bounds.min - margin).all() && p.cmple(bounds.max + margin).all();
-            assert!(volume.grid.positions().all(inside), "{size}");
-        }
-        let cube = VolumeSpec::around(Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 512);
-        assert_eq!(cube.grid.resolution, UVec3::splat(8));
-        let sponza = Aabb { min: Vec3::ZERO, max: Vec3::new(29.8, 12.4, 18.3) };
-        let cell = VolumeSpec::around(sponza, 512).grid;
-        let cell = cell.size / cell.resolution.as_vec3();
-        assert!(cell.max_element() / cell.min_element() < 1.3, "{cell}");
-    }
 
     fn deep(layers: u32, rotation: Quat) -> VolumeSpec {
         let grid = Grid {
@@ -209,7 +157,7 @@ mod tests {
 
     #[test]
     fn senseless_volumes_are_refused() {
-        let good = VolumeSpec::around(Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 64);
+        let good = deep(4, Quat::IDENTITY);
         let with = |change: fn(&mut Grid)| {
             let mut volume = good;
             change(&mut volume.grid);

@@ -9,14 +9,15 @@ use lumencast_codec::{
     limits,
 };
 use lumencast_gather::blend::BlendSettings;
-use lumencast_gather::{Gather, Gathered};
+use lumencast_gather::{Gather, Ticket};
 use lumencast_light::{LightField, Offset, ProbeVolume};
 use lumencast_scene::{Edit, Environment, InstanceSource, Scene, Script, Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
-use crate::field::Field;
+use crate::field::{Brought, Field, publish};
 use crate::inbox::{Mail, Received, refusal};
 use crate::pace::{Budget, SampleRange};
+use crate::placement;
 use crate::publish::Outlet;
 use crate::report::{Report, Stage, Stopwatch};
 
@@ -32,7 +33,7 @@ pub struct TickOptions {
     /// Whether paths go on, where they end, in the light of the tick before
     /// ([`lumencast_gather::Job::previous`]): all bounces for the price of few.
     pub feedback: bool,
-    /// Volumes in place of the scene's own.
+    /// Volumes in place of the scene's own, or of the default one.
     pub volumes: Vec<VolumeSpec>,
     /// Edits at set times.
     pub script: Option<Script>,
@@ -140,8 +141,8 @@ impl Tick {
     /// # Errors
     /// A volume that makes no sense or is beyond the limits of the wire format, or such a source.
     pub fn new(
-        scene: Scene,
-        gatherer: Box<dyn Gather>,
+        mut scene: Scene,
+        mut gatherer: Box<dyn Gather>,
         options: TickOptions,
         epoch: Epoch,
     ) -> Result<Self, ServerError> {
@@ -149,8 +150,11 @@ impl Tick {
         if source.len() > limits::SOURCE_BYTES || source.chars().any(char::is_control) {
             return Err(ServerError::Source(source.clone()));
         }
-        let volumes =
-            if options.volumes.is_empty() { scene.volumes() } else { options.volumes.clone() };
+        let volumes = if options.volumes.is_empty() {
+            placement::volumes(&mut scene, &mut *gatherer)?
+        } else {
+            options.volumes.clone()
+        };
         let fields = Field::all(&volumes, &options.gather)?;
         let told_scales = fields.iter().map(Field::scale_log2).collect();
         let budget = Budget::new(options.period, options.samples);
@@ -237,7 +241,8 @@ impl Tick {
         report.seconds[Stage::Publish as usize] = watch.lap();
 
         let gathered = self.gather(&scene);
-        let build = gathered.iter().flatten().map(|g| g.build_seconds).fold(0.0, f64::max);
+        let build_seconds = gathered.iter().flatten().map(|g| g.gathered.build_seconds);
+        let build = build_seconds.fold(0.0, f64::max);
         let gathering = watch.lap();
         report.seconds[Stage::Accelerate as usize] = build.min(gathering);
         report.seconds[Stage::Gather as usize] = gathering - build.min(gathering);
@@ -311,37 +316,41 @@ impl Tick {
     }
 
     /// Light for every field, all fields' jobs under way at once; none where a job has failed.
-    fn gather(&mut self, scene: &Arc<Snapshot>) -> Vec<Option<Gathered>> {
+    fn gather(&mut self, scene: &Arc<Snapshot>) -> Vec<Option<Brought>> {
         for field in look(&mut self.fields, &mut *self.gatherer, scene) {
             self.note_failure(field, "its surfaces are those of an earlier moment");
         }
         let samples = self.budget.samples();
         let previous = self.options.feedback.then(|| Arc::new(self.light()));
-        let tickets: Vec<_> = self
+        let tickets: Vec<(Ticket, Vec<usize>)> = self
             .fields
             .iter_mut()
             .map(|field| {
                 let seed = self.number << 8 | u64::from(field.id().0);
-                let job =
+                let (job, points) =
                     field.job(scene.clone(), previous.clone(), samples, self.options.gather, seed);
-                self.gatherer.submit(job)
+                (self.gatherer.submit(job), points)
             })
             .collect();
-        tickets.into_iter().map(|ticket| self.gatherer.wait(ticket)).collect()
+        let bring = |(ticket, points)| {
+            let gathered = self.gatherer.wait(ticket)?;
+            Some(Brought { gathered, points })
+        };
+        tickets.into_iter().map(bring).collect()
     }
 
     /// Takes in what was gathered; a field whose job has failed keeps its light.
-    fn blend(&mut self, scene: &Snapshot, gathered: &[Option<Gathered>]) {
-        for (number, gathered) in gathered.iter().enumerate() {
-            let Some(gathered) = gathered else {
+    fn blend(&mut self, scene: &Snapshot, gathered: &[Option<Brought>]) {
+        for (number, brought) in gathered.iter().enumerate() {
+            let Some(brought) = brought else {
                 self.note_failure(number, "it keeps its light");
                 continue;
             };
-            self.fields[number].blend(gathered);
-            self.fields[number].publish(FIT_EFFORT);
+            self.fields[number].blend(brought);
             let (tick, time, version) = (self.number, scene.time, scene.version);
             self.shown[number] = Some(Moment { tick, time, version });
         }
+        publish(&mut self.fields, FIT_EFFORT);
     }
 
     /// Tells that a field's job has failed: the first time, and each time that it has failed twice as
@@ -402,7 +411,7 @@ impl Tick {
         now: f64,
         scene: &Snapshot,
         edits: &Edits,
-        gathered: &[Option<Gathered>],
+        gathered: &[Option<Brought>],
         watched: bool,
         mut report: Report,
     ) -> Report {
@@ -410,7 +419,7 @@ impl Tick {
         let buried: usize = self.fields.iter().map(Field::buried_count).sum();
         report.samples_a_probe = self.budget.samples();
         report.samples = probes as u64 * u64::from(report.samples_a_probe);
-        report.rays = gathered.iter().flatten().map(|g| g.rays).sum();
+        report.rays = gathered.iter().flatten().map(|g| g.gathered.rays).sum();
         report.accepted = edits.accepted.len() as u64;
         report.refused = edits.refused.len() as u64;
         report.probes = probes as u64;

@@ -96,7 +96,7 @@ impl<'a> NodeInfo<'a> {
             name: &node.name,
             parent: node.parent,
             transform: Transform {
-                translation: Some(translation),
+                translation: Some(translation.as_vec3()),
                 rotation: Some(rotation),
                 scale: Some(scale),
             },
@@ -183,11 +183,8 @@ impl Scene {
             && !self.drawn_nodes().filter_map(|node| node.mesh).any(shines)
     }
 
-    /// The volumes that the scene asks for, or one around all of it with at most 512 probes.
+    /// The volumes that the scene asks for; none where it leaves that to others.
     pub fn volumes(&self) -> Vec<VolumeSpec> {
-        if self.volumes.is_empty() {
-            return vec![VolumeSpec::around(self.bounds(), 512)];
-        }
         self.volumes.clone()
     }
 

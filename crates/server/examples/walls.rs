@@ -1,0 +1,76 @@
+//! How much light of a lit room leaks into the dark one beside it, by the thickness of the wall between
+//! them: what probes in cells of a metre can tell apart.
+//!
+//! ```sh
+//! cargo run --release -p lumencast-server --example walls
+//! ```
+#![expect(clippy::print_stdout, reason = "a program for the terminal")]
+
+use std::sync::Arc;
+
+use glam::{Quat, UVec3, Vec3};
+use lumencast_gather::blend::BlendSettings;
+use lumencast_gather::path_trace::{CpuPathTracer, Options};
+use lumencast_light::{Grid, LightField, Offset, Order};
+use lumencast_scene::{Light, LightKind, Material, Snapshot, VolumeSpec};
+use lumencast_server::{Effort, FitOptions, GatherOptions, bake};
+use lumencast_testkit::scenes::{Stage, lambert};
+
+/// Sides of each of the two rooms, metres.
+const ROOM: Vec3 = Vec3::new(5.0, 3.0, 5.0);
+/// Thicknesses of the wall, metres.
+const WALLS: [f32; 5] = [0.0, 0.02, 0.05, 0.1, 0.2];
+
+/// Two rooms side by side along x, the wall about x = 0, a lamp in the left one.
+fn rooms(wall: f32) -> Arc<Snapshot> {
+    let mut stage = Stage::default();
+    let grey = lambert(Vec3::splat(0.6), Vec3::ZERO);
+    let sheet = stage.material(Material { double_sided: true, ..grey.clone() });
+    let grey = stage.material(grey);
+    let middle = 0.5 * (ROOM.x + wall);
+    if wall == 0.0 {
+        stage.room(Vec3::ZERO, ROOM.with_x(2.0 * ROOM.x), grey);
+        let corner = Vec3::new(0.0, -0.5 * ROOM.y, -0.5 * ROOM.z);
+        stage.quad(corner, Vec3::Y * ROOM.y, Vec3::Z * ROOM.z, sheet);
+    } else {
+        stage.room(Vec3::NEG_X * middle, ROOM, grey);
+        stage.room(Vec3::X * middle, ROOM, grey);
+    }
+    let kind = LightKind::Point { radius: 0.0 };
+    let lamp = Light { kind, color: Vec3::ONE, intensity: 100.0, range: None };
+    stage.light(lamp, Vec3::new(-middle, 0.8, 0.3), Vec3::NEG_Y);
+    stage.snapshot()
+}
+
+/// The mean irradiance that a field shows on the metre of a room's floor beside the wall.
+fn floor(light: &LightField, wall: f32, side: f32) -> f32 {
+    let at = |i: u16| {
+        let [x, z] = [i % 20, i / 20].map(|k| (f32::from(k) + 0.5) / 20.0);
+        Vec3::new(side * (0.5 * wall + x), -0.5 * ROOM.y, (z - 0.5) * ROOM.z)
+    };
+    (0..400).map(|i| light.irradiance(at(i), Vec3::Y).y.max(0.0)).sum::<f32>() / 400.0
+}
+
+fn main() {
+    let mut tracer = CpuPathTracer::new(Options::default()).expect("threads");
+    println!("| wall, cm | as gathered | fitted |\n| --- | --- | --- |");
+    for wall in WALLS {
+        let scene = rooms(wall);
+        let size = ROOM.with_x(2.0 * ROOM.x + wall);
+        let resolution = size.round().as_uvec3();
+        let grid = Grid { center: Vec3::ZERO, rotation: Quat::IDENTITY, size, resolution };
+        debug_assert_eq!(resolution, UVec3::new(10, 3, 5), "cells of a metre");
+        let volume = VolumeSpec { grid, order: Order::L2 };
+        let leaked = |fit: Option<FitOptions>, offset: Offset, tracer: &mut CpuPathTracer| {
+            let blend = BlendSettings::default();
+            let options = GatherOptions { blend, fit, offset, ..GatherOptions::default() };
+            let effort = Effort::of_samples(16_384);
+            let baked = bake(&scene, &[volume], tracer, effort, options, |_| ()).expect("light");
+            let light = LightField::new(baked.volumes);
+            100.0 * floor(&light, wall, 1.0) / floor(&light, wall, -1.0)
+        };
+        let gathered = leaked(None, Offset::HALF_CELL, &mut tracer);
+        let fitted = leaked(Some(FitOptions { points: 256 }), Offset::Cells(0.125), &mut tracer);
+        println!("| {:.0} | {gathered:.1} % | {fitted:.2} % |", 100.0 * wall);
+    }
+}
