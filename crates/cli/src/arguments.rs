@@ -13,10 +13,11 @@ use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Levels, MaterialModel, Options};
 use lumencast_light::{Grid, Offset, Order};
 use lumencast_scene::{Edit, FileContents, Scene, Script, VolumeSpec};
-use lumencast_server::{FitOptions, GatherOptions, SampleRange, TickOptions};
+use lumencast_server::{Effort, FitOptions, GatherOptions, SampleRange, Survey, TickOptions};
 use lumencast_shade::Occlusion;
 
 use crate::environment::EnvironmentArgument;
+use crate::output::tell;
 use crate::{output, warnings};
 
 /// The port of `serve` unless told otherwise.
@@ -88,17 +89,31 @@ pub(crate) struct SceneArguments {
 }
 
 impl SceneArguments {
-    /// The volumes given, or else the scene's own, in the order given.
-    pub(crate) fn volumes(&self, scene: &Scene) -> Result<Vec<VolumeSpec>> {
+    /// The volumes given, in the order given, or else the scene's own or the default one. Warns of those
+    /// that are in the wrong place.
+    pub(crate) fn volumes(
+        &self,
+        scene: &mut Scene,
+        gatherer: &mut dyn Gather,
+    ) -> Result<Vec<VolumeSpec>> {
         let mut volumes = Vec::new();
         for volume in &self.volumes {
             volumes.push(volume.in_scene(scene).context("--volume")?);
         }
         if volumes.is_empty() {
-            volumes = scene.volumes();
+            volumes = lumencast_server::volumes(scene, gatherer)?;
         }
-        for volume in &mut volumes {
+        for (number, volume) in volumes.iter_mut().enumerate() {
             volume.order = self.order.unwrap_or(volume.order);
+            let survey = lumencast_server::survey(&scene.snapshot(), volume, gatherer)?;
+            if survey.is_mostly_useless() {
+                let Survey { probes, buried, lost } = survey;
+                tell!(
+                    "warning: of the {probes} probes of volume {number}, {buried} are within \
+                     something and {lost} see no surface: say where probes are to be, by --volume or \
+                     in the scene's settings"
+                );
+            }
         }
         Ok(volumes)
     }
@@ -143,6 +158,42 @@ const POINTS: u32 = 256;
 /// Where fitted light is read unless told otherwise. Farther off, points on both sides of an edge read
 /// the same place; at the surface itself, both sides of a wall do (`docs/results.md`).
 const NEAR: Offset = Offset::Cells(0.125);
+
+/// Samples of a probe, at most, unless told otherwise.
+pub(crate) const MOST_SAMPLES: u32 = 16_384;
+/// How noisy light may be that is computed once, unless told otherwise: codes of 0 to 255.
+const NOISE: &str = "0.5";
+
+/// The noise at which computing ends, if it is to end by that.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NoiseArgument(Option<f32>);
+
+impl FromStr for NoiseArgument {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "off" => Ok(Self(None)),
+            _ => Ok(Self(Some(parse_positive(text).map_err(|why| format!("{why}, or off"))?))),
+        }
+    }
+}
+
+/// How long light is computed that is computed once.
+#[derive(Debug, Args)]
+pub(crate) struct EffortArguments {
+    /// The noise at which computing ends: root of the mean square of what noise adds to surfaces as
+    /// they are displayed, in codes of 0 to 255; off to take all samples.
+    #[arg(long, value_name = "CODES|off", default_value = NOISE)]
+    noise: NoiseArgument,
+}
+
+impl EffortArguments {
+    /// With so many samples a probe at most.
+    pub(crate) fn with(&self, samples: u32) -> Effort {
+        Effort { samples, noise: self.noise.0 }
+    }
+}
 
 /// Where on surfaces light is read, and whether it is fitted to be read there.
 #[derive(Clone, Copy, Debug)]
@@ -232,9 +283,10 @@ impl TickArguments {
     /// All that a tick needs to know.
     pub(crate) fn options(
         &self,
-        scene: &Scene,
+        scene: &mut Scene,
         volumes: &SceneArguments,
         gather: &GatherArguments,
+        gatherer: &mut dyn Gather,
     ) -> Result<TickOptions> {
         let blend = BlendSettings { ratio: self.ratio, significance: self.significance };
         let feedback = if self.feedback { ", feedback" } else { "" };
@@ -245,7 +297,7 @@ impl TickArguments {
             source: source(&gather) + feedback,
             gather,
             feedback: self.feedback,
-            volumes: volumes.volumes(scene)?,
+            volumes: volumes.volumes(scene, gatherer)?,
             script: self.edits.as_deref().map(read_script).transpose()?,
         })
     }

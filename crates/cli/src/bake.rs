@@ -7,20 +7,21 @@ use clap::Args;
 use lumencast_codec::{Epoch, LightFile, SceneInfo, UpdateInfo};
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::Levels;
+use lumencast_server::Baked;
 use serde_json::json;
 
-use crate::arguments::{GatherArguments, SceneArguments, source};
+use crate::arguments::{EffortArguments, GatherArguments, MOST_SAMPLES, SceneArguments, source};
 use crate::{
-    out_file,
+    light_source, out_file,
     output::{self, say},
 };
 
-/// Computes a scene's light until it has converged and writes it to a file.
+/// Computes a scene's light until its noise does not show and writes it to a file.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   lumencast bake cornell -o cornell.light
-  lumencast bake sponza.glb -o sponza.light --volume 20x12x14 --samples 16384
+  lumencast bake sponza.glb -o sponza.light --volume 20x12x14 --noise 0.25
 
 The file holds the same bytes as the keyframes of a server's broadcast (docs/wire.md); a client can
 start from it when there is no server. `lumencast inspect FILE` says what is in it.")]
@@ -32,9 +33,12 @@ pub(crate) struct Bake {
     /// The file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Samples a probe: four times as many halve the noise.
-    #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    /// Samples a probe, at most: four times as many halve the noise.
+    #[arg(long, default_value_t = MOST_SAMPLES,
+          value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     samples: u32,
+    #[command(flatten)]
+    effort: EffortArguments,
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
@@ -45,21 +49,18 @@ impl Bake {
         out_file::check(&self.output)?;
         let mut scene = self.scene.source.open()?;
         out_file::check_apart([&self.output], &self.scene.source.files(&scene))?;
-        let volumes = self.scene.volumes(&scene)?;
-        let snapshot = scene.snapshot();
         let mut gatherer = self.gather.gatherer(Levels::One)?;
+        let volumes = self.scene.volumes(&mut scene, &mut *gatherer)?;
+        let snapshot = scene.snapshot();
         let options = self.gather.options(BlendSettings::default(), self.gather.reading.baked());
-        let bar = output::bar(1000, "Baking");
-        let light = lumencast_server::bake(
-            &snapshot,
-            &volumes,
-            &mut *gatherer,
-            self.samples,
-            options,
-            |done| bar.set_position((done * 1000.0) as u64),
-        );
+        let bar = output::share_bar("Computing light");
+        let effort = self.effort.with(self.samples);
+        let baked =
+            lumencast_server::bake(&snapshot, &volumes, &mut *gatherer, effort, options, |done| {
+                light_source::show(&bar, done);
+            });
         bar.finish_and_clear();
-        let light = light?;
+        let Baked { volumes: light, samples, noise } = baked?;
 
         let info = SceneInfo { name: scene.name().into(), root: scene.root_file().into() };
         let at = UpdateInfo {
@@ -67,18 +68,19 @@ impl Bake {
             scene_version: snapshot.version,
             ..UpdateInfo::default()
         };
-        let source = format!("{}, baked, {} samples", source(&options), self.samples);
+        let source = format!("{}, baked, {samples} samples", source(&options));
         let bytes = LightFile::of_volumes(Epoch(0), info, 1.0, &source, &light, at).write();
         out_file::write(&self.output, &bytes)?;
         let probes: usize = light.iter().map(|volume| volume.grid.probe_count()).sum();
         if self.json {
             return output::json(&json!({
                 "file": self.output, "bytes": bytes.len(), "fields": light.len(),
-                "probes": probes, "samples": self.samples,
+                "probes": probes, "samples": samples, "noise": noise,
             }));
         }
+        let noise = noise.map_or(String::new(), |noise| format!(", noise {noise:.2} of 255"));
         say!(
-            "{}: fields: {}, probes: {probes}, {}",
+            "{}: fields: {}, probes: {probes}, {samples} samples a probe{noise}, {}",
             self.output.display(),
             light.len(),
             output::bytes(bytes.len() as u64)

@@ -8,13 +8,14 @@ use clap::Args;
 use glam::Vec3;
 use lumencast_codec::{Catalog, LightFile};
 use lumencast_light::ProbeVolume;
-use lumencast_scene::{NodeInfo, Scene};
+use lumencast_scene::{MeshId, NodeInfo, Scene};
 use serde_json::{Value, json};
 
+use crate::arguments::scene_name;
 use crate::output::{self, say};
 use crate::remote::Seen;
 use crate::words::{entry_in_words, in_words, label};
-use crate::{light_source, remote};
+use crate::{light_source, remote, warnings};
 
 /// Says what is in a file (.light, .gltf, .glb), a built-in scene, or a running server.
 #[derive(Debug, Args)]
@@ -139,10 +140,13 @@ fn scene_report(scene: &mut Scene) -> Value {
         .drawn_nodes()
         .map(|n| json!({ "node": n.id, "name": n.name, "parent": n.parent, "mesh": n.mesh }))
         .collect();
-    let meshes: Vec<Value> = scene
-        .meshes()
-        .iter()
-        .map(|mesh| json!({ "name": mesh.name, "triangles": mesh.triangle_count() }))
+    let shown: BTreeSet<MeshId> = scene.drawn_nodes().filter_map(|node| node.mesh).collect();
+    let meshes: Vec<Value> = shown
+        .into_iter()
+        .filter_map(|id| Some((id, scene.meshes().get(id.0 as usize)?)))
+        .map(|(id, mesh)| {
+            json!({ "mesh": id, "name": mesh.name, "triangles": mesh.triangle_count() })
+        })
         .collect();
     let cameras: Vec<Value> = scene
         .cameras()
@@ -186,7 +190,7 @@ fn lights(scene: &Scene) -> Vec<Value> {
         let light = node.light?;
         Some(json!({ "node": node.id, "name": node.name, "light": light }))
     };
-    scene.nodes().filter_map(light).collect()
+    scene.drawn_nodes().filter_map(light).collect()
 }
 
 /// The report for people: a line for each plain value, a block for each list.

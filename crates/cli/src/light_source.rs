@@ -4,11 +4,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
+use indicatif::ProgressBar;
 use lumencast_codec::{Catalog, DecodeError, LightFile};
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::ProbeVolume;
 use lumencast_scene::{Scene, Snapshot, VolumeSpec};
+use lumencast_server::{Baked, Done, Effort};
 
 use crate::arguments::Reading;
 use crate::{
@@ -53,8 +55,7 @@ pub(crate) fn check_fits(what: &str, catalog: &Catalog, scene: &Scene) {
 /// How a field is computed.
 #[derive(Debug)]
 pub(crate) struct Computed {
-    /// Samples a probe.
-    pub(crate) samples: u32,
+    pub(crate) effort: Effort,
     /// Surface scattering events, seen from a probe.
     pub(crate) bounces: u32,
     /// Upper limit of one path vertex's contribution, cd/m².
@@ -64,21 +65,32 @@ pub(crate) struct Computed {
 }
 
 impl Computed {
+    /// What traces it.
+    pub(crate) fn tracer(&self) -> Result<CpuPathTracer> {
+        CpuPathTracer::new(self.tracing.clone()).context("cannot start the threads that trace")
+    }
+
     /// The light of volumes, with a bar that shows how far it is.
     pub(crate) fn volumes(
         self,
         scene: &Arc<Snapshot>,
         volumes: &[VolumeSpec],
-    ) -> Result<Vec<ProbeVolume>> {
-        let mut tracer =
-            CpuPathTracer::new(self.tracing).context("cannot start the threads that trace")?;
+        tracer: &mut CpuPathTracer,
+    ) -> Result<Baked> {
         let gather = self.reading.gathered(self.bounces, self.clamp, BlendSettings::default());
         let bar = output::share_bar("Computing the light field");
-        let progress =
-            |done: f32| bar.set_position((f64::from(done) * output::SHARE_BAR_LENGTH) as u64);
-        let light =
-            lumencast_server::bake(scene, volumes, &mut tracer, self.samples, gather, progress);
+        let light = lumencast_server::bake(scene, volumes, tracer, self.effort, gather, |done| {
+            show(&bar, done);
+        });
         bar.finish_and_clear();
         Ok(light?)
+    }
+}
+
+/// Shows how far a computation is, and how noisy its light still is.
+pub(crate) fn show(bar: &ProgressBar, done: Done) {
+    bar.set_position((f64::from(done.share) * output::SHARE_BAR_LENGTH) as u64);
+    if let Some(noise) = done.noise {
+        bar.set_message(format!("Computing light, noise {noise:.2} of 255"));
     }
 }

@@ -25,6 +25,7 @@ mod render;
 mod serve;
 mod token;
 mod view;
+mod warnings;
 mod words;
 
 use std::io::IsTerminal;

@@ -77,12 +77,12 @@ pub(crate) struct Serve {
 impl Serve {
     pub(crate) fn run(self) -> Result<()> {
         let network = self.network()?;
-        let scene = self.scene.source.open()?;
-        let options = self.tick.options(&scene, &self.scene, &self.gather)?;
+        let mut scene = self.scene.source.open()?;
+        let mut gatherer = self.gather.gatherer(Levels::Two)?;
+        let options = self.tick.options(&mut scene, &self.scene, &self.gather, &mut *gatherer)?;
         let mut config = ServerConfig::new(network);
         config.tick = options;
         config.page = self.page.clone();
-        let gatherer = self.gather.gatherer(Levels::Two)?;
 
         let runtime = tokio::runtime::Builder::new_multi_thread()
             // The network needs little; the processor is for the light.
@@ -136,10 +136,6 @@ impl Serve {
             });
             output::json_line(&ready);
             return;
-        }
-        let scene = server.tick().scene();
-        for warning in scene.warnings() {
-            tell!("warning: {warning}");
         }
         say!("{}: {probes} probes at {} Hz", server.scene_name(), self.tick.rate);
         say!("{page}");

@@ -24,7 +24,7 @@ use crate::arguments::{
 };
 use crate::camera::{self, CameraArgument, parse_size};
 use crate::light_source::{self, is_address};
-use crate::{out_file, output};
+use crate::{out_file, output, warnings};
 
 /// How long threads may take to end once the window is closed.
 const GRACE: Duration = Duration::from_secs(2);
@@ -185,13 +185,13 @@ impl View {
 
     /// A scene whose light is computed here, by a server of its own.
     fn here(&self, runtime: &Runtime) -> Result<(Box<dyn World>, Running)> {
-        let spinner = output::spinner(format!("Loading {}", self.scene.source.scene));
-        let scene = self.scene()?;
+        let mut scene = self.scene()?;
+        let spinner = output::spinner("Starting to compute its light".into());
         let replica = scene.pristine(0.0);
         let loopback = std::net::SocketAddr::from(([127, 0, 0, 1], 0));
         let mut config = ServerConfig::new(lumencast_transport::ServerConfig::new(loopback));
-        config.tick = self.tick.options(&scene, &self.scene, &self.gather)?;
-        let gatherer = self.gather.gatherer(Levels::Two)?;
+        let mut gatherer = self.gather.gatherer(Levels::Two)?;
+        config.tick = self.tick.options(&mut scene, &self.scene, &self.gather, &mut *gatherer)?;
         let (address, running) = runtime.block_on(async {
             let server = Server::bind(scene, gatherer, config).await?;
             let address = format!("http://{}/{}", server.local_addr(), server.scene_name());

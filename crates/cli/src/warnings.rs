@@ -2,6 +2,8 @@
 
 use lumencast_scene::Scene;
 
+use crate::output::tell;
+
 /// How many lines there are at most.
 const SHOWN: usize = 20;
 
@@ -13,17 +15,17 @@ pub(crate) const DARK: &str =
 pub(crate) fn left_out(scene: &Scene) {
     let warnings = scene.warnings();
     for warning in warnings.iter().take(SHOWN) {
-        eprintln!("warning: {warning}");
+        tell!("warning: {warning}");
     }
     if warnings.len() > SHOWN {
         let more = warnings.len() - SHOWN;
-        eprintln!("warning: {more} more like these; `lumencast inspect --json` lists all");
+        tell!("warning: {more} more like these; `lumencast inspect --json` lists all");
     }
 }
 
 /// Says where a scene comes out black, and what to do.
 pub(crate) fn dark(scene: &Scene) {
     if scene.is_dark() {
-        eprintln!("warning: {DARK}");
+        tell!("warning: {DARK}");
     }
 }

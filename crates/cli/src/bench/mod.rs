@@ -1,10 +1,13 @@
 //! `lumencast bench`: figures of this machine.
 
 mod bmfr;
+mod judge;
 mod paths;
 mod peers;
 mod quality;
 mod rays;
+mod scenes;
+mod section;
 mod tick;
 
 use anyhow::Result;
@@ -21,6 +24,7 @@ pub(crate) enum Bench {
     Paths(paths::BenchPaths),
     Quality(Box<quality::BenchQuality>),
     Peers(peers::BenchPeers),
+    Scenes(scenes::BenchScenes),
 }
 
 impl Bench {
@@ -31,8 +35,16 @@ impl Bench {
             Self::Paths(command) => command.run(),
             Self::Quality(command) => command.run(),
             Self::Peers(command) => command.run(),
+            Self::Scenes(command) => command.run(),
         }
     }
+}
+
+/// The light of two parts of a picture together.
+fn sum(a: &Picture, b: &Picture) -> Picture {
+    let mut sum = a.clone();
+    sum.pixels_mut().iter_mut().zip(b.pixels()).for_each(|(a, b)| *a += *b);
+    sum
 }
 
 /// What an adapter draws of a part of the light.

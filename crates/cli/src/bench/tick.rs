@@ -44,10 +44,11 @@ const RAW_BYTES: [(&str, u64); 2] = [("paper", 56), ("implementation", 72)];
 
 impl BenchTick {
     pub(crate) fn run(self) -> Result<()> {
-        let scene = self.scene.source.open()?;
-        let options = self.tick.options(&scene, &self.scene, &self.gather)?;
+        let mut scene = self.scene.source.open()?;
+        let mut gatherer = self.gather.gatherer(Levels::Two)?;
+        let options = self.tick.options(&mut scene, &self.scene, &self.gather, &mut *gatherer)?;
         let period = options.period;
-        let mut tick = Tick::new(scene, self.gather.gatherer(Levels::Two)?, options, Epoch(0))?;
+        let mut tick = Tick::new(scene, gatherer, options, Epoch(0))?;
         let ticks = SETTLING + (self.seconds * self.tick.rate).ceil().clamp(1.0, 1e7) as usize;
         let bar = output::bar(ticks as u64, "Ticks");
         let mut sent = Sent::default();

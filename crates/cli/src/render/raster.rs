@@ -13,7 +13,9 @@ use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadow
 use serde_json::json;
 
 use super::{Lighting, PartsArgument, Render};
-use crate::arguments::{ReadingArguments, occlusion, parse_occlusion, parse_positive};
+use crate::arguments::{
+    EffortArguments, MOST_SAMPLES, ReadingArguments, occlusion, parse_occlusion, parse_positive,
+};
 use crate::light_source::{self, Computed};
 use crate::output::{self, say, tell};
 
@@ -32,10 +34,12 @@ pub(crate) struct RasterArguments {
     /// it is not given.
     #[arg(long, value_name = "FILE|URL")]
     light: Option<String>,
-    /// Samples a probe where the field is computed.
-    #[arg(long, value_name = "N", default_value_t = 2048,
+    /// Samples a probe where the field is computed, at most.
+    #[arg(long, value_name = "N", default_value_t = MOST_SAMPLES,
           value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     probe_samples: u32,
+    #[command(flatten)]
+    effort: EffortArguments,
     #[command(flatten)]
     reading: ReadingArguments,
     /// Takes ringing out of the field by a Hann window that ends at this band; 3 leaves order 2 a
@@ -177,15 +181,16 @@ impl Render {
             light_source::check_fits(light, &catalog, scene);
             return Ok(volumes);
         }
-        let specs = self.scene.volumes(scene)?;
         let computed = Computed {
-            samples: self.raster.probe_samples,
+            effort: self.raster.effort.with(self.raster.probe_samples),
             bounces: self.picture.bounces.saturating_sub(1),
             clamp: self.clamp,
             reading: self.raster.reading.drawn(),
             tracing: self.picture.tracing(),
         };
-        computed.volumes(&scene.snapshot(), &specs)
+        let mut tracer = computed.tracer()?;
+        let specs = self.scene.volumes(scene, &mut tracer)?;
+        Ok(computed.volumes(&scene.snapshot(), &specs, &mut tracer)?.volumes)
     }
 
     fn report_drawn(

@@ -1,7 +1,6 @@
 //! `lumencast bench peers`: our pictures by the protocol by which the second paper's published
 //! implementation was measured.
 
-mod judge;
 mod reference;
 mod report;
 mod subjects;
@@ -11,21 +10,22 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use glam::Vec3;
 use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
 use lumencast_light::LightField;
 use lumencast_picture::{Picture, ToneMap};
-use lumencast_scene::{Environment, Material, Scene, Snapshot, View, VolumeSpec};
+use lumencast_scene::{Scene, Snapshot, VolumeSpec};
+use lumencast_server::Effort;
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading};
 
+use super::judge::{Judge, covered};
 use super::{cells, draw};
 use crate::arguments::{Reading, ReadingArguments, VolumeArgument};
 use crate::light_source::Computed;
-use crate::{camera, out_file, output};
-use judge::Judge;
+use crate::{camera, out_file, output, warnings};
 use reference::References;
 use report::{Fault, Field, Report, Table};
-use subjects::{SIZE, SUBJECTS, Subject};
+use subjects::{PlaceOfFault, Subject};
+pub(super) use subjects::{SIZE, SUBJECTS};
 
 /// Samples a probe: 64 updates of 512.
 const PROBE_SAMPLES: u32 = 64 * 512;
@@ -123,7 +123,7 @@ impl BenchPeers {
         warnings::left_out(&scene);
         let view = camera::view(&scene, None)?;
         let snapshot = scene.snapshot();
-        let judge = Judge::new(reference, covered(renderer, &snapshot, view, settings)?)?;
+        let judge = Judge::new(reference, covered(renderer, &snapshot, view, settings)?, 1.0)?;
         self.write(subject, "reference", judge.reference())?;
         renderer.set_scene(&snapshot);
         let direct = draw(renderer, view, settings, Lighting::DIRECT)?;
@@ -167,9 +167,11 @@ impl BenchPeers {
     ) -> Result<LightField> {
         let materials = MaterialModel::Lambert;
         let tracing = Options { materials, threads: None, levels: Levels::One };
-        let (samples, bounces) = (self.probe_samples, self.bounces);
-        let computed = Computed { samples, bounces, clamp: f32::INFINITY, reading, tracing };
-        Ok(LightField::new(computed.volumes(snapshot, &[grid])?))
+        let effort = Effort::of_samples(self.probe_samples);
+        let (bounces, clamp) = (self.bounces, f32::INFINITY);
+        let computed = Computed { effort, bounces, clamp, reading, tracing };
+        let mut tracer = computed.tracer()?;
+        Ok(LightField::new(computed.volumes(snapshot, &[grid], &mut tracer)?.volumes))
     }
 
     fn write(&self, subject: &Subject, name: &str, picture: &Picture) -> Result<()> {
@@ -180,25 +182,6 @@ impl BenchPeers {
 }
 
 fn faults(subject: &'static Subject, judge: &Judge, picture: &Picture) -> Vec<Fault> {
-    let at = |place| judge.deviation(picture, place);
+    let at = |p: &PlaceOfFault| judge.deviation(picture, [p.from, p.to]);
     subject.places.iter().map(|p| Fault { fault: p.fault, deviation: at(p) }).collect()
-}
-
-/// Which pixels show nothing but surfaces: those where no environment is seen, were there nothing
-/// else that shines.
-fn covered(
-    renderer: &mut Renderer,
-    snapshot: &Snapshot,
-    view: View,
-    settings: &Settings,
-) -> Result<Vec<bool>> {
-    let dark = |m: &Material| Material { emissive: Vec3::ZERO, ..m.clone() };
-    let silhouette = Snapshot {
-        materials: snapshot.materials.iter().map(dark).collect(),
-        environment: Environment::Constant { radiance: Vec3::ONE },
-        ..snapshot.clone()
-    };
-    renderer.set_scene(&Arc::new(silhouette));
-    let picture = draw(renderer, view, settings, Lighting::NONE)?;
-    Ok(picture.pixels().iter().map(|p| *p == Vec3::ZERO).collect())
 }

@@ -5,8 +5,8 @@ use std::fmt::{self, Write};
 use lumencast_light::Order;
 use serde::Serialize;
 
-use super::judge::Deviation;
-use super::subjects::{Psnr, Published};
+use super::subjects::Published;
+use crate::bench::judge::{Deviation, Psnr};
 
 #[derive(Serialize)]
 pub(super) struct Report {
@@ -74,11 +74,5 @@ impl Table {
             }
         }
         writeln!(out)
-    }
-}
-
-impl fmt::Display for Psnr {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.1} ({:.1}) dB", self.sharp, self.filtered)
     }
 }

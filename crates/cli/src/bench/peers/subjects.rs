@@ -3,16 +3,18 @@
 use glam::{UVec2, UVec3};
 use serde::Serialize;
 
+use crate::bench::judge::Psnr;
+
 /// Pixels of the pictures.
-pub(super) const SIZE: UVec2 = UVec2::new(320, 180);
+pub(in crate::bench) const SIZE: UVec2 = UVec2::new(320, 180);
 
 /// A scene of the protocol.
 #[derive(Debug)]
-pub(super) struct Subject {
+pub(in crate::bench) struct Subject {
     /// Its name on the command line, and that of its files.
     pub(super) name: &'static str,
     /// Its file within the folder of scenes.
-    pub(super) file: &'static str,
+    pub(in crate::bench) file: &'static str,
     /// Cells of the published grid, which spans the scene's bounds.
     pub(super) cells: UVec3,
     pub(super) published: Published,
@@ -27,15 +29,6 @@ pub(super) struct Published {
     pub(super) best_settings: Psnr,
 }
 
-/// PSNR, dB.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct Psnr {
-    /// Of pixels.
-    pub(super) sharp: f64,
-    /// After the filter.
-    pub(super) filtered: f64,
-}
-
 /// A part of the picture.
 #[derive(Debug)]
 pub(super) struct PlaceOfFault {
@@ -46,7 +39,7 @@ pub(super) struct PlaceOfFault {
     pub(super) to: UVec2,
 }
 
-pub(super) const SUBJECTS: [Subject; 3] = [
+pub(in crate::bench) const SUBJECTS: [Subject; 3] = [
     Subject {
         name: "cornell",
         file: "cornell/CornellBoxPoint.glb",

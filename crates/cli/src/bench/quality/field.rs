@@ -5,12 +5,14 @@ use std::time::Instant;
 use anyhow::Result;
 use lumencast_light::LightField;
 use lumencast_scene::{View, VolumeSpec};
+use lumencast_server::Effort;
 use lumencast_shade::{Lighting, Renderer, Settings};
 
 use super::reference::Judge;
 use super::report::{Errors, Row};
-use super::{BenchQuality, Subject, sum};
+use super::{BenchQuality, Subject};
 use crate::arguments::Reading;
+use crate::bench::sum;
 use crate::bench::{cells, draw};
 use crate::light_source::Computed;
 
@@ -37,9 +39,12 @@ impl BenchQuality {
         let (samples, clamp) = (self.probe_samples, self.clamp);
         let how = if reading.fit.is_some() { ", fitted" } else { "" };
         let tracing = self.picture.tracing();
-        let computed = Computed { samples, bounces, clamp, reading, tracing };
+        let effort = Effort::of_samples(samples);
+        let computed = Computed { effort, bounces, clamp, reading, tracing };
+        let mut tracer = computed.tracer()?;
         let start = Instant::now();
-        let light = LightField::new(computed.volumes(&subject.snapshot, &[spec])?);
+        let baked = computed.volumes(&subject.snapshot, &[spec], &mut tracer)?;
+        let light = LightField::new(baked.volumes);
         let seconds = start.elapsed().as_secs_f64();
         Ok(Field {
             name: format!("{} L{} {bounces} bounces{how}", cells(&spec), u8::from(spec.order)),

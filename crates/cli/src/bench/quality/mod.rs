@@ -12,11 +12,11 @@ mod sheet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::UVec2;
+use lumencast_gather::path_trace::CpuPathTracer;
 use lumencast_light::Order;
-use lumencast_picture::Picture;
 use lumencast_scene::{Scene, Snapshot, View, VolumeSpec};
 use lumencast_shade::{Gpu, Renderer, Settings, Shading, Shadows};
 
@@ -125,10 +125,12 @@ impl BenchQuality {
         if let Some(document) = &self.document {
             document::check(&section, document)?;
         }
+        let mut tracer = CpuPathTracer::new(self.picture.tracing())
+            .context("cannot start the threads that trace")?;
+        let grids = self.scene.volumes(&mut scene, &mut tracer)?;
         let snapshot = scene.snapshot();
         let view = camera::view(&scene, self.picture.camera.as_ref())?;
         let subject = Subject { scene: &scene, snapshot, view };
-        let grids = self.scene.volumes(&scene)?;
         ensure!(!grids.is_empty(), "the scene has no volumes; give --volume");
 
         let mut renderer = Renderer::new(Gpu::new()?, &Settings::default());
@@ -245,10 +247,4 @@ impl BenchQuality {
             ..Settings::default()
         }
     }
-}
-
-fn sum(a: &Picture, b: &Picture) -> Picture {
-    let mut sum = a.clone();
-    sum.pixels_mut().iter_mut().zip(b.pixels()).for_each(|(a, b)| *a += *b);
-    sum
 }

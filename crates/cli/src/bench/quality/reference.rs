@@ -8,7 +8,8 @@ use lumencast_gather::reference::{Film, Parts, PictureSettings, Renderer};
 use lumencast_picture::{Comparison, Loaded, PIXELS_PER_DEGREE, Picture, compare};
 use serde::Serialize;
 
-use super::{BenchQuality, Subject, sum};
+use super::{BenchQuality, Subject};
+use crate::bench::sum;
 use crate::{film_file, fingerprint, output};
 
 /// The two parts of a path-traced picture.

@@ -1,19 +1,43 @@
-//! How pictures are judged by the protocol.
+//! How pictures are judged by the protocol of the published implementation's figures: codes, where
+//! surfaces are seen, as they are and after a filter that takes most of the reference's noise away.
+
+use std::fmt;
+use std::sync::Arc;
 
 use anyhow::{Result, ensure};
 use glam::{UVec2, Vec3};
+use lumencast_gather::reference::Film;
 use lumencast_picture::{Pair, Picture, gamma_code, psnr};
+use lumencast_scene::{Environment, Material, Snapshot, View};
+use lumencast_shade::{Lighting, Renderer, Settings};
+use serde::Serialize;
 
-use super::subjects::{PlaceOfFault, Psnr};
+use super::draw;
 
 /// Side of the filter that takes the reference's noise away, pixels.
 const FILTER: u32 = 4;
+
+/// PSNR, dB.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct Psnr {
+    /// Of pixels.
+    pub(super) sharp: f64,
+    /// After the filter.
+    pub(super) filtered: f64,
+}
+
+impl fmt::Display for Psnr {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.1} ({:.1}) dB", self.sharp, self.filtered)
+    }
+}
 
 /// What pictures are compared with, and where.
 pub(super) struct Judge {
     reference: Picture,
     /// Which pixels show nothing but surfaces, row by row.
     covered: Vec<bool>,
+    exposure: f32,
 }
 
 /// How a part of a picture differs from the reference, after the filter, in codes of 0 to 255.
@@ -28,10 +52,10 @@ pub(super) struct Deviation {
 impl Judge {
     /// # Errors
     /// The mask is of another size, or nothing is covered.
-    pub(super) fn new(reference: Picture, covered: Vec<bool>) -> Result<Self> {
+    pub(super) fn new(reference: Picture, covered: Vec<bool>, exposure: f32) -> Result<Self> {
         ensure!(covered.len() == reference.pixels().len(), "a mask of another size");
         ensure!(covered.contains(&true), "the camera sees no surface");
-        Ok(Self { reference, covered })
+        Ok(Self { reference, covered, exposure })
     }
 
     pub(super) fn reference(&self) -> &Picture {
@@ -47,7 +71,7 @@ impl Judge {
         };
         let shown = |p: &Picture| -> Vec<Vec3> {
             let covered = p.pixels().iter().zip(&self.covered).filter(|(_, covered)| **covered);
-            covered.map(|(p, _)| code(*p)).collect()
+            covered.map(|(p, _)| self.code(*p)).collect()
         };
         let filtered = |p: &Picture| self.filtered(p, everything);
         Ok(Psnr {
@@ -57,8 +81,7 @@ impl Judge {
     }
 
     /// How a picture differs at a place.
-    pub(super) fn deviation(&self, picture: &Picture, place: &PlaceOfFault) -> Deviation {
-        let at = [place.from, place.to];
+    pub(super) fn deviation(&self, picture: &Picture, at: [UVec2; 2]) -> Deviation {
         let [a, b] = [&self.reference, picture].map(|p| self.filtered(p, at));
         let differences: Vec<Vec3> = a.iter().zip(&b).map(|(a, b)| 255.0 * (b - a)).collect();
         let mean = |of: &dyn Fn(&Vec3) -> Vec3| {
@@ -73,9 +96,30 @@ impl Judge {
     /// How a picture's codes differ, twice enlarged: grey where they do not.
     pub(super) fn difference(&self, picture: &Picture) -> Picture {
         Picture::from_fn(picture.width(), picture.height(), |x, y| {
-            let [a, b] = [&self.reference, picture].map(|p| p.pixel(x, y).map_or(Vec3::ZERO, code));
+            let [a, b] = [&self.reference, picture]
+                .map(|p| p.pixel(x, y).map_or(Vec3::ZERO, |p| self.code(p)));
             (0.5 + 2.0 * (b - a)).clamp(Vec3::ZERO, Vec3::ONE).powf(2.2)
         })
+    }
+
+    /// PSNR that a film's noise would leave by itself after the filter, were the film what is judged;
+    /// infinite where it has none.
+    pub(super) fn noise(&self, film: &Film) -> Result<f64> {
+        let size = self.size();
+        let half = |(sums, samples): (&[Vec3], u32)| -> Result<Vec<Vec3>> {
+            let mean = sums.iter().map(|sum| *sum / samples.max(1) as f32).collect();
+            Ok(self.filtered(&Picture::new(size.x, size.y, mean)?, [UVec2::ZERO, size]))
+        };
+        let [a, b] = film.parts();
+        let (a, b) = (half(a)?, half(b)?);
+        // The mean of two halves errs by half of what they differ by.
+        let squares = a.iter().zip(&b).map(|(a, b)| (0.5 * (a - b)).as_dvec3().length_squared());
+        Ok(-10.0 * (squares.sum::<f64>() / (3.0 * a.len() as f64)).log10())
+    }
+
+    /// As a picture is displayed: v^(1/2.2), clamped.
+    fn code(&self, linear: Vec3) -> Vec3 {
+        gamma_code(linear * self.exposure).clamp(Vec3::ZERO, Vec3::ONE)
     }
 
     fn size(&self) -> UVec2 {
@@ -94,15 +138,29 @@ impl Judge {
                 self.covered[index].then(|| picture.pixels()[index])
             };
             let sum: Vec3 = (0..FILTER * FILTER).map(pixel).sum::<Option<Vec3>>()?;
-            Some(code(sum / (FILTER * FILTER) as f32))
+            Some(self.code(sum / (FILTER * FILTER) as f32))
         };
         (0..blocks.element_product()).filter_map(block).collect()
     }
 }
 
-/// As a picture is displayed: v^(1/2.2), clamped.
-fn code(linear: Vec3) -> Vec3 {
-    gamma_code(linear).clamp(Vec3::ZERO, Vec3::ONE)
+/// Which pixels show nothing but surfaces: those where no environment is seen, were there nothing
+/// else that shines. The renderer's scene is another one afterwards.
+pub(super) fn covered(
+    renderer: &mut Renderer,
+    snapshot: &Snapshot,
+    view: View,
+    settings: &Settings,
+) -> Result<Vec<bool>> {
+    let dark = |m: &Material| Material { emissive: Vec3::ZERO, ..m.clone() };
+    let silhouette = Snapshot {
+        materials: snapshot.materials.iter().map(dark).collect(),
+        environment: Environment::Constant { radiance: Vec3::ONE },
+        ..snapshot.clone()
+    };
+    renderer.set_scene(&Arc::new(silhouette));
+    let picture = draw(renderer, view, settings, Lighting::NONE)?;
+    Ok(picture.pixels().iter().map(|p| *p == Vec3::ZERO).collect())
 }
 
 #[cfg(test)]
@@ -120,7 +178,7 @@ mod tests {
     }
 
     fn judge(reference: Picture, covered: impl Fn(u32) -> bool) -> Judge {
-        Judge::new(reference, (0..SIDE * SIDE).map(covered).collect()).expect("pixels")
+        Judge::new(reference, (0..SIDE * SIDE).map(covered).collect(), 1.0).expect("pixels")
     }
 
     /// A code of a tenth too much everywhere: 20 dB.
@@ -129,7 +187,8 @@ mod tests {
         let judge = judge(picture(|_, _| linear(0.5)), |_| true);
         let psnr = judge.psnr(&picture(|_, _| linear(0.6))).expect("a figure");
         assert!((psnr.sharp - 20.0).abs() < 1e-3 && (psnr.filtered - 20.0).abs() < 1e-3);
-        let whiter = Judge::new(picture(|_, _| Vec3::splat(9.0)), judge.covered).expect("pixels");
+        let whiter =
+            Judge::new(picture(|_, _| Vec3::splat(9.0)), judge.covered, 1.0).expect("pixels");
         let psnr = whiter.psnr(&picture(|_, _| linear(0.9))).expect("a figure");
         assert!((psnr.sharp - 20.0).abs() < 1e-3, "white is clamped: {psnr:?}");
     }
@@ -149,8 +208,8 @@ mod tests {
         let judge = judge(picture(|_, _| linear(0.5)), |i| i % SIDE >= 2);
         let psnr = judge.psnr(&wrong_at_the_left).expect("a figure");
         assert!((psnr.sharp - 20.0).abs() < 1e-3 && (psnr.filtered - 20.0).abs() < 1e-3);
-        assert!(Judge::new(picture(|_, _| Vec3::ONE), vec![false; 64]).is_err());
-        assert!(Judge::new(picture(|_, _| Vec3::ONE), vec![true; 63]).is_err());
+        assert!(Judge::new(picture(|_, _| Vec3::ONE), vec![false; 64], 1.0).is_err());
+        assert!(Judge::new(picture(|_, _| Vec3::ONE), vec![true; 63], 1.0).is_err());
     }
 
     #[test]
@@ -158,8 +217,8 @@ mod tests {
         let judge = judge(picture(|_, _| linear(0.5)), |_| true);
         let red = Vec3::new(0.7_f32.powf(2.2), 0.5_f32.powf(2.2), 0.4_f32.powf(2.2));
         let right = picture(|x, _| if x < 4 { Vec3::ZERO } else { red });
-        let place = PlaceOfFault { fault: "red", from: UVec2::new(4, 0), to: UVec2::new(8, 8) };
-        let Deviation { mean, rms } = judge.deviation(&right, &place);
+        let place = [UVec2::new(4, 0), UVec2::new(8, 8)];
+        let Deviation { mean, rms } = judge.deviation(&right, place);
         assert!((mean - Vec3::new(51.0, 0.0, -25.5)).abs().max_element() < 0.01, "{mean}");
         assert!((rms - (51.0_f32.powi(2) / 3.0 + 25.5_f32.powi(2) / 3.0).sqrt()).abs() < 0.01);
     }

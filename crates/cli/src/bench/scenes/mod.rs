@@ -1,0 +1,312 @@
+//! `lumencast bench scenes`: the indirect light of many scenes at default settings, so that none is only
+//! looked at by chance.
+
+mod find;
+mod report;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
+use lumencast_gather::reference::{self, Film, Parts, PictureSettings};
+use lumencast_light::LightField;
+use lumencast_picture::{Picture, ToneMap, exposure};
+use lumencast_scene::{Edit, Environment, Scene, Snapshot, View};
+use lumencast_server::{Baked, Effort};
+use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading, Shadows};
+
+use super::judge::{Judge, covered};
+use super::peers::{SIZE, SUBJECTS};
+use super::section::Section;
+use super::{cells, draw, sum};
+use crate::arguments::{EffortArguments, MOST_SAMPLES, ReadingArguments};
+use crate::light_source::Computed;
+use crate::output::{self, tell};
+use crate::{camera, film_file, fingerprint, out_file, warnings};
+use report::{Beside, Report, Row};
+
+/// Bounces of the reference; probes have one fewer.
+const BOUNCES: u32 = 4;
+/// By how much the reference's noise lies below the error that it tells, dB.
+const BELOW: f64 = 6.0;
+/// The sky that scenes without light stand under, lux.
+const SKY: f32 = 1000.0;
+/// Samples a pixel that a reference begins with.
+const FIRST_SPP: u32 = 64;
+
+/// Measures the indirect light of scenes at default settings, beside the path tracer's.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  lumencast bench scenes
+  lumencast bench scenes cornell door ../shared/scenes --keep references -o pictures
+  lumencast bench scenes door --times 16 --json
+
+A picture of 320×180, of the scene's first camera or else of all of it, all materials Lambert, is drawn
+with indirect light alone, of the scene's own volumes or the default one, and compared with the path
+tracer's indirect light of 4 bounces. Scenes without light stand under a sky of 1,000 lux. PSNR is of
+codes v^(1/2.2) clamped to 0 to 1, over pixels that show nothing but surfaces, and in brackets after a
+filter of 4×4 pixels. The exposure makes the 99th percentile of the whole picture white; it is 1 for
+the scenes of `bench peers`. References are refined until their noise after the filter lies 6 dB below
+the error that they tell, or to the samples allowed.")]
+pub(crate) struct BenchScenes {
+    /// Built-in scenes, glTF files, and folders of them; the built-in scenes unless given.
+    #[arg(value_name = "SCENE|FOLDER")]
+    scenes: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: ReadingArguments,
+    #[command(flatten)]
+    effort: EffortArguments,
+    /// Samples a probe, at most.
+    #[arg(long, value_name = "N", default_value_t = MOST_SAMPLES,
+          value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    probe_samples: u32,
+    /// Also computes each field with so many times the samples, to see what noise costs.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=256))]
+    times: Option<u32>,
+    /// Samples a pixel of a reference, at most.
+    #[arg(long, value_name = "N", default_value_t = 4096,
+          value_parser = clap::value_parser!(u32).range(2..=1 << 20))]
+    reference_spp: u32,
+    /// Keeps references in this folder and goes on from there.
+    #[arg(long, value_name = "FOLDER")]
+    keep: Option<PathBuf>,
+    /// Writes each scene's indirect light, the reference's and how they differ into this folder.
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// Puts the table into this document of markdown, in place of the one that an earlier run put there
+    /// or at its end.
+    #[arg(long, value_name = "FILE")]
+    document: Option<PathBuf>,
+    /// Prints JSON only.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A scene that is measured.
+struct Subject {
+    name: String,
+    scene: Scene,
+    snapshot: Arc<Snapshot>,
+    view: View,
+    /// Nothing where it is the reference's.
+    exposure: Option<f32>,
+    under_sky: bool,
+}
+
+impl BenchScenes {
+    pub(crate) fn run(self) -> Result<()> {
+        for folder in self.keep.iter().chain(&self.output) {
+            out_file::check_folder(folder)?;
+        }
+        if let Some(path) = &self.document {
+            section().check(path)?;
+        }
+        let settings = Settings {
+            size: SIZE,
+            samples: 64,
+            shading: Shading::Samples,
+            materials: Materials::Lambert,
+            shadows: Shadows { resolution: 4096, ..Shadows::default() },
+            ..Settings::default()
+        };
+        let mut renderer = Renderer::new(Gpu::new()?, &settings);
+        let mut rows = Vec::new();
+        for scene in find::scenes(&self.scenes)? {
+            let subject = subject(&scene)?;
+            tell!("{}", subject.name);
+            let row = self.row(subject, &mut renderer, &settings)?;
+            tell!("{}", row.line());
+            rows.push(row);
+        }
+        let report = Report { adapter: renderer.gpu().name(), rows };
+        if let Some(path) = &self.document {
+            section().replace(path, &report.text())?;
+        }
+        if self.json {
+            return output::json(&serde_json::to_value(&report)?);
+        }
+        output::print(&report.text());
+        Ok(())
+    }
+
+    fn row(
+        &self,
+        mut subject: Subject,
+        renderer: &mut Renderer,
+        settings: &Settings,
+    ) -> Result<Row> {
+        let covered = covered(renderer, &subject.snapshot, subject.view, settings)?;
+        let mut film = Tracing::new(self, &subject, Parts::Indirect)?;
+        film.to(FIRST_SPP)?;
+        let exposure = match subject.exposure {
+            Some(exposure) => exposure,
+            None => {
+                let mut direct = Tracing::new(self, &subject, Parts::Direct)?;
+                direct.to(FIRST_SPP)?;
+                exposure(&sum(&direct.picture()?, &film.picture()?))
+            }
+        };
+        let settings = Settings { pre_exposure: exposure, ..*settings };
+        renderer.set_scene(&subject.snapshot);
+        let (baked, probes, grids) = self.light(&mut subject, None)?;
+        let picture = self.draw(&baked, renderer, subject.view, &settings)?;
+        let mut judge;
+        loop {
+            judge = Judge::new(film.picture()?, covered.clone(), exposure)?;
+            let error = judge.psnr(&picture)?.filtered;
+            let enough = judge.noise(&film.film)? >= error + BELOW;
+            if enough || film.film.samples() >= self.reference_spp {
+                break;
+            }
+            film.to(2 * film.film.samples())?;
+        }
+        if let Some(folder) = &self.output {
+            let write = |what: &str, picture: &Picture, exposure: f32| {
+                let path = folder.join(format!("{}-{what}.png", subject.name));
+                picture.write_png(path, ToneMap::Gamma, exposure)
+            };
+            write("reference", judge.reference(), exposure)?;
+            write("field", &picture, exposure)?;
+            write("difference", &judge.difference(&picture), 1.0)?;
+        }
+        let beside = match self.times {
+            Some(times) => {
+                let effort = Effort::of_samples(baked.samples.saturating_mul(times));
+                let (more, ..) = self.light(&mut subject, Some(effort))?;
+                let picture = self.draw(&more, renderer, subject.view, &settings)?;
+                Some(Beside { times, psnr: judge.psnr(&picture)? })
+            }
+            None => None,
+        };
+        Ok(Row {
+            psnr: judge.psnr(&picture)?,
+            reference_noise: judge.noise(&film.film)?,
+            reference_samples: film.film.samples(),
+            scene: subject.name,
+            under_sky: subject.under_sky,
+            grids,
+            probes,
+            samples: baked.samples,
+            noise: baked.noise,
+            exposure,
+            beside,
+        })
+    }
+
+    /// A scene's light, the number of its probes, and its grids.
+    fn light(
+        &self,
+        subject: &mut Subject,
+        effort: Option<Effort>,
+    ) -> Result<(Baked, usize, Vec<String>)> {
+        let computed = Computed {
+            effort: effort.unwrap_or_else(|| self.effort.with(self.probe_samples)),
+            bounces: BOUNCES - 1,
+            clamp: f32::INFINITY,
+            reading: self.reading.drawn(),
+            tracing: Options {
+                materials: MaterialModel::Lambert,
+                threads: None,
+                levels: Levels::One,
+            },
+        };
+        let mut tracer = computed.tracer()?;
+        let specs = lumencast_server::volumes(&mut subject.scene, &mut tracer)?;
+        let baked = computed.volumes(&subject.snapshot, &specs, &mut tracer)?;
+        let probes = specs.iter().map(|spec| spec.grid.probe_count()).sum();
+        Ok((baked, probes, specs.iter().map(cells).collect()))
+    }
+
+    fn draw(
+        &self,
+        baked: &Baked,
+        renderer: &mut Renderer,
+        view: View,
+        settings: &Settings,
+    ) -> Result<Picture> {
+        renderer.set_light(&LightField::new(baked.volumes.clone()))?;
+        draw(renderer, view, settings, Lighting::INDIRECT)
+    }
+}
+
+fn section() -> Section {
+    Section { title: "indirect light of scenes".to_owned(), command: "scenes" }
+}
+
+fn subject(path: &Path) -> Result<Subject> {
+    let name = path.to_string_lossy();
+    let mut scene = Scene::open(&name)?;
+    warnings::left_out(&scene);
+    let under_sky = scene.is_dark();
+    if under_sky {
+        scene.apply(&Edit::SetEnvironment { environment: Environment::clear_sky(SKY) })?;
+    }
+    let published = SUBJECTS.iter().any(|subject| path.ends_with(subject.file));
+    Ok(Subject {
+        name: scene.name().to_owned(),
+        snapshot: scene.snapshot(),
+        view: camera::view(&scene, None)?,
+        scene,
+        exposure: published.then_some(1.0),
+        under_sky,
+    })
+}
+
+/// A part of a reference, while it is refined.
+struct Tracing {
+    renderer: reference::Renderer,
+    film: Film,
+    kept: Option<(PathBuf, u64)>,
+}
+
+impl Tracing {
+    fn new(bench: &BenchScenes, subject: &Subject, parts: Parts) -> Result<Self> {
+        let settings = PictureSettings {
+            size: SIZE,
+            bounces: BOUNCES,
+            parts,
+            materials: MaterialModel::Lambert,
+            ..PictureSettings::default()
+        };
+        let renderer = reference::Renderer::new(&subject.snapshot, subject.view, settings)
+            .context("cannot start the threads that trace")?;
+        let kept = match &bench.keep {
+            Some(folder) => {
+                let key = fingerprint::of(&subject.scene, format!("{BOUNCES} {parts:?}"))?;
+                let file = format!("{}-{key:016x}.film", subject.name);
+                Some((folder.join(file), key))
+            }
+            None => None,
+        };
+        let film = match &kept {
+            Some((path, key)) => film_file::begun(path, *key, SIZE, FIRST_SPP),
+            None => Film::new(SIZE, FIRST_SPP),
+        };
+        Ok(Self { renderer, film, kept })
+    }
+
+    /// Refines it to so many samples a pixel.
+    fn to(&mut self, samples: u32) -> Result<()> {
+        if self.film.samples() >= samples {
+            return Ok(());
+        }
+        let bar = output::bar(samples.into(), "Tracing the reference");
+        while self.film.samples() < samples {
+            // Never told to stop.
+            self.renderer.pass(&mut self.film, samples, &|_| true);
+            bar.set_position(self.film.samples().into());
+        }
+        bar.finish_and_clear();
+        match &self.kept {
+            Some((path, key)) => film_file::write(path, *key, &self.film),
+            None => Ok(()),
+        }
+    }
+
+    fn picture(&self) -> Result<Picture> {
+        Ok(Picture::new(SIZE.x, SIZE.y, self.film.picture())?)
+    }
+}
