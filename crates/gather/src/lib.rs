@@ -127,8 +127,12 @@ pub struct Sums {
     pub sum_of_squares: Vec<Vec3>,
     /// Samples taken.
     pub count: u32,
-    /// Share of the samples that met the back of a surface first: near 1 for probes inside walls.
+    /// Share of the samples that met the back of a surface first, by its winding: near 1 for probes
+    /// inside of solid things.
     pub back_face_fraction: f32,
+    /// Share of the samples that met a back first that nobody is meant to see, its material being
+    /// single-sided.
+    pub culled_fraction: f32,
     /// Sums over samples of terms times the distance to the first surface, and times its square
     /// (metres, square metres); empty unless [`Job::distances`] asks for them.
     pub distances: Vec<[f32; 2]>,

@@ -13,7 +13,7 @@ use lumencast_scene::{Snapshot, VolumeSpec};
 use crate::error::ServerError;
 use crate::surfaces::Surfaces;
 use crate::tick::{GatherOptions, Moment};
-use crate::walls::Buried;
+use crate::walls::{Buried, Sight};
 
 /// A volume with all that turns sums into frames.
 ///
@@ -170,7 +170,7 @@ impl Field {
         for probe in 0..self.history.len() {
             self.arriving.probe_mut(probe).copy_from_slice(self.history.coefficients(probe));
         }
-        self.buried.record(probes.iter().map(|sums| sums.back_face_fraction));
+        self.buried.record(probes.iter().map(Sight::of));
         self.buried.fill(&mut self.arriving);
         if let Some(surfaces) = &mut self.surfaces {
             surfaces.blend(points, at_points);

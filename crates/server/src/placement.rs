@@ -212,7 +212,7 @@ fn uses(
 
 fn found(sums: &Sums) -> Use {
     let met = || sums.surfaces.iter().flatten();
-    if sums.back_face_fraction > BURIED_ABOVE {
+    if sums.culled_fraction > BURIED_ABOVE {
         Use::Buried
     } else if met().any(|surface| surface.front) {
         Use::Open

@@ -205,7 +205,7 @@ impl Shader<'_, '_> {
                 path.seen.distance = hit.t;
                 path.seen.normal = place.normal;
                 path.seen.front = front;
-                path.seen.back = !front && !spot.material.double_sided;
+                path.seen.culled = !front && !spot.material.double_sided;
             }
             let mut emitted = spot.emission_seen(front, world.model);
             if emitted == Vec3::ZERO {

@@ -82,7 +82,7 @@ pub(crate) struct Seen {
     /// The first surface is seen from its front.
     pub(crate) front: bool,
     /// The first surface shows a back that nobody is meant to see.
-    pub(crate) back: bool,
+    pub(crate) culled: bool,
 }
 
 impl Seen {
@@ -92,7 +92,7 @@ impl Seen {
         distance: f32::INFINITY,
         normal: Vec3::ZERO,
         front: false,
-        back: false,
+        culled: false,
     };
 
     /// Arriving radiance, cd/m².

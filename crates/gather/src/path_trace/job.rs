@@ -45,6 +45,7 @@ struct TileSums {
     distances: [Vec2; sh::MAX_COEFFICIENTS],
     surfaces: Vec<Option<SurfacePoint>>,
     backs: u32,
+    culled: u32,
 }
 
 /// Gathers; `None` when cancelled. Returns the sums and the number of rays.
@@ -156,6 +157,7 @@ fn sum(
         distances: [Vec2::ZERO; sh::MAX_COEFFICIENTS],
         surfaces: Vec::new(),
         backs: 0,
+        culled: 0,
     };
     for ((sample, seen), reached) in (tile.first..tile.end).zip(seen).zip(reached) {
         let radiance = seen.radiance();
@@ -182,7 +184,8 @@ fn sum(
                 front: seen.front,
             }));
         }
-        t.backs += u32::from(seen.back);
+        t.backs += u32::from(seen.normal != Vec3::ZERO && !seen.front);
+        t.culled += u32::from(seen.culled);
     }
     t
 }
@@ -197,12 +200,15 @@ fn reduce(job: &Job, terms: usize, tiles: &[(u32, &TileSums)]) -> Sums {
         sum.as_vec2().to_array()
     };
     let count: u32 = tiles.iter().map(|(n, _)| n).sum();
-    let backs: u32 = tiles.iter().map(|(_, t)| t.backs).sum();
+    let share = |of: &dyn Fn(&TileSums) -> u32| {
+        tiles.iter().map(|(_, t)| of(t)).sum::<u32>() as f32 / count.max(1) as f32
+    };
     Sums {
         sum: (0..terms).map(|k| add(&|t| t.sum[k])).collect(),
         sum_of_squares: (0..terms).map(|k| add(&|t| t.squares[k])).collect(),
         count,
-        back_face_fraction: backs as f32 / count.max(1) as f32,
+        back_face_fraction: share(&|t| t.backs),
+        culled_fraction: share(&|t| t.culled),
         distances: job.distances.map_or_else(Vec::new, |_| (0..terms).map(distances).collect()),
         surfaces: tiles.iter().flat_map(|(_, t)| &t.surfaces).copied().collect(),
     }
