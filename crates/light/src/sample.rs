@@ -51,6 +51,12 @@ impl Grid {
         (local / self.size + 0.5) * self.resolution.as_vec3() - 0.5
     }
 
+    /// The inverse of [`Self::cell_from_world`].
+    pub fn world_from_cell(&self, cell: Vec3) -> Vec3 {
+        let unit = (cell + 0.5) / self.resolution.as_vec3() - 0.5;
+        self.center + self.rotation * (unit * self.size)
+    }
+
     /// Distance of a world position from the box, metres; 0 inside.
     pub fn distance(&self, position: Vec3) -> f32 {
         self.beyond(self.cell_from_world(position))
@@ -89,9 +95,6 @@ pub struct Corners {
     pub probes: [usize; 8],
     /// What each of them counts; together 1.
     pub shares: [f32; 8],
-    /// Whether the point, moved along the normal, lies within the box; otherwise the outermost probes
-    /// stand in for it.
-    pub inside: bool,
 }
 
 impl ProbeVolume {
@@ -126,7 +129,6 @@ impl ProbeVolume {
                 grid.index(UVec3::new(pick(c, 0), pick(c, 1), pick(c, 2)))
             }),
             shares: std::array::from_fn(|c| share(c, 0) * share(c, 1) * share(c, 2)),
-            inside: cell.cmpge(Vec3::splat(-0.5)).all() && cell.cmple(last + 0.5).all(),
         }
     }
 

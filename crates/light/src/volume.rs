@@ -47,8 +47,7 @@ impl Grid {
 
     /// World position of the probe of a cell.
     pub fn position(&self, cell: UVec3) -> Vec3 {
-        let unit = (cell.as_vec3() + 0.5) / self.resolution.as_vec3() - 0.5;
-        self.center + self.rotation * (unit * self.size)
+        self.world_from_cell(cell.as_vec3())
     }
 
     /// World positions of all probes, in index order.

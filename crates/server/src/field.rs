@@ -62,7 +62,7 @@ impl Field {
             positions: grid.positions().collect(),
             history: History::new(blend, grid.probe_count(), order.coefficients()),
             buried: Buried::new(grid.probe_count()),
-            surfaces: fit.map(|fit| Surfaces::new(fit, blend, grid.probe_count())),
+            surfaces: fit.map(|fit| Surfaces::new(fit, blend, &grid)),
             encoder: ProbeEncoder::new(grid.resolution, order),
             update: 0,
         }
@@ -125,7 +125,7 @@ impl Field {
     /// What to ask for before [`Self::job`], so that it knows of the surfaces: only where probes are
     /// fitted, and the scene is another one.
     pub(crate) fn look(&self, scene: &Arc<Snapshot>) -> Option<Job> {
-        self.surfaces.as_ref()?.look(scene, &self.positions)
+        self.surfaces.as_ref()?.look(scene)
     }
 
     /// Takes in what a look has found.

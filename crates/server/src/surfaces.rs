@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{IVec3, Vec3};
 use lumencast_gather::blend::{BlendSettings, History};
 use lumencast_gather::fit::Surroundings;
 use lumencast_gather::{Job, Receiver, Sums, SurfacePoint};
+use lumencast_light::Grid;
 use lumencast_scene::Snapshot;
 
 use crate::tick::FitOptions;
@@ -26,7 +27,9 @@ const SAMPLES_A_TURN: u32 = 4;
 /// Points of surfaces, with what is known of the light there.
 #[derive(Clone)]
 pub(crate) struct Surfaces {
-    /// A probe.
+    /// Where they are looked for from: the volume's probes, and places about it.
+    lookouts: Vec<Vec3>,
+    /// A lookout.
     points: u32,
     around: Surroundings,
     /// Where the points were when their histories began.
@@ -39,10 +42,12 @@ pub(crate) struct Surfaces {
 }
 
 impl Surfaces {
-    pub(crate) fn new(options: FitOptions, blend: BlendSettings, probes: usize) -> Self {
-        let each = (options.points as usize).min(MOST_POINTS / probes.max(1)).max(1);
-        let points = probes * each;
+    pub(crate) fn new(options: FitOptions, blend: BlendSettings, grid: &Grid) -> Self {
+        let lookouts: Vec<Vec3> = grid.positions().chain(about(grid)).collect();
+        let each = (options.points as usize).min(MOST_POINTS / lookouts.len().max(1)).max(1);
+        let points = lookouts.len() * each;
         Self {
+            lookouts,
             points: each as u32,
             around: Surroundings::default(),
             began: vec![None; points],
@@ -53,13 +58,13 @@ impl Surfaces {
     }
 
     /// What to ask for to find the surfaces of a scene; `None` while it is the one that was seen.
-    pub(crate) fn look(&self, scene: &Arc<Snapshot>, probes: &[Vec3]) -> Option<Job> {
-        let probe = |position: &Vec3| Receiver::probe(*position, self.points);
+    pub(crate) fn look(&self, scene: &Arc<Snapshot>) -> Option<Job> {
+        let lookout = |position: &Vec3| Receiver::probe(*position, self.points);
         (self.seen != Some(scene.version)).then(|| Job {
             bounces: 0,
             surfaces: true,
             seed: SEED,
-            ..Job::new(scene.clone(), probes.iter().map(probe).collect::<Vec<_>>())
+            ..Job::new(scene.clone(), self.lookouts.iter().map(lookout).collect::<Vec<_>>())
         })
     }
 
@@ -120,4 +125,22 @@ impl Surfaces {
         let irradiance = |point| known(point).then(|| self.history.coefficients(point)[0]);
         (0..self.history.len()).map(irradiance).collect()
     }
+}
+
+/// Places half a cell in front of a volume's outer faces, one for each of the cells there: what stands
+/// on its border is not seen from within.
+fn about(grid: &Grid) -> impl Iterator<Item = Vec3> {
+    let cells = grid.resolution.as_ivec3();
+    let beyond = (0..3).flat_map(move |axis| {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let faces = [-1, cells[axis]].into_iter();
+        faces.flat_map(move |depth| {
+            (0..cells[u] * cells[v]).map(move |i| {
+                let mut cell = IVec3::ZERO;
+                (cell[axis], cell[u], cell[v]) = (depth, i % cells[u], i / cells[u]);
+                cell
+            })
+        })
+    });
+    beyond.map(|cell| grid.world_from_cell(cell.as_vec3()))
 }

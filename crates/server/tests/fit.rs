@@ -1,16 +1,20 @@
 //! Probes fitted to surfaces, tick by tick.
 
+use std::f32::consts::PI;
 use std::sync::Arc;
 
-use glam::{UVec3, Vec3};
+use glam::{Quat, UVec3, Vec3};
 use lumencast_codec::{EncodedRegion, Epoch};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::ProbeVolume;
-use lumencast_scene::{Edit, LightSpec, NodeId, Scene, Transform, VolumeSpec};
+use lumencast_light::{Grid, Order, ProbeVolume};
+use lumencast_scene::{
+    Edit, Environment, LightSpec, Material, NodeId, Scene, Transform, VolumeSpec,
+};
 use lumencast_server::{
     Done, Effort, FitOptions, GatherOptions, Mail, Outlet, Received, SampleRange, Tick,
     TickOptions, bake,
 };
+use lumencast_testkit::scenes::{Stage, lambert};
 
 const FIT: FitOptions = FitOptions { points: 16 };
 
@@ -146,6 +150,32 @@ fn baking_ends_by_its_noise() {
         bake(&snapshot, &volumes(), &mut tracer(), Effort::of_samples(300), gather(None), |_| ())
             .expect("light");
     assert_eq!((off.samples, off.noise), (300, None));
+}
+
+/// A closed box that its volume spans to the millimetre, under an even sky: all probes are within, and
+/// its faces, which none of them sees, are as bright as the sky.
+#[test]
+fn what_stands_on_the_border_is_lit_from_outside() {
+    for double_sided in [false, true] {
+        let mut stage = Stage::default();
+        let grey = Material { double_sided, ..lambert(Vec3::splat(0.5), Vec3::ZERO) };
+        let grey = stage.material(grey);
+        stage.room(Vec3::ZERO, Vec3::splat(-2.0), grey);
+        stage.environment(Environment::Constant { radiance: Vec3::ONE });
+        let (size, resolution) = (Vec3::splat(2.0), UVec3::splat(4));
+        let grid = Grid { center: Vec3::ZERO, rotation: Quat::IDENTITY, size, resolution };
+        let volume = VolumeSpec { grid, order: Order::L2 };
+        let (effort, gather) = (Effort::of_samples(1024), gather(Some(FIT)));
+        let light = bake(&stage.snapshot(), &[volume], &mut tracer(), effort, gather, |_| ());
+        let light = light.expect("a volume").volumes.remove(0);
+        for normal in Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
+            let (u, v) = normal.any_orthonormal_pair();
+            for (x, y) in [(0.0, 0.0), (0.8, 0.3), (-0.5, 0.9)] {
+                let read = light.sample(normal + x * u + y * v, normal).irradiance(normal).y;
+                assert!((read / PI - 1.0).abs() < 0.1, "{read} at {x} {y} of {normal}");
+            }
+        }
+    }
 }
 
 /// A lamp four times as bright, and a box that stands elsewhere: light of the old scene is gone soon,

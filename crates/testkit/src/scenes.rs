@@ -40,7 +40,7 @@ impl Stage {
         self.primitive(quad(corner, u, v, material), Affine3A::IDENTITY)
     }
 
-    /// Adds the six walls of a box whose fronts face inwards.
+    /// Adds the six walls of a box whose fronts face inwards, or outwards where the size is negative.
     pub fn room(&mut self, center: Vec3, size: Vec3, material: MaterialId) -> &mut Self {
         for axis in 0..3 {
             for sign in [-1.0, 1.0] {

@@ -12,8 +12,8 @@
 //!   volumes that [count](lumencast_light::LightField::shares) there, trilinear, off the surface by the
 //!   volume's [offset](lumencast_light::Offset), convolved by the cosine. The two sides of a wall are
 //!   read from other places and in other directions, so that even a wall within a cell keeps them apart.
-//! - Points are those that are [seen](Surroundings) from the probes themselves, so that a surface
-//!   counts by how much of it is seen from around the volume, and the insides of walls not at all.
+//! - Points are those that are [seen](Surroundings) from the probes themselves and from about the
+//!   volume, so that a surface counts by how much of it is seen, and the insides of walls not at all.
 //! - wₚ makes differences count as they are displayed: the square of the slope of the code v^(1/2.2)
 //!   at what the volume shows at p. It is found from the fit itself, in rounds: found from the noisy
 //!   Eₚ, it would favour points that are too dark by chance.
@@ -155,17 +155,18 @@ fn first_probes(light: &LightField) -> Vec<u32> {
 }
 
 /// The probes that a client reads a point from, and how much each counts; none where the point lies
-/// outside of all volumes, whose outermost probes stand in for it.
+/// half a cell outside of all volumes and more, whose outermost probes stand in for it.
 fn read_at(light: &LightField, first: &[u32], at: &SurfacePoint) -> Vec<(u32, f32)> {
-    let (mut reads, mut inside) = (Vec::new(), false);
-    for (volume, part) in light.shares(at.position, at.normal) {
-        let corners = light.volumes()[volume].corners(at.position, at.normal);
-        inside |= corners.inside;
+    let (mut reads, mut near) = (Vec::new(), false);
+    for (number, part) in light.shares(at.position, at.normal) {
+        let volume = &light.volumes()[number];
+        let corners = volume.corners(at.position, at.normal);
+        near |= volume.grid.reach(volume.grid.cell_from_world(at.position)) > 0.0;
         let probes = corners.probes.into_iter().zip(corners.shares);
         let counting = probes.filter(|(_, share)| *share > 0.0);
-        reads.extend(counting.map(|(probe, share)| (first[volume] + probe as u32, part * share)));
+        reads.extend(counting.map(|(probe, share)| (first[number] + probe as u32, part * share)));
     }
-    if inside { reads } else { Vec::new() }
+    if near { reads } else { Vec::new() }
 }
 
 /// The irradiance that is read of the bands that stay what was gathered, lux.
@@ -205,18 +206,18 @@ fn mean_irradiance(probe: &[Vec3]) -> f32 {
     sh::cosine_basis(sh::Order::L1, Vec3::Y)[0] * luminance(probe[0])
 }
 
-/// What is seen from a volume's probes: for each of them as many directions, and the point of a
-/// surface that each meets.
+/// What is seen from a volume's probes, and from other places: for each of them as many directions, and
+/// the point of a surface that each meets.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surroundings {
     points: Vec<Option<SurfacePoint>>,
-    /// Which probes are inside of something; what they see does not count.
+    /// Which of the places are inside of something; what they see does not count.
     inside: Vec<bool>,
 }
 
 impl Surroundings {
-    /// Of the sums of all probes, in index order, of a job that asked for
-    /// [`surfaces`](crate::Job::surfaces).
+    /// Of the sums of all probes, in index order, and after them of any other places to look from, of a
+    /// job that asked for [`surfaces`](crate::Job::surfaces).
     pub fn new(probes: &[Sums]) -> Self {
         let backs = |sums: &Sums| sums.surfaces.iter().flatten().filter(|at| !at.front).count();
         let inside =
