@@ -2,6 +2,7 @@
 //! looked at by chance.
 
 mod find;
+mod live;
 mod report;
 
 use std::path::{Path, PathBuf};
@@ -9,19 +10,20 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use clap::Args;
+use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
 use lumencast_gather::reference::{self, Film, Parts, PictureSettings};
-use lumencast_light::LightField;
+use lumencast_light::{LightField, ProbeVolume};
 use lumencast_picture::{Picture, ToneMap, exposure};
 use lumencast_scene::{Edit, Environment, Scene, Snapshot, View};
-use lumencast_server::{Baked, Effort};
+use lumencast_server::Effort;
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading, Shadows};
 
 use super::judge::{Judge, covered};
 use super::peers::{SIZE, SUBJECTS};
 use super::section::Section;
 use super::{cells, draw, sum};
-use crate::arguments::{EffortArguments, MOST_SAMPLES, ReadingArguments};
+use crate::arguments::{EffortArguments, MOST_SAMPLES, Reading, ReadingArguments};
 use crate::light_source::Computed;
 use crate::output::{self, tell};
 use crate::{camera, film_file, fingerprint, out_file, warnings};
@@ -33,6 +35,8 @@ const BOUNCES: u32 = 4;
 const BELOW: f64 = 6.0;
 /// The sky that scenes without light stand under, lux.
 const SKY: f32 = 1000.0;
+/// So many times the samples of one that is not live has light that counts as converged.
+const LIVE_CONVERGED: u32 = 4;
 /// Samples a pixel that a reference begins with.
 const FIRST_SPP: u32 = 64;
 
@@ -66,6 +70,14 @@ pub(crate) struct BenchScenes {
     /// Also computes each field with so many times the samples, to see what noise costs.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=256))]
     times: Option<u32>,
+    /// Also casts each scene's light for so many seconds of 25 ticks, as `serve` does with these samples
+    /// a probe and tick, and compares what then is there with the same light converged.
+    #[arg(long, value_name = "SECONDS", value_parser = crate::arguments::parse_positive)]
+    live: Option<f32>,
+    /// Samples a probe and tick of --live.
+    #[arg(long, value_name = "N", default_value_t = 64, requires = "live",
+          value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    live_samples: u32,
     /// Samples a pixel of a reference, at most.
     #[arg(long, value_name = "N", default_value_t = 4096,
           value_parser = clap::value_parser!(u32).range(2..=1 << 20))]
@@ -151,8 +163,16 @@ impl BenchScenes {
         };
         let settings = Settings { pre_exposure: exposure, ..*settings };
         renderer.set_scene(&subject.snapshot);
-        let (baked, probes, grids) = self.light(&mut subject, None)?;
-        let picture = self.draw(&baked, renderer, subject.view, &settings)?;
+        let drawn = self.reading.drawn();
+        let usual = computed(drawn, self.effort.with(self.probe_samples));
+        let mut tracer = usual.tracer()?;
+        let specs = lumencast_server::volumes(&mut subject.scene, &mut tracer)?;
+        let snapshot = subject.snapshot.clone();
+        let mut bake = |computed: Computed| computed.volumes(&snapshot, &specs, &mut tracer);
+        let baked = bake(usual)?;
+        let mut picture_of =
+            |volumes: Vec<ProbeVolume>| draw_light(renderer, volumes, subject.view, &settings);
+        let picture = picture_of(baked.volumes)?;
         let mut judge;
         loop {
             judge = Judge::new(film.picture()?, covered.clone(), exposure)?;
@@ -172,64 +192,67 @@ impl BenchScenes {
             write("field", &picture, exposure)?;
             write("difference", &judge.difference(&picture), 1.0)?;
         }
-        let beside = match self.times {
-            Some(times) => {
-                let effort = Effort::of_samples(baked.samples.saturating_mul(times));
-                let (more, ..) = self.light(&mut subject, Some(effort))?;
-                let picture = self.draw(&more, renderer, subject.view, &settings)?;
-                Some(Beside { times, psnr: judge.psnr(&picture)? })
-            }
-            None => None,
-        };
+        let mut beside = Vec::new();
+        if let Some(times) = self.times {
+            let effort = Effort::of_samples(baked.samples.saturating_mul(times));
+            let more = bake(computed(drawn, effort))?;
+            beside.push(Beside {
+                what: format!("{times} times the samples"),
+                psnr: judge.psnr(&picture_of(more.volumes)?)?,
+            });
+        }
+        if let Some(seconds) = self.live {
+            let served = self.reading.served();
+            let effort = Effort::of_samples(self.probe_samples.saturating_mul(LIVE_CONVERGED));
+            let converged = bake(computed(served, effort))?;
+            beside.push(Beside {
+                what: "as served, converged".to_owned(),
+                psnr: judge.psnr(&picture_of(converged.volumes)?)?,
+            });
+            let gather = served.gathered(BOUNCES - 1, f32::INFINITY, BlendSettings::default());
+            let samples = self.live_samples;
+            let live = live::light(subject.scene, tracer, &specs, gather, samples, seconds.into())?;
+            beside.push(Beside {
+                what: format!("live, {samples} samples a tick, after {seconds} s"),
+                psnr: judge.psnr(&picture_of(live)?)?,
+            });
+        }
         Ok(Row {
             psnr: judge.psnr(&picture)?,
             reference_noise: judge.noise(&film.film)?,
             reference_samples: film.film.samples(),
             scene: subject.name,
             under_sky: subject.under_sky,
-            grids,
-            probes,
+            grids: specs.iter().map(cells).collect(),
+            probes: specs.iter().map(|spec| spec.grid.probe_count()).sum(),
             samples: baked.samples,
             noise: baked.noise,
             exposure,
             beside,
         })
     }
+}
 
-    /// A scene's light, the number of its probes, and its grids.
-    fn light(
-        &self,
-        subject: &mut Subject,
-        effort: Option<Effort>,
-    ) -> Result<(Baked, usize, Vec<String>)> {
-        let computed = Computed {
-            effort: effort.unwrap_or_else(|| self.effort.with(self.probe_samples)),
-            bounces: BOUNCES - 1,
-            clamp: f32::INFINITY,
-            reading: self.reading.drawn(),
-            tracing: Options {
-                materials: MaterialModel::Lambert,
-                threads: None,
-                levels: Levels::One,
-            },
-        };
-        let mut tracer = computed.tracer()?;
-        let specs = lumencast_server::volumes(&mut subject.scene, &mut tracer)?;
-        let baked = computed.volumes(&subject.snapshot, &specs, &mut tracer)?;
-        let probes = specs.iter().map(|spec| spec.grid.probe_count()).sum();
-        Ok((baked, probes, specs.iter().map(cells).collect()))
+/// How a scene's light is computed.
+fn computed(reading: Reading, effort: Effort) -> Computed {
+    Computed {
+        effort,
+        bounces: BOUNCES - 1,
+        clamp: f32::INFINITY,
+        reading,
+        tracing: Options { materials: MaterialModel::Lambert, threads: None, levels: Levels::One },
     }
+}
 
-    fn draw(
-        &self,
-        baked: &Baked,
-        renderer: &mut Renderer,
-        view: View,
-        settings: &Settings,
-    ) -> Result<Picture> {
-        renderer.set_light(&LightField::new(baked.volumes.clone()))?;
-        draw(renderer, view, settings, Lighting::INDIRECT)
-    }
+/// Its indirect part.
+fn draw_light(
+    renderer: &mut Renderer,
+    volumes: Vec<ProbeVolume>,
+    view: View,
+    settings: &Settings,
+) -> Result<Picture> {
+    renderer.set_light(&LightField::new(volumes))?;
+    draw(renderer, view, settings, Lighting::INDIRECT)
 }
 
 fn section() -> Section {

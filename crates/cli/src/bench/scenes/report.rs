@@ -28,31 +28,30 @@ pub(super) struct Row {
     pub(super) exposure: f32,
     /// Of the indirect part.
     pub(super) psnr: Psnr,
-    /// The same of more samples.
-    pub(super) beside: Option<Beside>,
+    /// The same of the same scene's light, computed in other ways.
+    pub(super) beside: Vec<Beside>,
     /// After the filter, dB.
     pub(super) reference_noise: f64,
     /// A pixel.
     pub(super) reference_samples: u32,
 }
 
-/// A field of more samples.
+/// Light that was computed in another way.
 #[derive(Serialize)]
 pub(super) struct Beside {
-    /// So many times as many.
-    pub(super) times: u32,
+    pub(super) what: String,
     pub(super) psnr: Psnr,
 }
 
 impl Report {
     /// A table of markdown, which can be read as it is.
     pub(super) fn text(&self) -> String {
-        let times = self.rows.iter().find_map(|row| row.beside.as_ref()).map(|beside| beside.times);
-        let more = times.map_or(String::new(), |times| format!(" {times} times the samples |"));
+        let beside = self.rows.first().map_or(&[][..], |row| &row.beside);
+        let more: String = beside.iter().map(|beside| format!(" {} |", beside.what)).collect();
         let mut text = format!(
             "| scene | grid | samples a probe | noise, codes | indirect part, dB |{more} \
              reference's noise |\n|{}\n",
-            " --- |".repeat(6 + usize::from(times.is_some()))
+            " --- |".repeat(6 + beside.len())
         );
         for row in &self.rows {
             // Writing to a string does not fail.
@@ -68,14 +67,11 @@ impl Row {
     pub(super) fn line(&self) -> String {
         let star = if self.under_sky { "*" } else { "" };
         let noise = self.noise.map_or("off".into(), |noise| format!("{noise:.2}"));
-        let beside = self.beside.as_ref().map_or(String::new(), |beside| {
-            format!(
-                " {:.1} ({:.1}), {:+.2} |",
-                beside.psnr.sharp,
-                beside.psnr.filtered,
-                beside.psnr.filtered - self.psnr.filtered
-            )
-        });
+        let beside = |beside: &Beside| {
+            let Psnr { sharp, filtered } = beside.psnr;
+            format!(" {sharp:.1} ({filtered:.1}), {:+.2} |", filtered - self.psnr.filtered)
+        };
+        let beside: String = self.beside.iter().map(beside).collect();
         format!(
             "| {}{star} | {} | {} | {noise} | {:.1} ({:.1}) |{beside} {:.1} |",
             self.scene,

@@ -1,0 +1,52 @@
+//! The same scene's light as a server casts it, some seconds after it began.
+
+use anyhow::Result;
+use lumencast_codec::{EncodedRegion, Epoch};
+use lumencast_gather::path_trace::CpuPathTracer;
+use lumencast_light::ProbeVolume;
+use lumencast_scene::{Scene, VolumeSpec};
+use lumencast_server::{GatherOptions, Mail, Outlet, SampleRange, Tick, TickOptions};
+
+use crate::output;
+
+/// The light of a server's ticks for so many seconds, a fixed number of samples a probe and tick. The
+/// scene's time stands still.
+pub(super) fn light(
+    scene: Scene,
+    tracer: CpuPathTracer,
+    volumes: &[VolumeSpec],
+    gather: GatherOptions,
+    samples: u32,
+    seconds: f64,
+) -> Result<Vec<ProbeVolume>> {
+    let options = TickOptions {
+        samples: SampleRange::fixed(samples),
+        gather,
+        volumes: volumes.to_vec(),
+        ..TickOptions::default()
+    };
+    let ticks = (seconds / options.period).ceil() as u64;
+    let mut tick = Tick::new(scene, Box::new(tracer), options, Epoch(0))?;
+    let bar = output::bar(ticks, "Ticks");
+    for _ in 0..ticks {
+        tick.step(0.0, Mail::default(), &mut Nobody);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(tick.volumes().cloned().collect())
+}
+
+/// Takes nothing.
+struct Nobody;
+
+impl Outlet for Nobody {
+    fn is_watched(&self, _: u32, _: u32) -> bool {
+        false
+    }
+
+    fn catalog(&mut self, _: Vec<u8>) {}
+
+    fn state(&mut self, _: Vec<u8>, _: bool) {}
+
+    fn probes(&mut self, _: u32, _: EncodedRegion) {}
+}
