@@ -160,7 +160,7 @@ const POINTS: u32 = 256;
 const NEAR: Offset = Offset::Cells(0.125);
 
 /// Samples of a probe, at most, unless told otherwise.
-pub(crate) const MOST_SAMPLES: u32 = 16_384;
+pub(crate) const MOST_SAMPLES: u32 = 32_768;
 /// How noisy light may be that is computed once, unless told otherwise: codes of 0 to 255.
 const NOISE: &str = "0.5";
 
