@@ -123,15 +123,7 @@ impl Sessions {
 }
 
 /// One of those that are counted, until it is dropped.
-pub(crate) struct Ticket(Arc<AtomicUsize>);
-
-impl Ticket {
-    /// One more.
-    pub(crate) fn of(count: &Arc<AtomicUsize>) -> Self {
-        count.fetch_add(1, Ordering::Relaxed);
-        Self(count.clone())
-    }
-}
+struct Ticket(Arc<AtomicUsize>);
 
 impl Drop for Ticket {
     fn drop(&mut self) {

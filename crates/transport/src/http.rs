@@ -2,7 +2,6 @@
 //! application serves; all behind the check of hosts and origins.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
 
 use axum::Router;
 use axum::extract::Request;
@@ -10,7 +9,9 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use tower::ServiceExt as _;
 
+use crate::guests::Guests;
 use crate::origin_check::{OriginCheck, Refusal};
+use crate::progress::{Patience, Progress, under_way};
 use crate::session::Backend;
 use crate::tcp::Peer;
 use crate::tls::Fingerprint;
@@ -26,11 +27,31 @@ pub(crate) struct Front {
     pub(crate) fingerprint: Fingerprint,
     pub(crate) application: Router,
     /// TCP connections that are open for HTTP.
-    pub(crate) connections: Arc<AtomicUsize>,
+    pub(crate) connections: Arc<Guests>,
+    /// Requests that are being answered.
+    pub(crate) requests: Arc<Guests>,
+    pub(crate) patience: Patience,
 }
 
 impl Front {
-    pub(crate) async fn answer(self, request: Request, peer: Peer) -> Response {
+    /// Answers a request of a connection.
+    pub(crate) async fn answer(
+        self,
+        request: Request,
+        peer: Peer,
+        progress: &Arc<Progress>,
+    ) -> Response {
+        let answering = progress.request();
+        let Some(guest) = self.requests.enter(peer.remote.ip()) else {
+            self.backend.sessions.refused();
+            let again = [(header::RETRY_AFTER, "1")];
+            let reason = "too many requests are under way; try again later\n";
+            return (StatusCode::SERVICE_UNAVAILABLE, again, reason).into_response();
+        };
+        under_way(self.checked_answer(request, peer).await, answering, guest)
+    }
+
+    async fn checked_answer(self, request: Request, peer: Peer) -> Response {
         if let Err(reason) = checked(&self.backend.check, &request) {
             tracing::info!(remote = %peer.remote, %reason, "HTTP request refused");
             self.backend.sessions.refused();

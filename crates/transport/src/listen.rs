@@ -5,7 +5,7 @@ use std::net::{Ipv6Addr, SocketAddr, UdpSocket};
 
 use tokio::net::TcpListener;
 
-use crate::{Error, Result};
+use crate::{Error, Result, descriptors};
 
 /// Attempts to find a port that is free for both protocols, where the caller leaves the choice.
 const PORT_ATTEMPTS: usize = 16;
@@ -62,6 +62,7 @@ fn other_loopback(address: SocketAddr) -> Option<SocketAddr> {
 fn listen_error(address: SocketAddr, protocol: &'static str, error: io::Error) -> Error {
     let port = address.port();
     let advice = match error.kind() {
+        _ if descriptors::are_used_up(&error) => descriptors::ADVICE.to_owned(),
         io::ErrorKind::AddrInUse => {
             format!("another program uses port {port}: stop it, or choose another port")
         }

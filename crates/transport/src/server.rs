@@ -1,7 +1,6 @@
 //! The server: an embedded relay on one port, QUIC on UDP and HTTP with WebSocket on TCP.
 
 use std::net::{SocketAddr, UdpSocket};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, RwLock};
 use std::time::Duration;
 
@@ -13,11 +12,13 @@ use tokio::task::JoinHandle;
 use web_transport_moq::noq;
 
 use crate::access::{self, Access, Sessions};
+use crate::guests::Guests;
 use crate::http::Front;
 use crate::origin_check::OriginCheck;
+use crate::progress::Patience;
 use crate::session::{Backend, Failure};
 use crate::tls::{self, Fingerprint, Identified, Tls};
-use crate::{Announcements, Broadcast, Error, Result, listen, quic, tcp};
+use crate::{Announcements, Broadcast, Error, Result, descriptors, listen, quic, tcp};
 
 /// The largest frame accepted from a client, in bytes.
 const CLIENT_FRAME: usize = 1 << 20;
@@ -41,6 +42,14 @@ pub struct ServerConfig {
     pub allowed_origins: Vec<String>,
     /// Sessions open at once, at most; a further one is refused with status 503.
     pub max_sessions: usize,
+    /// TCP connections open at once for HTTP, at most, and half of them from one address; a further one is
+    /// closed. There are fewer where the system allows fewer descriptors.
+    pub max_connections: usize,
+    /// HTTP requests answered at once, at most, and half of them from one address; a further one is
+    /// refused with status 503.
+    pub max_requests: usize,
+    /// How long a TCP connection may stand still.
+    pub patience: Patience,
 }
 
 impl ServerConfig {
@@ -54,6 +63,9 @@ impl ServerConfig {
             allowed_hosts: Vec::new(),
             allowed_origins: Vec::new(),
             max_sessions: 256,
+            max_connections: 1024,
+            max_requests: 256,
+            patience: Patience::default(),
         }
     }
 }
@@ -64,7 +76,7 @@ pub struct Server {
     origin: origin::Producer,
     sessions: Sessions,
     /// TCP connections that are open for HTTP.
-    connections: Arc<AtomicUsize>,
+    connections: Arc<Guests>,
     shutdown: shutdown::Trigger,
     endpoints: Vec<noq::Endpoint>,
     tasks: Vec<JoinHandle<()>>,
@@ -108,12 +120,14 @@ impl Server {
             sessions: sessions.clone(),
             shutdown: observer,
         };
-        let connections = Arc::<AtomicUsize>::default();
+        let connections = Guests::new(descriptors::connections(&config));
         let front = Front {
             backend: backend.clone(),
             fingerprint: fingerprint.clone(),
             application,
             connections: connections.clone(),
+            requests: Guests::new(config.max_requests),
+            patience: config.patience,
         };
 
         let mut tasks = vec![
@@ -149,6 +163,11 @@ impl Server {
         self.sessions.count()
     }
 
+    /// How many TCP connections are open for HTTP; those of WebSocket sessions are not among them.
+    pub fn connections(&self) -> usize {
+        self.connections.count()
+    }
+
     /// How many requests and sessions have been refused since the start: for their host, origin or
     /// token, or because too many sessions were open.
     pub fn refusals(&self) -> u64 {
@@ -173,7 +192,7 @@ impl Server {
         let address = self.address;
         let closed = async {
             self.shutdown.start();
-            while self.sessions.count() > 0 || self.connections.load(Ordering::Relaxed) > 0 {
+            while self.sessions.count() > 0 || self.connections.count() > 0 {
                 tokio::time::sleep(POLL).await;
             }
             for endpoint in &self.endpoints {

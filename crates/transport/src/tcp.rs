@@ -12,8 +12,9 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
 
-use crate::access::Ticket;
 use crate::http::Front;
+use crate::progress::Progress;
+use crate::rarely::Rarely;
 use crate::session::{Failure, HANDSHAKE};
 #[cfg(target_os = "linux")]
 use crate::unsent;
@@ -21,6 +22,12 @@ use crate::unsent;
 /// How long to wait after a connection could not be accepted, which is usually for want of file
 /// descriptors.
 const PAUSE: Duration = Duration::from_millis(50);
+
+/// Bytes that a connection holds, at most, of what its client has not taken yet.
+const HTTP1_BUFFER: usize = 128 << 10;
+/// The same of each stream, and how many of them there are.
+const HTTP2_BUFFER: usize = 64 << 10;
+const HTTP2_STREAMS: u32 = 32;
 
 /// Who is at the other end of a TCP connection.
 #[derive(Clone)]
@@ -32,19 +39,29 @@ pub(crate) struct Peer {
 
 /// Accepts connections until it is dropped.
 pub(crate) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, front: Front) {
+    let (mut failed, mut full) = (Rarely::default(), Rarely::default());
     loop {
         match listener.accept().await {
             Ok((stream, remote)) => {
+                let Some(guest) = front.connections.enter(remote.ip()) else {
+                    front.backend.sessions.refused();
+                    if let Some(times) = full.now() {
+                        tracing::warn!(%remote, times, "connection refused: too many are open");
+                    }
+                    continue;
+                };
                 let (tls, front) = (tls.clone(), front.clone());
                 tokio::spawn(async move {
-                    let _counted = Ticket::of(&front.connections);
+                    let _guest = guest;
                     if let Err(err) = connection(stream, remote, tls, front).await {
                         tracing::debug!(%remote, %err, "TCP connection ended");
                     }
                 });
             }
             Err(err) => {
-                tracing::warn!(%err, "cannot accept a TCP connection");
+                if let Some(times) = failed.now() {
+                    tracing::warn!(%err, times, "cannot accept TCP connections");
+                }
                 tokio::time::sleep(PAUSE).await;
             }
         }
@@ -76,21 +93,33 @@ where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
     let mut shutdown = front.backend.shutdown.clone();
+    let progress = Progress::new(front.patience);
+    let asked = progress.clone();
     let service = service_fn(move |request: hyper::Request<hyper::body::Incoming>| {
-        let (front, peer) = (front.clone(), peer.clone());
+        let (front, peer, progress) = (front.clone(), peer.clone(), asked.clone());
         async move {
-            Ok::<_, std::convert::Infallible>(front.answer(request.map(Body::new), peer).await)
+            let answer = front.answer(request.map(Body::new), peer, &progress).await;
+            Ok::<_, std::convert::Infallible>(answer)
         }
     });
     let mut builder = auto::Builder::new(TokioExecutor::new());
-    builder.http1().timer(TokioTimer::new()).header_read_timeout(HANDSHAKE);
+    builder
+        .http1()
+        .timer(TokioTimer::new())
+        .header_read_timeout(HANDSHAKE)
+        .max_buf_size(HTTP1_BUFFER);
+    builder.http2().max_concurrent_streams(HTTP2_STREAMS).max_send_buf_size(HTTP2_BUFFER);
     let connection = builder.serve_connection_with_upgrades(TokioIo::new(stream), service);
     let mut connection = std::pin::pin!(connection);
     tokio::select! {
         ended = connection.as_mut() => ended,
+        () = progress.stalled() => Err("it stands still".into()),
         () = shutdown.started() => {
             connection.as_mut().graceful_shutdown();
-            connection.await
+            tokio::select! {
+                ended = connection.as_mut() => ended,
+                () = progress.stalled() => Err("it stands still".into()),
+            }
         }
     }
 }

@@ -8,11 +8,17 @@ use hyper::upgrade::OnUpgrade;
 use hyper_util::rt::TokioIo;
 use moq_relay::auth;
 use qmux::ws::tokio_tungstenite::WebSocketStream;
-use qmux::ws::tungstenite::{handshake, protocol::Role};
+use qmux::ws::tungstenite::handshake;
+use qmux::ws::tungstenite::protocol::{Role, WebSocketConfig};
 
 use crate::in_order;
 use crate::session::{Ask, Backend, Failure, MAX_STREAMS};
 use crate::tcp::Peer;
+
+/// The largest message, bytes: of one record or frame of 16 KiB, with its head.
+const MESSAGE: usize = 17 << 10;
+/// Bytes that each session takes to read into.
+const READ_BUFFER: usize = 16 << 10;
 
 /// Whether a request asks for a WebSocket.
 pub(crate) fn is_upgrade(headers: &HeaderMap) -> bool {
@@ -67,7 +73,11 @@ async fn session(
     lease: auth::Lease,
 ) -> Result<(), Failure> {
     let (io, taken) = in_order::Socket::new(TokioIo::new(on_upgrade.await?));
-    let socket = WebSocketStream::from_raw_socket(io, Role::Server, None).await;
+    let limits = WebSocketConfig::default()
+        .read_buffer_size(READ_BUFFER)
+        .max_message_size(Some(MESSAGE))
+        .max_frame_size(Some(MESSAGE));
+    let socket = WebSocketStream::from_raw_socket(io, Role::Server, Some(limits)).await;
     let mut config = qmux::Config::default();
     config.max_streams_bidi = MAX_STREAMS.into();
     config.max_streams_uni = MAX_STREAMS.into();

@@ -1,6 +1,7 @@
 //! A real server and real clients, over QUIC and WebSocket, on loopback.
 
 mod common;
+mod hostile;
 mod restart;
 mod security;
 mod stream;

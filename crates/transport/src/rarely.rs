@@ -1,0 +1,38 @@
+//! Messages that may come often and must not flood a log.
+
+use std::time::{Duration, Instant};
+
+/// The least time from one message to the next of its kind.
+const PAUSE: Duration = Duration::from_secs(10);
+
+/// Counts what is not told.
+#[derive(Debug, Default)]
+pub(crate) struct Rarely {
+    told: Option<Instant>,
+    times: u64,
+}
+
+impl Rarely {
+    /// Something has happened: how often it has since it was told last, if it is to be told now.
+    pub(crate) fn now(&mut self) -> Option<u64> {
+        self.times += 1;
+        if self.told.is_some_and(|told| told.elapsed() < PAUSE) {
+            return None;
+        }
+        self.told = Some(Instant::now());
+        Some(std::mem::take(&mut self.times))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_is_told_and_the_others_are_counted() {
+        let mut rarely = Rarely::default();
+        assert_eq!([rarely.now(), rarely.now(), rarely.now()], [Some(1), None, None]);
+        rarely.told = Instant::now().checked_sub(PAUSE);
+        assert_eq!(rarely.now(), Some(3));
+    }
+}
