@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use axum::Router;
 use axum::extract::{Path, State};
+use axum::http::request::Parts;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::middleware::map_response;
 use axum::response::{IntoResponse, Response};
@@ -68,7 +69,7 @@ impl Ticked {
 /// The routes.
 pub(crate) fn router(shared: Arc<Shared>) -> Router {
     Router::new()
-        .route("/", get(|state: State<Arc<Shared>>| page_file(state, Path("index.html".into()))))
+        .route("/", get(index))
         .route("/lumencast.json", get(start))
         .route("/scene/{*name}", get(scene_file))
         .route("/healthz", get(health))
@@ -91,11 +92,19 @@ async fn start(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
     ([(header::CONTENT_TYPE, "application/json")], start.to_string())
 }
 
-async fn page_file(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Response {
+async fn index(shared: State<Arc<Shared>>, asked: Parts) -> Response {
+    page_file(shared, Path("index.html".into()), asked).await
+}
+
+async fn page_file(
+    State(shared): State<Arc<Shared>>,
+    Path(name): Path<String>,
+    asked: Parts,
+) -> Response {
     if name == "index.html" && !shared.page.contains(&name) {
         return axum::response::Html(page::MISSING).into_response();
     }
-    let mut response = respond(&name, shared.page.get(&name).cloned()).await;
+    let mut response = respond(&name, shared.page.get(&name).cloned(), &asked).await;
     // Vite puts a hash of the contents into the names of these.
     if name.starts_with("assets/") && response.status() == StatusCode::OK {
         let forever = HeaderValue::from_static("public, max-age=31536000, immutable");
@@ -105,14 +114,20 @@ async fn page_file(State(shared): State<Arc<Shared>>, Path(name): Path<String>) 
 }
 
 /// A scene's files have one name each; pages ask by what stands in the glTF.
-async fn scene_file(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Response {
+async fn scene_file(
+    State(shared): State<Arc<Shared>>,
+    Path(name): Path<String>,
+    asked: Parts,
+) -> Response {
     let padded = name.trim_end_matches('\0');
-    let Some(name) = lumencast_scene::file_name(padded) else { return respond("", None).await };
+    let Some(name) = lumencast_scene::file_name(padded) else {
+        return respond("", None, &asked).await;
+    };
     let contents = {
         let files = shared.scene_files.read().unwrap_or_else(PoisonError::into_inner);
         files.get(&name).cloned()
     };
-    respond(&name, contents).await
+    respond(&name, contents, &asked).await
 }
 
 async fn health(State(shared): State<Arc<Shared>>) -> Response {

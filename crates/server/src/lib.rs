@@ -16,6 +16,7 @@ mod http;
 mod inbox;
 mod metrics;
 mod noise;
+mod open_file;
 mod pace;
 mod page;
 mod placement;

@@ -24,9 +24,11 @@ pub fn is_embedded() -> bool {
 pub(crate) fn files(folder: Option<&Path>) -> io::Result<FileSet> {
     match folder {
         Some(folder) => FileSet::folder(folder),
-        None => Ok(embedded::FILES
-            .iter()
-            .map(|&(name, bytes)| (name.to_owned(), Contents::Bytes(Bytes::from_static(bytes))))
-            .collect()),
+        None => {
+            let file = |&(name, bytes): &(&str, &'static [u8])| {
+                (name.to_owned(), Contents::of(Bytes::from_static(bytes)))
+            };
+            Ok(embedded::FILES.iter().map(file).collect::<FileSet>().compressed())
+        }
     }
 }

@@ -189,17 +189,20 @@ fn beat(
 
 /// The files that make the scene up, as clients ask for them.
 fn scene_files(scene: &Scene) -> FileSet {
-    scene
-        .files()
-        .into_iter()
-        .map(|file| {
-            let contents = match file.contents {
-                FileContents::Path(path) => Contents::Path(path),
-                FileContents::Bytes(bytes) => Contents::Bytes(bytes.to_vec().into()),
-            };
-            (file.name, contents)
-        })
-        .collect()
+    let files = scene.files().into_iter().filter_map(|file| {
+        let contents = match file.contents {
+            FileContents::Path(path) => match Contents::at(&path) {
+                Ok(contents) => contents,
+                Err(error) => {
+                    tracing::warn!(path = %path.display(), %error, "not served");
+                    return None;
+                }
+            },
+            FileContents::Bytes(bytes) => Contents::of(bytes.to_vec().into()),
+        };
+        Some((file.name, contents))
+    });
+    files.collect()
 }
 
 /// Tells this run of the server from others: no secret, only unlikely to come twice.
