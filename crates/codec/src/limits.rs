@@ -3,6 +3,11 @@
 
 /// Bytes of a frame.
 pub const FRAME_BYTES: usize = 1 << 20;
+/// Bytes of a frame of a client's edits.
+pub const EDIT_BYTES: usize = 4 * 1024;
+/// The largest number on the wire that is no measure: the largest that JavaScript tells from its
+/// neighbours.
+pub const LARGEST_NUMBER: u64 = (1 << 53) - 1;
 /// Fields of a catalog.
 pub const FIELDS: usize = 256;
 /// Regions of a field.

@@ -156,7 +156,7 @@ fn known(edit: Value) -> Option<Edit> {
 /// An edit on its way from a client to the server.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClientEdit {
-    /// Grows by one from 1, for each client.
+    /// Grows by one from 1, for each client; at most [`limits::LARGEST_NUMBER`].
     pub seq: u64,
     /// The edit.
     pub edit: Edit,
@@ -174,10 +174,14 @@ impl ClientEdit {
     /// # Errors
     /// The sequence number, if that much could be read, and why the frame was refused.
     pub fn decode(bytes: &[u8]) -> Result<Self, (Option<u64>, DecodeError)> {
-        DecodeError::limit("bytes of a frame", bytes.len(), limits::FRAME_BYTES)
+        DecodeError::limit("bytes of an edit", bytes.len(), limits::EDIT_BYTES)
             .map_err(|error| (None, error))?;
         let value: Value = json(serde_json::from_slice(bytes)).map_err(|error| (None, error))?;
         let seq = value.get("seq").and_then(Value::as_u64);
+        if let Some(seq) = seq.filter(|seq| *seq > limits::LARGEST_NUMBER) {
+            let (what, limit) = ("sequence number", limits::LARGEST_NUMBER);
+            return Err((None, DecodeError::Limit { what, value: seq, limit }));
+        }
         json(serde_json::from_value(value)).map_err(|error| (seq, error))
     }
 }
@@ -272,5 +276,16 @@ mod tests {
             ClientEdit::decode(b"rubbish").map_err(|(seq, e)| (seq, e.kind())),
             Err((None, "json"))
         );
+        // Numbers that web clients cannot read, and frames that are too long, are no edits.
+        let last = ClientEdit { seq: limits::LARGEST_NUMBER, edit: remove(3) };
+        assert_eq!(ClientEdit::decode(&last.encode()), Ok(last.clone()));
+        let beyond = ClientEdit { seq: limits::LARGEST_NUMBER + 1, ..last };
+        let long = [beyond.encode(), vec![b' '; limits::EDIT_BYTES]].concat();
+        for frame in [beyond.encode(), long] {
+            assert_eq!(
+                ClientEdit::decode(&frame).map_err(|(seq, e)| (seq, e.kind())),
+                Err((None, "limit"))
+            );
+        }
     }
 }

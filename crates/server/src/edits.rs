@@ -3,11 +3,12 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use lumencast_codec::limits;
 use lumencast_transport::{Announcement, Announcements, Error, ReadOptions, RemoteBroadcast};
 use tokio::sync::Semaphore;
 use tokio::task::JoinSet;
 
-use crate::inbox::{Inbox, MAX_CLIENTS, MAX_FRAME, Verdict};
+use crate::inbox::{Inbox, MAX_CLIENTS, Verdict};
 
 /// Edits older than this are not worth waiting for when a newer group is there.
 const MAX_AGE: Duration = Duration::from_secs(5);
@@ -51,7 +52,7 @@ pub(crate) async fn collect(
 /// Reads one client's edits until its broadcast ends or it is cut off.
 async fn read(client: &str, broadcast: &RemoteBroadcast, inbox: &Mutex<Inbox>, clock: Instant) {
     tracing::info!(client, "edits a scene");
-    let options = ReadOptions::default().with_max_age(MAX_AGE).with_max_frame(MAX_FRAME);
+    let options = ReadOptions::default().with_max_age(MAX_AGE).with_max_frame(limits::EDIT_BYTES);
     let mut track = broadcast.subscribe("edits", options);
     loop {
         let frame = match track.next().await {
@@ -74,9 +75,14 @@ async fn read(client: &str, broadcast: &RemoteBroadcast, inbox: &Mutex<Inbox>, c
     }
 }
 
-/// The client's name in `<scene>/edits/<client>`, if it is one.
+/// The client's name in `<scene>/edits/<client>`, if the path is of that form.
 fn client_name(path: &str) -> Option<String> {
-    let (_, name) = path.rsplit_once('/')?;
+    let mut parts = path.split('/');
+    let (Some(_), Some("edits"), Some(name), None) =
+        (parts.next(), parts.next(), parts.next(), parts.next())
+    else {
+        return None;
+    };
     let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     ((1..=64).contains(&name.len()) && name.chars().all(allowed)).then(|| name.to_owned())
 }
@@ -88,7 +94,16 @@ mod tests {
     #[test]
     fn names() {
         assert_eq!(client_name("sponza/edits/A-z_09").as_deref(), Some("A-z_09"));
-        for wrong in ["", "sponza", "sponza/edits/", "sponza/edits/a b", "sponza/edits/ä"] {
+        for wrong in [
+            "",
+            "sponza",
+            "sponza/edits/",
+            "sponza/edits/a b",
+            "sponza/edits/ä",
+            "sponza/edits/x/victim",
+            "sponza/else/a",
+            "a",
+        ] {
             assert_eq!(client_name(wrong), None, "{wrong}");
         }
         assert_eq!(client_name(&format!("s/edits/{}", "x".repeat(65))), None);

@@ -33,8 +33,9 @@ pub(crate) const MAX_CLIENTS: usize = 1024;
 pub(crate) const MAX_EDITS_A_TICK: usize = 512;
 /// Edits refused beforehand that one tick reports.
 pub(crate) const MAX_REFUSED_A_TICK: usize = 256;
-/// Bytes of a frame; no edit is nearly as long.
-pub(crate) const MAX_FRAME: usize = 4 * 1024;
+/// How far a number may be beyond the last: whoever sends a larger one keeps that client's next edits
+/// from being taken.
+const MAX_AHEAD: u64 = 1 << 16;
 /// Edits of all clients that wait for the next tick, and refusals that wait to be reported.
 const MAX_PENDING: usize = 16 * 1024;
 /// Bytes of the edits taken in one tick. With their senders, refusals and acknowledgements they stay
@@ -128,7 +129,10 @@ impl Inbox {
         mailbox.excess = (mailbox.excess - regained).max(0.0);
         mailbox.heard = now;
 
-        let Some((seq, edit)) = parse(bytes) else {
+        // The first may be any: a client goes on counting when its server has begun anew.
+        let (first, last) = (mailbox.last == 0, mailbox.last);
+        let near = |seq: u64| first || seq.saturating_sub(last) <= MAX_AHEAD;
+        let Some((seq, edit)) = parse(bytes).filter(|(seq, _)| near(*seq)) else {
             mailbox.rubbish += 1;
             return match mailbox.rubbish > limits.rubbish {
                 true => Verdict::CutOff,
@@ -215,9 +219,6 @@ pub(crate) fn refusal(client: String, seq: u64, reason: &str) -> RefusedEdit {
 /// The number of a frame and its edit, or why the edit cannot be read; `None` where there is not
 /// even a number.
 fn parse(bytes: &[u8]) -> Option<(u64, Result<Edit, String>)> {
-    if bytes.len() > MAX_FRAME {
-        return None;
-    }
     match ClientEdit::decode(bytes) {
         Ok(ClientEdit { seq, edit }) => Some((seq, Ok(edit))),
         Err((seq, error)) => Some((seq?, Err(format!("not an edit: {error}")))),
@@ -251,6 +252,19 @@ mod tests {
             BTreeMap::from([("a".to_owned(), 2), ("b".to_owned(), 4)])
         );
         assert!(inbox.take(61.0).acks.is_empty(), "forgotten after a minute");
+    }
+
+    /// The first number may be any, since a client goes on counting when its server begins anew.
+    #[test]
+    fn numbers_far_ahead_are_no_edits() {
+        let mut inbox = Inbox::new(Limits::default());
+        let mut receive = |seq| inbox.receive("a", &frame(seq), 0.0);
+        assert_eq!(receive(1 << 30), Verdict::Taken);
+        assert_eq!(receive((1 << 30) + MAX_AHEAD + 1), Verdict::Rubbish);
+        assert_eq!(receive(1 << 53), Verdict::Rubbish);
+        assert_eq!(receive((1 << 30) + MAX_AHEAD), Verdict::Taken);
+        assert_eq!(receive((1 << 30) + MAX_AHEAD + 1), Verdict::Taken);
+        assert_eq!(taken(&mut inbox).len(), 3);
     }
 
     #[test]
@@ -336,7 +350,7 @@ mod tests {
         let limits = Limits { rate: 1e9, burst: 1e9, ..Limits::default() };
         let mut inbox = Inbox::new(limits);
         for seq in 1..=200 {
-            let name = "x".repeat(MAX_FRAME - 100);
+            let name = "x".repeat(limits::EDIT_BYTES - 100);
             let edit = format!(r#"{{"edit":"add_instance","source":{{"file":"{name}"}}}}"#);
             let frame = format!(r#"{{"seq":{seq},"edit":{edit}}}"#);
             assert_eq!(inbox.receive("a", frame.as_bytes(), 0.0), Verdict::Taken);
@@ -345,12 +359,14 @@ mod tests {
         while taken < 200 {
             let mail = inbox.take(0.0);
             assert!(!mail.edits.is_empty());
-            assert!(mail.edits.len() * MAX_FRAME <= MAX_BYTES_A_TICK + 100 * mail.edits.len());
+            assert!(
+                mail.edits.len() * limits::EDIT_BYTES <= MAX_BYTES_A_TICK + 100 * mail.edits.len()
+            );
             taken += mail.edits.len();
             assert_eq!(mail.acks["a"], taken as u64);
         }
         assert_eq!(taken, 200);
-        let long = "x".repeat(MAX_FRAME + 1);
+        let long = "x".repeat(limits::EDIT_BYTES + 1);
         assert_eq!(inbox.receive("a", long.as_bytes(), 0.0), Verdict::Rubbish);
     }
 

@@ -1,7 +1,7 @@
 //! Who may read and who may edit.
 //!
 //! Names are slash-separated paths. The server's broadcasts have one part (`sponza`); a client's
-//! own lie below `<one part>/edits/`, and nowhere else, whatever its token says.
+//! own are called `<one part>/edits/<one part>`, and nothing else, whatever its token says.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use crate::{Error, Result};
 /// What anyone may read: the server's own broadcasts.
 const READABLE: &str = "*";
 /// What a client may publish at most.
-const EDITABLE: &str = "*/edits/**";
+const EDITABLE: &str = "*/edits/*";
 
 /// Who may read the server's broadcasts, and who may publish edits.
 #[derive(Debug, Clone, Default)]
@@ -73,7 +73,7 @@ impl Key {
             |text: &str| text.parse::<Pattern>().map_err(|err| Error::Key(err.to_string()));
         let claims = Claims::default()
             .with_subscribe([pattern(scene)?])
-            .with_publish([pattern(&format!("{scene}/edits/**"))?])
+            .with_publish([pattern(&format!("{scene}/edits/*"))?])
             .with_issued(SystemTime::now())
             .with_expires(lifetime.map(|lifetime| SystemTime::now() + lifetime));
         self.0.sign(&claims).map_err(key_error)
@@ -218,7 +218,7 @@ mod tests {
         let grant = ask(&Access::Loopback, "/", None).expect("granted");
         for (path, allowed) in [
             ("sponza/edits/a", true),
-            ("sponza/edits/a/b", true),
+            ("sponza/edits/a/b", false),
             ("sponza", false),
             ("sponza/edit", false),
             ("edits/a", false),

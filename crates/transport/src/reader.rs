@@ -126,7 +126,7 @@ impl TrackReader {
     /// Dropping the future loses nothing.
     ///
     /// # Errors
-    /// [`Error::FrameTooLarge`], after which reading may go on with the next group.
+    /// [`Error::FrameTooLarge`], after which reading may go on with the next frame.
     pub async fn next(&mut self) -> Result<Option<Frame>> {
         loop {
             if self.group.is_some() {
@@ -177,7 +177,6 @@ impl TrackReader {
         };
         let limit = self.options.max_frame;
         if bytes.len() > limit {
-            self.group = None;
             let track = self.track.to_string();
             return Err(Error::FrameTooLarge { track, size: bytes.len(), limit });
         }

@@ -132,8 +132,10 @@ async fn edits_reach_the_server(transport: Transport) {
     track.write(vec![0; 1001].into(), true).expect("written");
     let refused = step("large", reader.next()).await;
     assert!(matches!(refused, Err(Error::FrameTooLarge { size: 1001, limit: 1000, .. })));
-    track.write(text("three"), true).expect("written");
-    assert_eq!(read(&mut reader).await.bytes, text("three"));
+    for (edit, new_group) in [("three", false), ("four", true)] {
+        track.write(text(edit), new_group).expect("written");
+        assert_eq!(read(&mut reader).await.bytes, text(edit), "after the one that was too large");
+    }
 
     drop((track, broadcast, client));
     assert!(matches!(step("end", reader.next()).await, Ok(None)));

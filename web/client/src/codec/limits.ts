@@ -1,6 +1,7 @@
 /** The limits of docs/wire.md; a decoder refuses what exceeds them. */
 export const LIMITS = {
   frameBytes: 1 << 20,
+  editBytes: 4 << 10,
   fields: 256,
   regionsPerField: 4096,
   probesPerField: 262_144,

@@ -108,7 +108,7 @@ const utf8 = new TextEncoder();
 /** The frame by which a client sends an edit. */
 export function encodeClientEdit(seq: number, edit: Edit): Uint8Array {
   const bytes = utf8.encode(JSON.stringify({ seq, edit }));
-  if (bytes.length > LIMITS.frameBytes) throw new WireError('limit', `an edit of ${bytes.length} bytes`);
+  if (bytes.length > LIMITS.editBytes) throw new WireError('limit', `an edit of ${bytes.length} bytes`);
   return bytes;
 }
 
