@@ -127,6 +127,14 @@ impl Serve {
             ip if ip.is_unspecified() => format!("THIS-MACHINE:{}", address.port()),
             _ => address.to_string(),
         };
+        if self.tls_cert.is_none() && !address.ip().is_loopback() {
+            let what =
+                if self.open { "whoever is on the way may edit" } else { "tokens can be read" };
+            tell!(
+                "warning: plain HTTP beyond this machine: {what}, and browsers offer pages no \
+                 WebTransport or WebGPU; give --tls-cert and --tls-key, or put a proxy with TLS in front"
+            );
+        }
         let page = format!("{scheme}://{host}/");
         let probes: usize = server.tick().volumes().map(|v| v.grid.probe_count()).sum();
         if self.json {

@@ -53,8 +53,7 @@ impl Front {
 
     async fn checked_answer(self, request: Request, peer: Peer) -> Response {
         if let Err(reason) = checked(&self.backend.check, &request) {
-            tracing::info!(remote = %peer.remote, %reason, "HTTP request refused");
-            self.backend.sessions.refused();
+            self.backend.refuse(peer.remote, &reason);
             return (StatusCode::FORBIDDEN, format!("{reason}\n")).into_response();
         }
         if websocket::is_upgrade(request.headers()) {

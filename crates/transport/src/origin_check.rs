@@ -2,7 +2,8 @@
 //!
 //! Any web page may open a connection to `localhost`, and any name may resolve to it (DNS
 //! rebinding). So every request on HTTP, WebSocket and WebTransport has to name a host that is
-//! this server's, and, where a browser says which page asks (`Origin`), a page of this server.
+//! this server's, and, where a browser says which page asks (`Origin`), a page of this server or, on
+//! loopback, of another one on this machine, as development servers are.
 //! Native clients send no `Origin`; they are judged by the host and by [`Access`](crate::Access).
 
 use std::net::{IpAddr, SocketAddr};
@@ -12,10 +13,12 @@ use std::net::{IpAddr, SocketAddr};
 pub(crate) enum Refusal {
     #[error("the request names no host")]
     NoHost,
-    #[error("the host {0:?} is not this server's; name it among the allowed hosts to accept it")]
+    #[error(
+        "the host {0:?} is not this server's; to accept it, start the server with --allow-host"
+    )]
     ForeignHost(String),
     #[error(
-        "the origin {0:?} is not this server's; name it among the allowed origins to accept it"
+        "the origin {0:?} is not this server's; to accept it, start the server with --allow-origin"
     )]
     ForeignOrigin(String),
     #[error("a page of another site asks without naming its origin")]
@@ -25,6 +28,8 @@ pub(crate) enum Refusal {
 /// The hosts and origins that one server answers to.
 #[derive(Debug, Clone)]
 pub(crate) struct OriginCheck {
+    /// Nobody but this machine reaches the server.
+    is_local: bool,
     port: u16,
     hosts: Vec<String>,
     origins: Vec<String>,
@@ -35,7 +40,8 @@ impl OriginCheck {
     /// to pages of `origins` (`scheme://host[:port]`).
     pub(crate) fn new(address: SocketAddr, hosts: &[String], origins: &[String]) -> Self {
         let lower = |list: &[String]| list.iter().map(|item| item.to_ascii_lowercase()).collect();
-        Self { port: address.port(), hosts: lower(hosts), origins: lower(origins) }
+        let (is_local, port) = (address.ip().is_loopback(), address.port());
+        Self { is_local, port, hosts: lower(hosts), origins: lower(origins) }
     }
 
     /// Checks one request by its `Host` (or `:authority`) and its `Origin`, where it has one.
@@ -61,7 +67,7 @@ impl OriginCheck {
     }
 
     /// A page is our own if it came from the very authority it now asks, or from this machine's
-    /// loopback at our port, which nobody else can hold.
+    /// loopback: at our port, which nobody else can hold, or at any where the server is this machine's.
     fn is_own_origin(&self, origin: &str, authority: &str) -> bool {
         if self.origins.iter().any(|allowed| allowed == origin) {
             return true;
@@ -72,8 +78,8 @@ impl OriginCheck {
             "https" => 443,
             _ => return false,
         };
-        let loopback =
-            is_loopback(host_of(rest)) && port_of(rest).unwrap_or(default_port) == self.port;
+        let own_port = || port_of(rest).unwrap_or(default_port) == self.port;
+        let loopback = is_loopback_origin(rest) && (self.is_local || own_port());
         rest == authority || loopback
     }
 }
@@ -99,8 +105,14 @@ fn is_loopback_name(host: &str) -> bool {
     host == "localhost" || host.ends_with(".localhost")
 }
 
-fn is_loopback(host: &str) -> bool {
-    is_loopback_name(host) || literal(host).is_some_and(|ip| ip.is_loopback())
+/// Whether an origin without its scheme is `localhost` or the address that this stands for, and nothing
+/// else: of 127.0.0.2 and the like the same port may be somebody else's.
+fn is_loopback_origin(rest: &str) -> bool {
+    let host = host_of(rest);
+    let port = port_of(rest).map_or(String::new(), |port| format!(":{port}"));
+    let whole = |host: &str| rest == format!("{host}{port}");
+    let is_address = ["127.0.0.1", "[::1]"].into_iter().any(whole);
+    is_address || (is_loopback_name(host) && whole(host))
 }
 
 #[cfg(test)]
@@ -137,14 +149,19 @@ mod tests {
             "http://localhost:4443",
             "http://127.0.0.1:4443",
             "http://[::1]:4443",
+            "http://localhost:5173",
+            "http://127.0.0.1:8080",
+            "http://app.localhost:3000",
+            "http://localhost",
             "https://studio.example",
         ] {
             assert_eq!(check().check(local, Some(origin)), Ok(()), "{origin}");
         }
         for origin in [
             "https://evil.example",
-            "http://localhost:5173",
-            "http://localhost",
+            "http://127.0.0.2:4443",
+            "http://localhost:5173:80",
+            "http://localhost:evil",
             "http://6.6.6.6:4443",
             "http://localhost:4443@evil.example",
             "http://localhost:4443.evil.example",
@@ -157,6 +174,15 @@ mod tests {
                 "{origin}"
             );
         }
+    }
+
+    #[test]
+    fn of_a_server_for_others_only_its_own_port_is_local() {
+        let address = "0.0.0.0:4443".parse().expect("an address");
+        let check = OriginCheck::new(address, &[], &[]);
+        let ask = |origin| check.check(Some("localhost:4443"), Some(origin));
+        assert_eq!(ask("http://localhost:4443"), Ok(()));
+        assert!(ask("http://localhost:5173").is_err() && ask("http://127.0.0.2:4443").is_err());
     }
 
     #[test]

@@ -71,7 +71,7 @@ async fn admit(
     };
     let host = Some(request.url.authority()).filter(|host| !host.is_empty());
     backend.check.check(host, origin).map_err(|refusal| {
-        backend.sessions.refused();
+        backend.refuse(remote, &refusal.to_string());
         (StatusCode::FORBIDDEN, refusal.to_string())
     })?;
     let transport = moq_auth::Transport::Quic;

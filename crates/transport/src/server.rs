@@ -119,6 +119,7 @@ impl Server {
             check: Arc::new(check),
             sessions: sessions.clone(),
             shutdown: observer,
+            told: Arc::default(),
         };
         let connections = Guests::new(descriptors::connections(&config));
         let front = Front {

@@ -1,7 +1,7 @@
 //! What WebTransport and WebSocket sessions share: how one is let in and how it is served.
 
 use std::net::SocketAddr;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use axum::http::StatusCode;
@@ -10,6 +10,7 @@ use moq_relay::{auth, cluster, shutdown};
 
 use crate::access::Sessions;
 use crate::origin_check::OriginCheck;
+use crate::rarely::Rarely;
 
 /// How long a client may take for each step from its first packet to its session.
 pub(crate) const HANDSHAKE: Duration = Duration::from_secs(10);
@@ -29,6 +30,7 @@ pub(crate) struct Backend {
     pub(crate) check: Arc<OriginCheck>,
     pub(crate) sessions: Sessions,
     pub(crate) shutdown: shutdown::Observer,
+    pub(crate) told: Arc<Mutex<Rarely>>,
 }
 
 /// What a client asks for.
@@ -40,6 +42,15 @@ pub(crate) struct Ask<'a> {
 }
 
 impl Backend {
+    /// Counts and tells that a host or an origin is refused.
+    pub(crate) fn refuse(&self, remote: SocketAddr, reason: &str) {
+        self.sessions.refused();
+        let told = self.told.lock().unwrap_or_else(PoisonError::into_inner).now();
+        if let Some(times) = told {
+            tracing::warn!(%remote, times, "refused: {reason}");
+        }
+    }
+
     /// Lets a session in; a refusal comes with its status and reason.
     pub(crate) async fn admit(&self, ask: Ask<'_>) -> Result<auth::Lease, (StatusCode, String)> {
         if self.sessions.full() {

@@ -115,7 +115,7 @@ async fn foreign_hosts_and_origins_are_refused_on_webtransport() {
     }
     for (host, origin) in [
         (own.as_str(), Some("https://evil.example")),
-        (own.as_str(), Some("http://localhost:1")),
+        (own.as_str(), Some("http://127.0.0.2:1")),
         (own.as_str(), Some("null")),
         ("evil.example", None),
     ] {
