@@ -312,7 +312,8 @@ fn what_was_baked_can_be_inspected() {
         "{words}"
     );
     let [min, mean, max] = ["min", "mean", "max"].map(|k| field["c0"][k].as_f64().expect(k));
-    assert!(0.0 <= min && min < mean && mean < max, "{min} {mean} {max}");
+    // A fit may leave a probe in the dark a little below nothing.
+    assert!(-0.01 * mean <= min && min < mean && mean < max, "{min} {mean} {max}");
     // The brightest luminance is at most the brightest channel's, and at least a tenth of it.
     let scale = field["scale_log2"].as_f64().expect("a scale").exp2();
     assert!((0.025..2.0).contains(&(max / scale)), "{max} at a scale of {scale}");

@@ -110,7 +110,7 @@ impl Field {
     /// directions along the axes at probes that are not inside walls.
     pub(crate) fn places(&self) -> Vec<(Vec3, Vec3)> {
         if let Some(surfaces) = &self.surfaces {
-            return surfaces.places().collect();
+            return surfaces.places();
         }
         let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
         let open = self.positions.iter().zip(self.buried.open()).filter(|(_, open)| *open);

@@ -1,5 +1,6 @@
 //! The surfaces about a volume, to which its probes are fitted.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{IVec3, Vec3};
@@ -29,6 +30,8 @@ const SAMPLES_A_TURN: u32 = 4;
 pub(crate) struct Surfaces {
     /// Where they are looked for from: the volume's probes, and places about it.
     lookouts: Vec<Vec3>,
+    /// How many of them are probes.
+    probes: usize,
     /// A lookout.
     points: u32,
     around: Surroundings,
@@ -48,6 +51,7 @@ impl Surfaces {
         let points = lookouts.len() * each;
         Self {
             lookouts,
+            probes: grid.probe_count(),
             points: each as u32,
             around: Surroundings::default(),
             began: vec![None; points],
@@ -112,11 +116,19 @@ impl Surfaces {
         &self.around
     }
 
-    /// The points that count, with their normals.
-    pub(crate) fn places(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
-        let points = self.around.points().iter().enumerate();
-        let counting = points.filter(|(number, _)| self.around.counts(*number));
-        counting.filter_map(|(_, point)| point.map(|at| (at.position, at.normal)))
+    /// The points that count, with their normals: those that probes see, where there are any, and else
+    /// those that are seen from about the volume. The outsides of a closed room, as dark as they may be,
+    /// are nobody's business.
+    pub(crate) fn places(&self) -> Vec<(Vec3, Vec3)> {
+        let counting = |points: Range<usize>| -> Vec<(Vec3, Vec3)> {
+            let points = points.filter(|number| self.around.counts(*number));
+            let places = points.filter_map(|number| self.around.points()[number]);
+            places.map(|at| (at.position, at.normal)).collect()
+        };
+        let all = self.around.points().len();
+        let own = (self.probes * self.points as usize).min(all);
+        let seen = counting(0..own);
+        if seen.is_empty() { counting(own..all) } else { seen }
     }
 
     /// The irradiance at each point, lux; nothing where none was gathered.
