@@ -1,11 +1,12 @@
 """What hostile clients cost a server: its memory, and whether it still answers.
 
-    python3 benches/hostile.py path/to/lumencast
+    python3 benches/hostile.py path/to/lumencast [lazy_readers|long_messages|silent ...]
 
 Starts servers on loopback and ends them. Linux: memory is read from /proc. The scene has 200 MB, most
 of it a buffer that nothing uses.
 """
 
+import http.client
 import json
 import os
 import resource
@@ -15,7 +16,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import urllib.request
 
 LENGTH = 200_000_000
 
@@ -63,11 +63,16 @@ class Server:
         return socket.create_connection(("127.0.0.1", self.port), timeout=30)
 
     def answers(self):
+        """Whether it answers somebody at another address."""
+        client = http.client.HTTPConnection("127.0.0.1", self.port, timeout=5,
+                                            source_address=("127.0.0.2", 0))
         try:
-            url = f"http://127.0.0.1:{self.port}/healthz"
-            return urllib.request.urlopen(url, timeout=5).status == 200
-        except OSError:
+            client.request("GET", "/healthz")
+            return client.getresponse().status == 200
+        except (OSError, http.client.HTTPException):
             return False
+        finally:
+            client.close()
 
     def end(self):
         self.process.terminate()
@@ -120,7 +125,8 @@ def main():
     program = sys.argv[1]
     with tempfile.TemporaryDirectory() as folder:
         path = scene(folder)
-        for attack in (lazy_readers, long_messages, silent):
+        attacks = [lazy_readers, long_messages, silent]
+        for attack in [a for a in attacks if a.__name__ in sys.argv[2:] or not sys.argv[2:]]:
             server = Server(program, path)
             try:
                 sockets = attack(server)
