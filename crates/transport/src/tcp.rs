@@ -111,16 +111,18 @@ where
     builder.http2().max_concurrent_streams(HTTP2_STREAMS).max_send_buf_size(HTTP2_BUFFER);
     let connection = builder.serve_connection_with_upgrades(TokioIo::new(stream), service);
     let mut connection = std::pin::pin!(connection);
-    tokio::select! {
-        ended = connection.as_mut() => ended,
-        () = progress.stalled() => Err("it stands still".into()),
-        () = shutdown.started() => {
-            connection.as_mut().graceful_shutdown();
-            tokio::select! {
-                ended = connection.as_mut() => ended,
-                () = progress.stalled() => Err("it stands still".into()),
+    let served = async {
+        tokio::select! {
+            ended = connection.as_mut() => ended,
+            () = shutdown.started() => {
+                connection.as_mut().graceful_shutdown();
+                connection.await
             }
         }
+    };
+    tokio::select! {
+        ended = served => ended,
+        () = progress.stalled() => Err("it stands still".into()),
     }
 }
 
