@@ -89,7 +89,8 @@ impl Default for GatherOptions {
 pub struct FitOptions {
     /// Directions a probe in which points of surfaces are looked for, at least 1; fewer where a volume
     /// has so many probes that there would be more than a million points. Gathering at them takes as
-    /// many samples as gathering at the probes, in all.
+    /// many samples as gathering at the probes, in all, and up to as many more as there are places about
+    /// the volume from which something is seen.
     pub points: u32,
 }
 

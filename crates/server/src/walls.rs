@@ -4,11 +4,11 @@
 //! that black into the room. Such a probe is known by the share of its rays that meet a back face first
 //! (Majercik et al. 2019, "Dynamic Diffuse Global Illumination with Ray-Traced Irradiance Fields",
 //! classify probes likewise). Backs of double-sided materials count only where no light comes from
-//! them: a closed thing has none within, a room whose walls are wound outwards does. In what is published it holds the mean
-//! of its valid neighbours instead: of the up to 26 around it, each weighted by the inverse of its
-//! distance; probes deeper inside follow ring by ring. A wall thicker than two cells so carries light
-//! from each side only up to its middle; in a thinner one both sides mix, which only visibility can
-//! avoid. Where no probe of a volume is valid, all stay as they are.
+//! them: a closed thing has none within, a room whose walls are wound outwards does. In what is
+//! published it holds the mean of its valid neighbours instead: of the up to 26 around it, each
+//! weighted by the inverse of its distance; probes deeper inside follow ring by ring. A wall thicker
+//! than two cells so carries light from each side only up to its middle; in a thinner one both sides
+//! mix, which only visibility can avoid. Where no probe of a volume is valid, all stay as they are.
 
 use glam::{IVec3, Vec3};
 use lumencast_gather::Sums;
