@@ -11,14 +11,17 @@ use crate::trs::Trs;
 use crate::{Light, Material, Mesh};
 
 /// A glTF file's contents. Indices (of nodes, meshes, …) are the file's own and lie in range.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Asset {
     pub(crate) nodes: Vec<AssetNode>,
     /// Nodes at the top of the file's scene.
     pub(crate) roots: Vec<u32>,
     pub(crate) meshes: Vec<Arc<Mesh>>,
-    /// The file's materials, and the default material as the last. Meshes name them by these indices.
+    /// The file's materials, and the default material as the last.
     pub(crate) materials: Vec<Material>,
+    /// What meshes add to these indices when they name materials: 0 in the file, and the number of
+    /// the first of them in a scene.
+    pub(crate) first_material: u32,
     pub(crate) skins: Vec<Arc<Skin>>,
     pub(crate) animations: Vec<Animation>,
     pub(crate) cameras: Vec<Camera>,
@@ -56,7 +59,7 @@ pub(crate) struct Skin {
 }
 
 /// Curves that move nodes.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Animation {
     pub(crate) name: String,
     /// Seconds; time of the last key.
@@ -65,7 +68,7 @@ pub(crate) struct Animation {
 }
 
 /// A curve and what it moves.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Channel {
     pub(crate) node: u32,
     pub(crate) curve: Curve,

@@ -81,6 +81,9 @@ pub enum Fault {
         /// Why.
         reason: String,
     },
+    /// What was found when the file was last read.
+    #[error("{0}")]
+    Remembered(String),
 }
 
 impl Fault {

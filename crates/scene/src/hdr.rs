@@ -1,6 +1,7 @@
 //! Equirectangular pictures of the environment.
 
 use std::io::Cursor;
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -8,18 +9,21 @@ use image::{ImageFormat, ImageReader, Limits};
 
 use crate::HdrImage;
 use crate::error::Fault;
-use crate::gltf::source::Folder;
+use crate::gltf::source::{Folder, shorten};
 use crate::limits::{self, Budget};
 
-/// Reads an .hdr or .exr file in the scene's folder. Texels that are not finite or negative become
+/// Reads an .hdr or .exr file, whose name within the scene's folder is `name`. Texels that are not finite or negative become
 /// black, or the largest light; the second value counts them.
 pub(crate) fn read(
+    path: &Path,
+    name: &str,
     folder: &Folder,
-    uri: &str,
     budget: &Budget,
 ) -> Result<(Arc<HdrImage>, usize), Fault> {
-    let (_, _, bytes) = folder.read(uri)?;
-    let fail = |reason: String| Fault::Image { name: uri.to_owned(), reason };
+    let bytes = folder
+        .read_file(path)
+        .map_err(|source| Fault::Missing { uri: shorten(name), source })?;
+    let fail = |reason: String| Fault::Image { name: name.to_owned(), reason };
     let reader = || {
         let mut reader = ImageReader::new(Cursor::new(&bytes))
             .with_guessed_format()

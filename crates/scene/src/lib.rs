@@ -60,7 +60,7 @@ pub use gltf::source::file_name;
 pub use light::{Light, LightKind, PlacedLight};
 pub use material::{AlphaMode, Filter, Image, Material, TextureRef, Wrap};
 pub use mesh::{Mesh, MorphTarget, Primitive, Vertices};
-pub use scene::{AnimationInfo, EditError, NodeInfo, PlacedCamera, Scene};
+pub use scene::{AnimationInfo, EditError, FileRead, FileToRead, NodeInfo, PlacedCamera, Scene};
 pub use script::{Script, ScriptError};
 pub use snapshot::{Instance, Snapshot};
 pub use view::{NamedView, Rays, View};

@@ -7,6 +7,8 @@ use crate::error::Fault;
 
 /// Bytes of one file.
 pub(crate) const FILE_BYTES: u64 = 4 << 30;
+/// Bytes of a file that an edit names, and of each file that this one refers to.
+pub(crate) const ADDED_FILE_BYTES: u64 = 512 << 20;
 /// Bytes of one glTF's JSON.
 pub(crate) const JSON_BYTES: u64 = 256 << 20;
 /// Triangles.
@@ -35,7 +37,75 @@ pub(crate) const LIGHT: f32 = 1e12;
 /// Largest coordinate (metres) and scale.
 pub(crate) const EXTENT: f32 = 1e9;
 
-/// What has been taken of the limits.
+/// How much of the limits files take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Taken {
+    triangles: u64,
+    geometry: u64,
+    texels: u64,
+}
+
+impl Taken {
+    /// An error that says which limit it exceeds.
+    pub(crate) fn check(self) -> Result<(), Fault> {
+        let limits = [
+            (self.triangles, TRIANGLES, WHAT_TRIANGLES),
+            (self.geometry, GEOMETRY_BYTES, WHAT_GEOMETRY),
+            (self.texels, TEXELS, WHAT_TEXELS),
+        ];
+        match limits.into_iter().find(|(taken, limit, _)| taken > limit) {
+            None => Ok(()),
+            Some((_, limit, what)) => Err(Fault::TooLarge { what: what.into(), limit }),
+        }
+    }
+
+    pub(crate) fn is_within_limits(self) -> bool {
+        self.check().is_ok()
+    }
+}
+
+#[cfg(test)]
+impl Taken {
+    pub(crate) fn of_texels(texels: u64) -> Self {
+        Self { texels, ..Self::default() }
+    }
+}
+
+impl std::iter::Sum for Taken {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |sum, taken| sum + taken)
+    }
+}
+
+impl std::ops::Add for Taken {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            triangles: self.triangles + other.triangles,
+            geometry: self.geometry + other.geometry,
+            texels: self.texels + other.texels,
+        }
+    }
+}
+
+impl std::ops::Sub for Taken {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self {
+            triangles: self.triangles - other.triangles,
+            geometry: self.geometry - other.geometry,
+            texels: self.texels - other.texels,
+        }
+    }
+}
+
+const WHAT_TRIANGLES: &str = "triangles";
+const WHAT_GEOMETRY: &str = "bytes of geometry and animation";
+const WHAT_TEXELS: &str = "texels";
+
+/// What is taken of the limits while files are read, by several threads.
 #[derive(Debug, Default)]
 pub(crate) struct Budget {
     triangles: AtomicU64,
@@ -43,30 +113,36 @@ pub(crate) struct Budget {
     texels: AtomicU64,
 }
 
-impl Clone for Budget {
-    fn clone(&self) -> Self {
-        let copy = |n: &AtomicU64| AtomicU64::new(n.load(Ordering::Relaxed));
+impl Budget {
+    /// What is left of the limits once so much is taken.
+    pub(crate) fn starting_at(taken: Taken) -> Self {
         Self {
-            triangles: copy(&self.triangles),
-            geometry: copy(&self.geometry),
-            texels: copy(&self.texels),
+            triangles: taken.triangles.into(),
+            geometry: taken.geometry.into(),
+            texels: taken.texels.into(),
         }
     }
-}
 
-impl Budget {
+    pub(crate) fn taken(&self) -> Taken {
+        Taken {
+            triangles: self.triangles.load(Ordering::Relaxed),
+            geometry: self.geometry.load(Ordering::Relaxed),
+            texels: self.texels.load(Ordering::Relaxed),
+        }
+    }
+
     pub(crate) fn triangles(&self, n: usize) -> Result<(), Fault> {
-        take(&self.triangles, n as u64, TRIANGLES, "triangles")
+        take(&self.triangles, n as u64, TRIANGLES, WHAT_TRIANGLES)
     }
 
     /// Room for `n` values of type T.
     pub(crate) fn geometry<T>(&self, n: usize) -> Result<(), Fault> {
         let bytes = (n as u64).saturating_mul(size_of::<T>() as u64);
-        take(&self.geometry, bytes, GEOMETRY_BYTES, "bytes of geometry and animation")
+        take(&self.geometry, bytes, GEOMETRY_BYTES, WHAT_GEOMETRY)
     }
 
     pub(crate) fn texels(&self, width: u32, height: u32) -> Result<(), Fault> {
-        take(&self.texels, u64::from(width) * u64::from(height), TEXELS, "texels")
+        take(&self.texels, u64::from(width) * u64::from(height), TEXELS, WHAT_TEXELS)
     }
 }
 

@@ -58,7 +58,7 @@ pub(crate) fn beside(scene: &Path) -> Result<Option<(PathBuf, Settings)>, SceneE
         return Ok(None);
     }
     let read = || {
-        let bytes = read_file(&path).map_err(Fault::Read)?;
+        let bytes = read_file(&path, limits::FILE_BYTES).map_err(Fault::Read)?;
         let text = String::from_utf8(bytes).map_err(|_| invalid("is not UTF-8"))?;
         let settings: Settings = toml::from_str(&text).map_err(Fault::Toml)?;
         settings.check()?;

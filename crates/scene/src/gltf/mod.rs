@@ -53,7 +53,7 @@ pub(crate) fn read_file(
     folder: &Folder,
     budget: &Budget,
 ) -> Result<Asset, Fault> {
-    let bytes = source::read_file(path).map_err(Fault::Read)?;
+    let bytes = folder.read_file(path).map_err(Fault::Read)?;
     let mut asset = read(bytes, Some(&folder.beside(name)), budget)?;
     let contents = FileContents::Path(path.to_owned());
     asset.files.insert(0, SceneFile { name: name.to_owned(), contents });
@@ -105,6 +105,7 @@ fn read(bytes: Vec<u8>, folder: Option<&Folder>, budget: &Budget) -> Result<Asse
         nodes,
         meshes,
         materials,
+        first_material: 0,
         skins,
         animations,
         cameras: node::cameras(&root, &mut warnings)?,

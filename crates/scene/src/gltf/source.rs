@@ -15,22 +15,25 @@ use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 use crate::error::{Fault, invalid};
 use crate::limits;
 
-/// Reads a regular file of at most [`limits::FILE_BYTES`].
-pub(crate) fn read_file(path: &Path) -> io::Result<Vec<u8>> {
-    let file = File::open(path)?;
-    let metadata = file.metadata()?;
-    if !metadata.is_file() {
+/// Reads a regular file of at most `most` bytes.
+pub(crate) fn read_file(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    // To open a pipe is to wait for its writer.
+    if !std::fs::metadata(path)?.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
     }
-    if metadata.len() > limits::FILE_BYTES {
-        return Err(io::Error::new(
-            io::ErrorKind::FileTooLarge,
-            format!("larger than {} bytes", limits::FILE_BYTES),
-        ));
+    let file = File::open(path)?;
+    let length = file.metadata()?.len();
+    let too_large =
+        || io::Error::new(io::ErrorKind::FileTooLarge, format!("larger than {most} bytes"));
+    if length > most {
+        return Err(too_large());
     }
-    let mut bytes = Vec::with_capacity(metadata.len() as usize);
-    file.take(limits::FILE_BYTES).read_to_end(&mut bytes)?;
-    Ok(bytes)
+    let mut bytes = Vec::with_capacity(length as usize);
+    // It may grow while it is read.
+    match file.take(most + 1).read_to_end(&mut bytes)? as u64 > most {
+        true => Err(too_large()),
+        false => Ok(bytes),
+    }
 }
 
 /// The folder of a scene, and the place within it that URIs are relative to.
@@ -41,6 +44,8 @@ pub(crate) struct Folder {
     given: PathBuf,
     /// Folder of the referring file within the scene's folder: empty, or ending in `/`.
     prefix: String,
+    /// Bytes that a file may have.
+    most: u64,
 }
 
 impl Folder {
@@ -51,13 +56,24 @@ impl Folder {
             _ => Path::new("."),
         };
         let canonical = given.canonicalize()?;
-        Ok(Self { canonical, given: given.to_owned(), prefix: String::new() })
+        let (given, prefix) = (given.to_owned(), String::new());
+        Ok(Self { canonical, given, prefix, most: limits::FILE_BYTES })
     }
 
     /// The folder of a file whose name within the scene's folder is `name`.
     pub(crate) fn beside(&self, name: &str) -> Self {
         let prefix = name.rfind('/').map_or("", |end| &name[..=end]);
         Self { prefix: prefix.to_owned(), ..self.clone() }
+    }
+
+    /// The same folder, of which files of at most `most` bytes are read.
+    pub(crate) fn limited(&self, most: u64) -> Self {
+        Self { most, ..self.clone() }
+    }
+
+    /// Reads a file of this folder.
+    pub(crate) fn read_file(&self, path: &Path) -> io::Result<Vec<u8>> {
+        read_file(path, self.most)
     }
 
     /// Name within the scene's folder and place on disk of a URI.
@@ -84,7 +100,7 @@ impl Folder {
     pub(crate) fn read(&self, uri: &str) -> Result<(String, PathBuf, Vec<u8>), Fault> {
         let (name, path) = self.resolve(uri)?;
         let bytes =
-            read_file(&path).map_err(|source| Fault::Missing { uri: shorten(uri), source })?;
+            self.read_file(&path).map_err(|source| Fault::Missing { uri: shorten(uri), source })?;
         Ok((name, path, bytes))
     }
 }

@@ -9,6 +9,7 @@ use glam::{Affine3A, Quat, Vec3, Vec4};
 
 use super::Scene;
 use super::nodes::Node;
+use crate::asset::Asset;
 use crate::error::Fault;
 use crate::limits;
 use crate::trs::{Trs, is_in_world, is_invertible};
@@ -71,7 +72,8 @@ enum Numbers {
 
 impl Scene {
     /// Applies an edit, or refuses it and changes nothing. Gives the edit back with the number of the
-    /// node that it added filled in; numbers are given here, whatever the edit says.
+    /// node that it added filled in; numbers are given here, whatever the edit says. A file that it
+    /// names is read first, where it has not been ([`Scene::file_to_read`]).
     ///
     /// # Errors
     /// An edit that makes no sense for this scene.
@@ -88,6 +90,7 @@ impl Scene {
     }
 
     fn apply_numbered(&mut self, edit: &Edit, numbers: Numbers) -> Result<Edit, EditError> {
+        self.read_now(self.file_to_read(edit));
         let mut edit = edit.clone();
         match &mut edit {
             Edit::MoveNode { node, transform } => self.move_node(*node, transform)?,
@@ -180,7 +183,7 @@ impl Scene {
     }
 
     /// Where a node that is to be added would be; an error when it cannot be there.
-    fn check_addition(
+    pub(super) fn check_addition(
         &self,
         what: &str,
         parent: Option<NodeId>,
@@ -224,22 +227,51 @@ impl Scene {
                 let node = Node { parent, parent_from_node: trs, mesh, weights, ..Node::default() };
                 self.nodes.attach(id, node);
             }
-            InstanceSource::File(file) => {
-                let fail = |fault| EditError::File { file: file.clone(), fault };
-                let found = self.find_model(file).map_err(fail)?;
-                let asset = self.asset(&found);
-                self.check_room(id, asset.nodes.len() + 1, asset.size() + 1)?;
-                if !asset.fits(world) {
-                    let (what, why) =
-                        ("the instance".into(), "it would be out of the world".into());
-                    return Err(EditError::Senseless { what, why });
-                }
-                let model = self.take_model(found, id);
-                self.place_below(model, id, parent, trs);
-                self.pose_new_copy(model, id.0 + 1);
-            }
+            InstanceSource::File(file) => self.add_file(id, file, parent, (trs, world))?,
         }
         Ok(())
+    }
+
+    fn add_file(
+        &mut self,
+        id: NodeId,
+        file: &str,
+        parent: Option<NodeId>,
+        (trs, world): (Trs, Affine3A),
+    ) -> Result<(), EditError> {
+        let fail = |fault| EditError::File { file: file.to_owned(), fault };
+        let name = self.file_name(file).map_err(fail)?;
+        let known = self.models[1..].iter().position(|model| model.name == name);
+        let model = match known {
+            Some(known) => {
+                let asset = self.models[known + 1].asset.clone();
+                self.check_file(id, &asset, world)?;
+                known + 1
+            }
+            None => {
+                let found = self.find_model(&name).map_err(fail)?;
+                if let Err(error) = self.check_file(id, &found.asset, world) {
+                    self.put_back(&name, found);
+                    return Err(error);
+                }
+                self.take_model(name, found, id)
+            }
+        };
+        self.place_below(model, id, parent, trs);
+        self.pose_new_copy(model, id.0 + 1);
+        Ok(())
+    }
+
+    /// Whether a file's nodes have room in the scene, and places in the world.
+    fn check_file(&self, id: NodeId, asset: &Asset, world: Affine3A) -> Result<(), EditError> {
+        self.check_room(id, asset.nodes.len() + 1, asset.size() + 1)?;
+        match asset.fits(world) {
+            true => Ok(()),
+            false => Err(EditError::Senseless {
+                what: "the instance".into(),
+                why: "it would be out of the world".into(),
+            }),
+        }
     }
 
     fn add_light(
@@ -339,9 +371,10 @@ impl Scene {
             _ => String::new(),
         };
         self.environment = self
-            .load_picture(environment.clone())
+            .with_picture(environment.clone())
             .map_err(|fault| EditError::File { file, fault })?;
         self.environment_replaced = true;
+        self.give_back_pictures();
         Ok(())
     }
 }

@@ -9,16 +9,17 @@ use glam::Affine3A;
 use super::capture::Deformations;
 use super::nodes::{Node, Nodes, PlacedSkin};
 use super::playback::Clock;
+use super::shelf::{FoundModel, Shelf};
 use super::{Model, Scene};
 use crate::asset::{Asset, AssetNode};
 use crate::builtin;
 use crate::error::Fault;
 use crate::gltf::{self, source::Folder};
-use crate::limits::{self, Budget};
+use crate::limits::{Budget, Taken};
 use crate::origin::{self, Lump};
 use crate::settings::{self, Settings};
 use crate::trs::{Trs, is_in_world};
-use crate::{Environment, HdrImage, MaterialId, MeshId, NodeId, SceneError, hdr};
+use crate::{Environment, MaterialId, MeshId, NodeId, SceneError};
 
 impl Scene {
     /// Opens a file (.gltf or .glb), or, where there is none of that name, a built-in scene.
@@ -55,13 +56,14 @@ impl Scene {
         };
         let (file, folder, asset) = read().map_err(|fault: Fault| fault.of(path))?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let mut scene = Self::of(short_name(&stem), file, asset, Some(folder), budget);
+        let taken = budget.taken();
+        let mut scene = Self::of(short_name(&stem), file, (asset, taken), Some(folder));
         scene.check().map_err(|fault| fault.of(path))?;
         if let Some((settings_path, settings)) = settings::beside(path)? {
             scene.settle(settings).map_err(|fault| fault.of(settings_path))?;
         }
         let environment = scene.environment.clone();
-        scene.environment = scene.load_picture(environment).map_err(|fault| fault.of(path))?;
+        scene.light_by(environment).map_err(|fault| fault.of(path))?;
         Ok(scene)
     }
 
@@ -74,10 +76,11 @@ impl Scene {
         let budget = Budget::default();
         let read = || {
             let asset = gltf::read_bytes(&file, bytes.into(), &budget)?;
-            let mut scene = Self::of(short_name(name), file.clone(), asset, None, budget);
+            let taken = budget.taken();
+            let mut scene = Self::of(short_name(name), file.clone(), (asset, taken), None);
             scene.check()?;
             let environment = scene.environment.clone();
-            scene.environment = scene.load_picture(environment)?;
+            scene.light_by(environment)?;
             Ok(scene)
         };
         read().map_err(|fault: Fault| fault.of(&file))
@@ -98,16 +101,15 @@ impl Scene {
     fn of(
         name: String,
         file: String,
-        asset: Asset,
+        (asset, taken): (Asset, Taken),
         folder: Option<Folder>,
-        budget: Budget,
     ) -> Self {
         let asset = Arc::new(asset);
-        let mut scene = Self::empty(name, folder, budget);
+        let mut scene = Self::empty(name, folder);
         let mut said = std::collections::BTreeSet::new();
         let warnings = asset.warnings.iter().filter(|warning| said.insert(*warning));
         scene.warnings = warnings.cloned().collect();
-        scene.register(file, asset.clone(), None);
+        scene.register(file, FoundModel { asset: asset.clone(), taken }, None);
         scene.place(0, 0);
         for root in &asset.roots {
             scene.nodes.add_root(NodeId(*root));
@@ -147,7 +149,7 @@ impl Scene {
         Lump::around(joints.map(|joint| self.nodes.place_of(joint).translation))
     }
 
-    fn empty(name: String, folder: Option<Folder>, budget: Budget) -> Self {
+    fn empty(name: String, folder: Option<Folder>) -> Self {
         Self {
             name,
             folder,
@@ -156,7 +158,7 @@ impl Scene {
             models: Vec::new(),
             library: BTreeMap::new(),
             pictures: BTreeMap::new(),
-            budget,
+            shelf: Shelf::default(),
             nodes: Nodes::default(),
             meshes: Vec::new(),
             materials: Vec::new(),
@@ -181,7 +183,7 @@ impl Scene {
     /// Takes over what a file beside the scene says.
     fn settle(&mut self, settings: Settings) -> Result<(), Fault> {
         if let Some(environment) = settings.environment {
-            self.environment = self.load_picture(environment)?;
+            self.light_by(environment)?;
             self.environment_replaced = true;
         }
         if !settings.volumes.is_empty() {
@@ -190,78 +192,37 @@ impl Scene {
         Ok(())
     }
 
-    /// Fills in the picture of an environment that has one.
-    pub(super) fn load_picture(&mut self, environment: Environment) -> Result<Environment, Fault> {
-        let Environment::Image { uri, intensity, rotation, .. } = environment else {
-            return Ok(environment);
-        };
-        let image = Some(self.picture(&uri)?);
-        Ok(Environment::Image { uri, intensity, rotation, image })
+    /// Takes an environment of its files, whose picture is read first.
+    fn light_by(&mut self, environment: Environment) -> Result<(), Fault> {
+        self.read_now(self.picture_to_read(&environment));
+        self.environment = self.with_picture(environment)?;
+        Ok(())
     }
 
-    fn picture(&mut self, uri: &str) -> Result<Arc<HdrImage>, Fault> {
-        if let Some(picture) = self.pictures.get(uri) {
-            return Ok(picture.clone());
+    /// Adds a file to the scene's models; from now on it counts as part of the scene.
+    pub(super) fn take_model(
+        &mut self,
+        name: String,
+        mut found: FoundModel,
+        added_as: NodeId,
+    ) -> usize {
+        for warning in &found.asset.warnings {
+            tracing::warn!("{name}: {warning}");
         }
-        let folder = self.folder.as_ref().ok_or_else(|| Fault::Outside { uri: uri.into() })?;
-        let budget = self.budget.clone();
-        let (picture, repaired) = hdr::read(folder, uri, &budget)?;
-        self.budget = budget;
-        if repaired > 0 {
-            let warning = format!("{uri}: {repaired} texels were negative or not finite");
-            tracing::warn!("{warning}");
-            self.warnings.push(warning);
+        let first = self.materials.len() as u32;
+        if found.asset.first_material != first {
+            Arc::make_mut(&mut found.asset).number_materials(first);
         }
-        self.pictures.insert(uri.to_owned(), picture.clone());
-        Ok(picture)
-    }
-
-    /// Finds a file in the scene's folder among the models, or reads it. Changes nothing yet.
-    pub(super) fn find_model(&self, uri: &str) -> Result<Found, Fault> {
-        let folder = self.folder.as_ref().ok_or_else(|| Fault::Outside { uri: uri.into() })?;
-        let (name, path) = folder.resolve(uri)?;
-        if let Some(known) = self.models[1..].iter().position(|m| m.name == name) {
-            return Ok(Found::Model(known + 1));
-        }
-        if self.models.len() > limits::FILES {
-            let limit = limits::FILES as u64;
-            return Err(Fault::TooLarge { what: "files added".into(), limit });
-        }
-        let budget = self.budget.clone();
-        let asset = match self.library.get(&name) {
-            Some(asset) => asset.clone(),
-            None => {
-                let mut asset = gltf::read_file(&path, &name, folder, &budget)?;
-                asset.number_materials(self.materials.len() as u32);
-                Arc::new(asset)
-            }
-        };
-        Ok(Found::New { name, asset, budget })
-    }
-
-    /// The model of a file that was found; from now on it counts as part of the scene.
-    pub(super) fn take_model(&mut self, found: Found, added_as: NodeId) -> usize {
-        match found {
-            Found::Model(model) => model,
-            Found::New { name, asset, budget } => {
-                self.budget = budget;
-                for warning in &asset.warnings {
-                    tracing::warn!("{name}: {warning}");
-                }
-                self.register(name, asset, Some(added_as))
-            }
-        }
-    }
-
-    pub(super) fn asset<'a>(&'a self, found: &'a Found) -> &'a Asset {
-        match found {
-            Found::Model(model) => &self.models[*model].asset,
-            Found::New { asset, .. } => asset,
-        }
+        self.register(name, found, Some(added_as))
     }
 
     /// Gives a file's meshes, materials and animations their numbers.
-    fn register(&mut self, name: String, asset: Arc<Asset>, added_as: Option<NodeId>) -> usize {
+    fn register(
+        &mut self,
+        name: String,
+        FoundModel { asset, taken }: FoundModel,
+        added_as: Option<NodeId>,
+    ) -> usize {
         let (first_mesh, first_animation) = (self.meshes.len() as u32, self.clocks.len() as u32);
         self.meshes.extend_from_slice(&asset.meshes);
         self.materials.extend_from_slice(&asset.materials);
@@ -269,7 +230,15 @@ impl Scene {
         let clocks = std::iter::repeat_n(Clock::starting(self.time), asset.animations.len());
         self.clocks.extend(clocks);
         let copies = Vec::new();
-        self.models.push(Model { name, asset, first_mesh, first_animation, copies, added_as });
+        self.models.push(Model {
+            name,
+            asset,
+            taken,
+            first_mesh,
+            first_animation,
+            copies,
+            added_as,
+        });
         self.models.len() - 1
     }
 
@@ -326,28 +295,23 @@ impl Scene {
     #[must_use]
     pub fn pristine(&self, time: f64) -> Self {
         let main = &self.models[0];
-        let mut scene = Self::empty(self.name.clone(), self.folder.clone(), self.budget.clone());
-        scene.library =
-            self.models[1..].iter().map(|m| (m.name.clone(), m.asset.clone())).collect();
+        let mut scene = Self::empty(self.name.clone(), self.folder.clone());
+        let known = |model: &Model| (model.name.clone(), (model.asset.clone(), model.taken));
+        scene.library = self.models[1..].iter().map(known).collect();
         scene.pictures.clone_from(&self.pictures);
-        scene.register(main.name.clone(), main.asset.clone(), None);
+        let found = FoundModel { asset: main.asset.clone(), taken: main.taken };
+        scene.register(main.name.clone(), found, None);
         scene.place(0, 0);
         main.asset.roots.iter().for_each(|root| scene.nodes.add_root(NodeId(*root)));
-        scene.environment = main.asset.settings.environment.clone().unwrap_or_default();
+        let environment = main.asset.settings.environment.clone().unwrap_or_default();
+        // Its file was loaded with it; where another took its place, nobody asks for this one.
+        scene.environment = scene.with_picture(environment.clone()).unwrap_or(environment);
         scene.volumes.clone_from(&self.volumes);
         scene.nodes.set_origin(self.nodes.origin());
         scene.time = time;
         scene.play();
         scene
     }
-}
-
-/// A glTF file to be added.
-pub(super) enum Found {
-    /// One that was added before.
-    Model(usize),
-    /// One that is new, and the budget with it.
-    New { name: String, asset: Arc<Asset>, budget: Budget },
 }
 
 fn is_skinned(asset: &Asset, node: &AssetNode) -> bool {
@@ -383,13 +347,14 @@ impl Asset {
         true
     }
 
-    /// Makes meshes name materials by their numbers in the scene.
+    /// Makes meshes name materials by their numbers in a scene whose next number is `first`.
     fn number_materials(&mut self, first: u32) {
         for mesh in &mut self.meshes {
             for primitive in &mut Arc::make_mut(mesh).primitives {
-                primitive.material = MaterialId(primitive.material.0 + first);
+                primitive.material = MaterialId(primitive.material.0 - self.first_material + first);
             }
         }
+        self.first_material = first;
     }
 }
 

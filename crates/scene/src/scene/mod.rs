@@ -6,6 +6,7 @@ mod load;
 mod nodes;
 mod playback;
 mod replay;
+mod shelf;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,14 +17,16 @@ pub use apply::EditError;
 use capture::Deformations;
 use nodes::{Node, Nodes};
 use playback::Clock;
+pub use shelf::{FileRead, FileToRead};
+use shelf::{Picture, Shelf};
 
 use crate::animation::Property;
 use crate::asset::{Asset, Camera, SceneFile};
 use crate::gltf::source::Folder;
-use crate::limits::Budget;
+use crate::limits::Taken;
 use crate::trs::Trs;
 use crate::{
-    Aabb, AnimationId, Environment, FileContents, HdrImage, Light, Material, Mesh, MeshId,
+    Aabb, AnimationId, Environment, FileContents, Light, Material, Mesh, MeshId,
     NamedView, NodeId, Snapshot, Transform, View, VolumeSpec,
 };
 
@@ -37,11 +40,12 @@ pub struct Scene {
     warnings: Vec<String>,
     /// The scene's own file and the files that edits have added, in order.
     models: Vec<Model>,
-    /// Files read before, to be added without reading them again.
-    library: BTreeMap<String, Arc<Asset>>,
-    /// Pictures of environments, by name.
-    pictures: BTreeMap<String, Arc<HdrImage>>,
-    budget: Budget,
+    /// Files of another copy of this scene, to be added without reading them again.
+    library: BTreeMap<String, (Arc<Asset>, Taken)>,
+    /// Pictures of the environment, and of the one that the scene's file has, by name.
+    pictures: BTreeMap<String, Picture>,
+    /// What has been read and is not shown.
+    shelf: Shelf,
     nodes: Nodes,
     meshes: Vec<Arc<Mesh>>,
     materials: Vec<Material>,
@@ -63,6 +67,7 @@ struct Model {
     /// Name within the scene's folder.
     name: String,
     asset: Arc<Asset>,
+    taken: Taken,
     first_mesh: u32,
     first_animation: u32,
     /// For each copy in the scene, the number of the node that is the file's node 0.

@@ -9,6 +9,7 @@ mod files;
 mod geometry;
 mod mended;
 mod replay;
+mod shelf;
 
 use serde_json::{Value, json};
 
