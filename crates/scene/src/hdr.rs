@@ -20,9 +20,8 @@ pub(crate) fn read(
     folder: &Folder,
     budget: &Budget,
 ) -> Result<(Arc<HdrImage>, usize), Fault> {
-    let bytes = folder
-        .read_file(path)
-        .map_err(|source| Fault::Missing { uri: shorten(name), source })?;
+    let bytes =
+        folder.read_file(path).map_err(|source| Fault::Missing { uri: shorten(name), source })?;
     let fail = |reason: String| Fault::Image { name: name.to_owned(), reason };
     let reader = || {
         let mut reader = ImageReader::new(Cursor::new(&bytes))

@@ -1,7 +1,7 @@
 //! Edits on their way in: order, duplicates and limits, a client each. No socket and no clock: the
 //! caller passes bytes and time in.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use lumencast_codec::{ClientEdit, RefusedEdit, limits};
 use lumencast_scene::Edit;
@@ -175,14 +175,31 @@ impl Inbox {
     /// What there is for a tick at `now` seconds, in the order in which it came. What is over the
     /// limits of a tick stays for the next.
     pub fn take(&mut self, now: f64) -> Mail {
+        self.take_ready(now, |_| true)
+    }
+
+    /// The same, but for edits that are not ready; those stay, and with them what the same client has
+    /// sent since.
+    pub fn take_ready(&mut self, now: f64, mut is_ready: impl FnMut(&Edit) -> bool) -> Mail {
+        let (mut edits, mut kept, mut waiting) = (Vec::new(), Vec::new(), BTreeSet::new());
         let mut room = MAX_BYTES_A_TICK;
-        let fits = |(_, bytes): &&(Received, usize)| {
-            let taken = room.checked_sub(*bytes);
-            room = taken.unwrap_or(0);
-            taken.is_some()
-        };
-        let count = self.pending.iter().take(MAX_EDITS_A_TICK).take_while(fits).count();
-        let edits: Vec<Received> = self.pending.drain(..count).map(|(edit, _)| edit).collect();
+        let mut pending = std::mem::take(&mut self.pending).into_iter();
+        for (received, bytes) in pending.by_ref() {
+            if waiting.contains(&received.client) || !is_ready(&received.edit) {
+                waiting.insert(received.client.clone());
+                kept.push((received, bytes));
+                continue;
+            }
+            let left = room.checked_sub(bytes).filter(|_| edits.len() < MAX_EDITS_A_TICK);
+            let Some(left) = left else {
+                kept.push((received, bytes));
+                break;
+            };
+            room = left;
+            edits.push(received);
+        }
+        kept.extend(pending);
+        self.pending = kept;
         for received in &edits {
             if let Some(mailbox) = self.clients.get_mut(&received.client) {
                 mailbox.pending -= 1;
@@ -343,6 +360,33 @@ mod tests {
         assert_eq!(mail.acks["a"], MAX_EDITS_A_TICK as u64);
         let mail = inbox.take(0.0);
         assert_eq!((mail.edits.len(), mail.acks["a"]), (10, many));
+    }
+
+    /// A client's edits keep their order; others' go on.
+    #[test]
+    fn who_waits_for_a_file_waits_alone() {
+        let mut inbox = Inbox::new(Limits::default());
+        for (client, seq) in [("a", 1), ("a", 2), ("b", 1), ("a", 3), ("b", 2)] {
+            assert_eq!(inbox.receive(client, &frame(seq), 0.0), Verdict::Taken);
+        }
+        let of_node =
+            |edit: &Edit, number| matches!(edit, Edit::RemoveNode { node } if node.0 == number);
+        let mut asked = 0;
+        let mut take = |blocked: u32| {
+            let mail = inbox.take_ready(0.0, |edit| {
+                asked += 1;
+                !of_node(edit, blocked)
+            });
+            let edits = mail.edits.into_iter().map(|r| format!("{}{}", r.client, r.seq));
+            (edits.collect::<Vec<_>>().join(" "), mail.acks)
+        };
+        assert_eq!(take(1), (String::new(), BTreeMap::new()), "both are blocked by their first");
+        assert_eq!(
+            take(3),
+            ("a1 a2 b1 b2".into(), BTreeMap::from([("a".into(), 2), ("b".into(), 2)]))
+        );
+        assert_eq!(take(0).0, "a3");
+        assert_eq!(asked, 2 + 5 + 1, "what comes after is not looked at");
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod field;
 mod files;
 mod http;
 mod inbox;
+mod loader;
 mod metrics;
 mod noise;
 mod open_file;

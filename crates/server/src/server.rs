@@ -16,6 +16,7 @@ use crate::error::ServerError;
 use crate::files::{Contents, FileSet};
 use crate::http::{self, Shared, Ticked};
 use crate::inbox::{Inbox, Limits};
+use crate::loader::Loader;
 use crate::metrics::Metrics;
 use crate::pace::Beat;
 use crate::page;
@@ -116,19 +117,18 @@ impl Server {
         let collector =
             tokio::spawn(edits::collect(network.announced(&prefix)?, inbox.clone(), clock));
 
+        let start_error = |error: std::io::Error| ServerError::Stopped(error.to_string());
+        let mut loader = Loader::start().map_err(start_error)?;
         let stopping = Arc::new(AtomicBool::new(false));
         let (ended, mut wait_ended) = tokio::sync::oneshot::channel();
         let thread = {
             let (stopping, shared) = (stopping.clone(), shared.clone());
             let body = move || {
-                beat(tick, publisher, &shared, &inbox, clock, &stopping);
+                beat(tick, publisher, &mut loader, &shared, &inbox, clock, &stopping);
                 // Nobody listens any more if the server is stopping.
                 let _ = ended.send(());
             };
-            thread::Builder::new()
-                .name("tick".into())
-                .spawn(body)
-                .map_err(|e| ServerError::Stopped(e.to_string()))?
+            thread::Builder::new().name("tick".into()).spawn(body).map_err(start_error)?
         };
 
         let mut counting = tokio::time::interval(Duration::from_secs(1));
@@ -156,6 +156,7 @@ impl Server {
 fn beat(
     mut tick: Tick,
     mut publisher: Publisher,
+    loader: &mut Loader,
     shared: &Shared,
     inbox: &Mutex<Inbox>,
     clock: Instant,
@@ -172,7 +173,11 @@ fn beat(
         }
         let started = now();
         beat.start(started);
-        let mail = inbox.lock().unwrap_or_else(PoisonError::into_inner).take(started);
+        loader.deliver(&mut tick);
+        let mail = inbox
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take_ready(started, |edit| loader.is_ready(&tick, edit));
         shared.tick.store(tick.number(), Ordering::Relaxed);
         let report = tick.step(started, mail, &mut publisher);
         // With the log's time, from which pages measure the way to them.

@@ -11,7 +11,9 @@ use lumencast_codec::{
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::{Gather, Ticket};
 use lumencast_light::{LightField, Offset, ProbeVolume};
-use lumencast_scene::{Edit, Environment, InstanceSource, Scene, Script, Snapshot, VolumeSpec};
+use lumencast_scene::{
+    Edit, Environment, FileRead, InstanceSource, Scene, Script, Snapshot, VolumeSpec,
+};
 
 use crate::error::ServerError;
 use crate::field::{Brought, Field, publish};
@@ -196,6 +198,11 @@ impl Tick {
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Takes in a file that an edit names ([`Scene::take_in`]), so that a tick need not read it.
+    pub fn take_in(&mut self, file: FileRead) {
+        self.scene.take_in(file);
     }
 
     /// The light as it was last published, a volume each.

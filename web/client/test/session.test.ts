@@ -320,6 +320,21 @@ describe('edits', () => {
     expect(session.pending).toEqual([]);
   });
 
+  it('wait longer while the server may be reading a file', async () => {
+    const { net, server, session } = await joined();
+    const before = session.edit(MOVE);
+    const add = session.edit({ edit: 'add_instance', source: { file: 'large.glb' } });
+    const after = session.edit(MOVE);
+    before.catch(() => {});
+    await run(net, server, 20);
+    await expect(before).rejects.toMatchObject({ kind: 'unanswered' });
+    expect(session.pending.map(({ edit }) => edit)).toEqual(['add_instance', 'move_node']);
+    server.accept({ edit: 'add_instance', source: { file: 'large.glb' }, node: 9 }, session.client, 2);
+    server.accept(MOVE, session.client, 3);
+    net.link.tick(server);
+    await Promise.all([add, after]);
+  });
+
   it('reject when the session is closed', async () => {
     const { session, net } = await joined();
     const edit = session.edit(MOVE);

@@ -74,12 +74,15 @@ impl FileToRead {
         let read = match kind {
             Kind::Model => gltf::read_file(&path, &name, &folder, &budget)
                 .map(|asset| Contents::Model(Arc::new(asset))),
-            Kind::Picture => hdr::read(&path, &name, &folder, &budget).map(|(picture, repaired)| {
-                if repaired > 0 {
-                    warnings.push(format!("{name}: {repaired} texels were negative or not finite"));
-                }
-                Contents::Picture(picture)
-            }),
+            Kind::Picture => {
+                hdr::read(&path, &name, &folder, &budget).map(|(picture, repaired)| {
+                    if repaired > 0 {
+                        warnings
+                            .push(format!("{name}: {repaired} texels were negative or not finite"));
+                    }
+                    Contents::Picture(picture)
+                })
+            }
         };
         let contents = read.map(|contents| (contents, budget.taken() - before));
         FileRead { kind, name, stamp, contents, warnings }

@@ -6,6 +6,8 @@ import type { Edit } from '../edit.js';
 const RESEND = 3;
 /** Seconds without an answer after which an edit is given up. */
 const GIVE_UP = 10;
+/** The same while the server may be reading a file that an edit names; later edits wait with it. */
+const GIVE_UP_READING = 120;
 
 interface Waiting {
   readonly resolve: () => void;
@@ -49,10 +51,12 @@ export class Outbox {
   /** To be called now and then while the server's ticks arrive. */
   check(now: number): void {
     if (!this.send || this.waiting.size === 0) return;
+    const reading = this.cache.pending.find(({ edit }) => namesFile(edit));
     for (const [seq, { sent }] of this.waiting) {
-      if (sent === undefined || now - sent < GIVE_UP) continue;
+      const limit = reading && seq >= reading.seq ? GIVE_UP_READING : GIVE_UP;
+      if (sent === undefined || now - sent < limit) continue;
       this.cache.abandon(seq);
-      const reason = `the server gave no answer for ${GIVE_UP} s; it may need a token for edits`;
+      const reason = `the server gave no answer for ${limit} s; it may need a token for edits`;
       this.settle(seq, (waiting) => waiting.reject(new EditError('unanswered', reason)));
     }
     if (now - this.lastSent >= RESEND) this.sendAll(now);
@@ -97,4 +101,9 @@ export class Outbox {
     this.waiting.delete(seq);
     how(waiting);
   }
+}
+
+function namesFile(edit: Edit): boolean {
+  if (edit.edit === 'add_instance') return 'file' in edit.source;
+  return edit.edit === 'set_environment' && edit.environment.type === 'image';
 }
