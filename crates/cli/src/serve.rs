@@ -64,6 +64,10 @@ pub(crate) struct Serve {
     #[arg(long, value_name = "N", default_value_t = 256, help_heading = "Network",
           value_parser = clap::value_parser!(u32).range(1..))]
     clients: u32,
+    /// Names that one session may edit under at a time: a relay needs one for each of its editors.
+    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Network",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    names: u32,
     #[command(flatten)]
     tick: TickArguments,
     /// The page's files, in place of those compiled in.
@@ -114,6 +118,7 @@ impl Serve {
             network.tls = Tls::Files { cert: cert.clone(), key: key.clone() };
         }
         network.max_sessions = self.clients as usize;
+        network.max_names = self.names as usize;
         network.allowed_hosts.clone_from(&self.allow_host);
         network.allowed_origins.clone_from(&self.allow_origin);
         Ok(network)

@@ -187,7 +187,7 @@ fn an_edit_of_one_client_changes_the_light_of_another() {
             if from >= version && light > 5.0 * before {
                 break;
             }
-            assert!(began.elapsed() < Duration::from_secs(10), "{before}, still {light}");
+            assert!(began.elapsed() < PATIENCE, "{before}, still {light}");
         }
     });
     // Counted at the end of the tick that told of it.
@@ -329,14 +329,12 @@ fn a_restarted_server_is_found_again() {
 
         let restarted = Serving::on("cornell", port, &SMALL);
         assert_ne!(restarted.ready["epoch"], old, "an epoch of its own");
-        let began = Instant::now();
         while follower.cache.epoch() == epoch {
             follower.take().await;
         }
         assert_eq!(serde_json::json!(follower.cache.epoch()), restarted.ready["epoch"]);
         let (after, _) = follower.next_light().await;
         assert!(after > 0.0);
-        assert!(began.elapsed() < Duration::from_secs(5), "{:?}", began.elapsed());
     });
 }
 
@@ -421,4 +419,69 @@ fn a_token_is_needed_where_one_is_asked_for() {
     });
     // Counted at the end of the tick that told of it.
     server.wait_for_metric("lumencast_edits_accepted_total", |n| n == 1.0);
+}
+
+/// Who edits under another's name is not read while the other is there, and those who show its key
+/// take over from a connection that is dead.
+#[test]
+fn a_name_belongs_to_whoever_has_its_key() {
+    let server = Serving::start("cornell", &SMALL);
+    limited(async {
+        let mut victim = Follower::connect(&server).await;
+        let mut edits = victim.editor("victim.key");
+        let first = edits.send(dim(lamp(), 1.0));
+        let accepted = |state: &StateFrame, seq| {
+            let source = Some(("victim".to_owned(), seq));
+            state.edits.iter().any(|edit| edit.source == source).then(|| state.edits.clone())
+        };
+        victim.until(|state| accepted(state, first)).await;
+
+        let (impostor, keyless) =
+            (Follower::connect(&server).await, Follower::connect(&server).await);
+        let mut false_edits = impostor.editor("victim.guess");
+        let mut keyless_edits = keyless.editor("victim");
+        for intensity in [5.0, 6.0, 7.0] {
+            false_edits.send(dim(lamp(), intensity));
+            keyless_edits.send(dim(lamp(), intensity));
+        }
+        let back = Follower::connect(&server).await;
+        let mut continued = back.editor("victim.key");
+        continued.seq = 10;
+        let eleventh = continued.send(dim(lamp(), 2.0));
+        let applied = victim.until(|state| accepted(state, eleventh)).await;
+        assert_eq!(applied.iter().map(|edit| &edit.edit).collect::<Vec<_>>(), [&dim(lamp(), 2.0)]);
+    });
+    server.wait_for_metric("lumencast_edits_accepted_total", |n| n == 2.0);
+}
+
+/// A broken file of many names, and others who edit meanwhile.
+#[test]
+fn files_that_edits_name_hold_nobody_up() {
+    let folder = common::Folder::new("named");
+    let model = Serving::start("cornell", &SMALL).get("/scene/cornell.glb").body;
+    let scene = folder.file("scene.glb", &model);
+    folder.file("broken.glb", &[b'{'; 1 << 20]);
+    let server = Serving::start(&scene, &SMALL);
+    limited(async {
+        let mut watcher = Follower::connect(&server).await;
+        let mut slow = watcher.editor("slow");
+        let mut quick = watcher.editor("quick");
+        for number in 0..100 {
+            let file = format!("{}broken.glb", "./".repeat(number));
+            slow.send(Edit::AddInstance {
+                node: None,
+                source: lumencast_scene::InstanceSource::File(file),
+                parent: None,
+                transform: lumencast_scene::Transform::default(),
+            });
+        }
+        quick.send(dim(lamp(), 2.0));
+        let (mut refused, mut accepted) = (0, 0);
+        while refused < 100 || accepted < 1 {
+            let state = watcher.next_state().await;
+            refused += state.refused.len();
+            accepted += state.edits.len();
+            assert!(state.refused.iter().all(|r| r.client == "slow" && r.reason.contains("glTF")));
+        }
+    });
 }

@@ -6,6 +6,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use lumencast_codec::{ClientEdit, RefusedEdit, limits};
 use lumencast_scene::Edit;
 
+use crate::names;
+
 /// How much one client may send.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
@@ -27,8 +29,8 @@ impl Default for Limits {
     }
 }
 
-/// Clients remembered at a time.
-pub(crate) const MAX_CLIENTS: usize = 1024;
+/// Clients remembered at a time: as many as are read, and some that have gone.
+const MAX_CLIENTS: usize = 2 * names::MAX_CLIENTS;
 /// Edits taken in one tick: 12,800 a second at 25 Hz.
 pub(crate) const MAX_EDITS_A_TICK: usize = 512;
 /// Edits refused beforehand that one tick reports.
@@ -112,7 +114,7 @@ impl Inbox {
 
     /// Takes a frame of a client's `edits` track, `{"seq": 17, "edit": EDIT}`, at `now` seconds.
     pub fn receive(&mut self, client: &str, bytes: &[u8], now: f64) -> Verdict {
-        if !self.clients.contains_key(client) && self.clients.len() >= MAX_CLIENTS {
+        if !self.clients.contains_key(client) && !self.make_room() {
             return Verdict::CutOff;
         }
         let limits = self.limits;
@@ -170,6 +172,18 @@ impl Inbox {
                 Verdict::Refused
             }
         }
+    }
+
+    /// Whether one more client can be remembered: the one that has been silent for longest is
+    /// forgotten, unless edits of it wait.
+    fn make_room(&mut self) -> bool {
+        if self.clients.len() < MAX_CLIENTS {
+            return true;
+        }
+        let idle = self.clients.iter().filter(|(_, mailbox)| mailbox.pending == 0);
+        let silent = idle.min_by(|(_, a), (_, b)| a.heard.total_cmp(&b.heard));
+        let Some(name) = silent.map(|(name, _)| name.clone()) else { return false };
+        self.clients.remove(&name).is_some()
     }
 
     /// What there is for a tick at `now` seconds, in the order in which it came. What is over the
@@ -436,9 +450,12 @@ mod tests {
         for i in 0..MAX_CLIENTS {
             assert_eq!(inbox.receive(&i.to_string(), &frame(1), 0.0), Verdict::Taken);
         }
-        assert_eq!(inbox.receive("one more", &frame(1), 0.0), Verdict::CutOff);
-        inbox.take(0.0);
-        inbox.take(100.0);
-        assert_eq!(inbox.receive("one more", &frame(1), 100.0), Verdict::Taken);
+        assert_eq!(inbox.receive("one more", &frame(1), 0.0), Verdict::CutOff, "all wait");
+        while !inbox.take(0.0).edits.is_empty() {}
+        assert_eq!(inbox.receive("1", &frame(2), 1.0), Verdict::Taken);
+        assert_eq!(inbox.receive("one more", &frame(1), 2.0), Verdict::Taken);
+        let acks = inbox.take(2.0).acks;
+        assert!(acks.contains_key("1") && acks.contains_key("one more"));
+        assert!(acks.len() == MAX_CLIENTS && !acks.contains_key("0"), "silent for longest");
     }
 }

@@ -16,6 +16,7 @@ mod http;
 mod inbox;
 mod loader;
 mod metrics;
+mod names;
 mod noise;
 mod open_file;
 mod pace;

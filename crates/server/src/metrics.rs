@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use lumencast_transport::{RefusalKind, Refusals};
+
 use crate::report::{Report, Stage};
 
 /// Upper bounds of the histograms' buckets, seconds: around the period of 25 Hz and its share.
@@ -27,6 +29,7 @@ struct Counted {
     refused: u64,
     track_bytes: BTreeMap<String, u64>,
     clients: u64,
+    refusals: [u64; RefusalKind::ALL.len()],
     probes: u64,
     buried: u64,
     samples_a_probe: u32,
@@ -78,9 +81,11 @@ impl Metrics {
         }
     }
 
-    /// Sets the number of clients connected now.
-    pub fn set_clients(&self, clients: usize) {
-        self.lock().clients = clients as u64;
+    /// Sets the number of clients connected now, and of those who were refused.
+    pub fn set_network(&self, clients: usize, refusals: &Refusals) {
+        let mut c = self.lock();
+        c.clients = clients as u64;
+        c.refusals = RefusalKind::ALL.map(|kind| refusals.of(kind));
     }
 
     /// The text format of Prometheus, version 0.0.4.
@@ -112,6 +117,14 @@ impl Metrics {
         for (name, kind, help, value) in scalars {
             let _ = writeln!(out, "# HELP lumencast_{name} {help}");
             let _ = writeln!(out, "# TYPE lumencast_{name} {kind}\nlumencast_{name} {value}");
+        }
+        out.push_str(
+            "# HELP lumencast_refusals_total Connections, requests and sessions refused.\n",
+        );
+        out.push_str("# TYPE lumencast_refusals_total counter\n");
+        for (kind, count) in RefusalKind::ALL.iter().zip(c.refusals) {
+            let kind = kind.name();
+            let _ = writeln!(out, "lumencast_refusals_total{{kind=\"{kind}\"}} {count}");
         }
         out.push_str("# HELP lumencast_track_bytes_total Bytes published by track.\n");
         out.push_str("# TYPE lumencast_track_bytes_total counter\n");
@@ -169,6 +182,7 @@ mod tests {
             "lumencast_tick_seconds_sum 0.515",
             "lumencast_stage_seconds_bucket{stage=\"gather\",le=\"+Inf\"} 2",
             "lumencast_stage_seconds_count{stage=\"encode\"} 2",
+            "lumencast_refusals_total{kind=\"origin\"} 0",
             "lumencast_track_bytes_total{track=\"f0/r0/l0\"} 42",
         ] {
             assert!(text.lines().any(|l| l == line), "missing: {line}\n{text}");

@@ -137,7 +137,9 @@ impl Server {
             tokio::select! {
                 () = &mut stop => break,
                 _ = &mut wait_ended => break,
-                _ = counting.tick() => shared.metrics.set_clients(network.sessions()),
+                _ = counting.tick() => {
+                    shared.metrics.set_network(network.sessions(), &network.refusals());
+                }
             }
         }
         stopping.store(true, Ordering::Relaxed);

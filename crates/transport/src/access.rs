@@ -5,12 +5,13 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, SystemTime};
 
 use moq_auth::{Algorithm, Claims, Grant, Pattern, Patterns, Request, lease};
 use moq_relay::auth::{Admission, Admissions};
 
+use crate::refusals::{RefusalKind, Refusals};
 use crate::{Error, Result};
 
 /// What anyone may read: the server's own broadcasts.
@@ -84,17 +85,17 @@ fn key_error(err: impl std::fmt::Display) -> Error {
     Error::Key(err.to_string())
 }
 
-/// How many sessions are open, out of how many allowed, and how often somebody was refused.
+/// How many sessions are open, out of how many allowed, and who was refused.
 #[derive(Debug, Clone)]
 pub(crate) struct Sessions {
     open: Arc<AtomicUsize>,
     limit: usize,
-    refusals: Arc<AtomicU64>,
+    pub(crate) refusals: Refusals,
 }
 
 impl Sessions {
     pub(crate) fn new(limit: usize) -> Self {
-        Self { open: Arc::default(), limit, refusals: Arc::default() }
+        Self { open: Arc::default(), limit, refusals: Refusals::default() }
     }
 
     pub(crate) fn count(&self) -> usize {
@@ -103,15 +104,6 @@ impl Sessions {
 
     pub(crate) fn full(&self) -> bool {
         self.count() >= self.limit
-    }
-
-    /// Counts a request that was refused.
-    pub(crate) fn refused(&self) {
-        self.refusals.fetch_add(1, Ordering::Relaxed);
-    }
-
-    pub(crate) fn refusals(&self) -> u64 {
-        self.refusals.load(Ordering::Relaxed)
     }
 
     /// Counts one more session until the ticket is dropped; `None` if that would be too many.
@@ -143,13 +135,13 @@ fn answer(admission: Admission, access: &Access, sessions: &Sessions) {
         Ok(grant) => grant,
         Err(reason) => {
             tracing::info!(remote = ?admission.request.remote, %reason, "session refused");
-            sessions.refused();
+            sessions.refusals.count(RefusalKind::Token);
             return admission.refuse(moq_relay::auth::Error::Refused);
         }
     };
     let Some(ticket) = sessions.admit() else {
         tracing::warn!(limit = sessions.limit, "session refused: too many are open");
-        sessions.refused();
+        sessions.refusals.count(RefusalKind::Sessions);
         return admission.refuse(moq_relay::auth::Error::Unavailable("too many sessions".into()));
     };
     let (producer, consumer) = lease::Producer::new(grant);

@@ -140,7 +140,7 @@ impl Client {
 
     /// The broadcasts that the server shows this client, as they come and go.
     pub fn announced(&self, prefix: &str) -> Result<Announcements> {
-        Announcements::new(&self.remote.consume(), prefix, usize::MAX)
+        Announcements::of_server(&self.remote.consume(), prefix)
     }
 
     /// Whether the client is connected now.

@@ -9,6 +9,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 #[derive(Debug)]
 pub(crate) struct Guests {
     most: usize,
+    /// Whether this machine's own addresses may have all the room there is.
+    at_home: bool,
     there: Mutex<There>,
 }
 
@@ -21,7 +23,21 @@ struct There {
 impl Guests {
     /// Room for so many, at least two.
     pub(crate) fn new(most: usize) -> Arc<Self> {
-        Arc::new(Self { most: most.max(2), there: Mutex::default() })
+        Arc::new(Self { most: most.max(2), at_home: false, there: Mutex::default() })
+    }
+
+    /// Room for so many, of which a loopback address may take all: behind it may be a proxy, and with
+    /// it the world. Others may take at least eight.
+    pub(crate) fn with_proxies(most: usize) -> Arc<Self> {
+        Arc::new(Self { most, at_home: true, there: Mutex::default() })
+    }
+
+    fn most_of(&self, network: IpAddr) -> usize {
+        match self.at_home {
+            true if network.is_loopback() => self.most,
+            true => (self.most / 2).max(8),
+            false => self.most / 2,
+        }
     }
 
     /// One more from an address, until it is dropped; `None` where there is no room.
@@ -29,7 +45,7 @@ impl Guests {
         let network = network(address);
         let mut there = self.there();
         let of = there.of.get(&network).copied().unwrap_or(0);
-        if there.all >= self.most || of >= self.most / 2 {
+        if there.all >= self.most || of >= self.most_of(network) {
             return None;
         }
         there.all += 1;
@@ -68,6 +84,9 @@ impl Drop for Guest {
 fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(ip) => {
+            if ip.is_loopback() {
+                return ip.into();
+            }
             let [a, b, c, d, ..] = ip.segments();
             Ipv6Addr::new(a, b, c, d, 0, 0, 0, 0).into()
         }
@@ -98,5 +117,21 @@ mod tests {
         drop((two, three, four));
         assert_eq!(guests.count(), 0);
         assert!(guests.there().of.is_empty());
+    }
+
+    #[test]
+    fn proxies_may_take_all() {
+        let guests = Guests::with_proxies(20);
+        let enter = |address: &str, times| -> Vec<_> {
+            (0..times).map_while(|_| guests.enter(ip(address))).collect()
+        };
+        let stranger = enter("10.0.0.1", 30);
+        assert_eq!(stranger.len(), 10);
+        assert_eq!(enter("::1", 30).len(), 10, "what is left");
+        drop(stranger);
+        assert_eq!(enter("127.0.0.1", 30).len(), 20);
+        let few = Guests::with_proxies(3);
+        let all: Vec<_> = (0..5).map_while(|_| few.enter(ip("10.0.0.1"))).collect();
+        assert_eq!(all.len(), 3);
     }
 }

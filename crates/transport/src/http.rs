@@ -12,6 +12,7 @@ use tower::ServiceExt as _;
 use crate::guests::Guests;
 use crate::origin_check::{OriginCheck, Refusal};
 use crate::progress::{Patience, Progress, under_way};
+use crate::refusals::RefusalKind;
 use crate::session::Backend;
 use crate::tcp::Peer;
 use crate::tls::Fingerprint;
@@ -43,7 +44,7 @@ impl Front {
     ) -> Response {
         let answering = progress.request();
         let Some(guest) = self.requests.enter(peer.remote.ip()) else {
-            self.backend.sessions.refused();
+            self.backend.sessions.refusals.count(RefusalKind::Requests);
             let again = [(header::RETRY_AFTER, "1")];
             let reason = "too many requests are under way; try again later\n";
             return (StatusCode::SERVICE_UNAVAILABLE, again, reason).into_response();
@@ -52,8 +53,9 @@ impl Front {
     }
 
     async fn checked_answer(self, request: Request, peer: Peer) -> Response {
-        if let Err(reason) = checked(&self.backend.check, &request) {
-            self.backend.refuse(peer.remote, &reason);
+        if let Err(refusal) = checked(&self.backend.check, &request) {
+            let reason = refusal.to_string();
+            self.backend.refuse(refusal.kind(), peer.remote, &reason);
             return (StatusCode::FORBIDDEN, format!("{reason}\n")).into_response();
         }
         if websocket::is_upgrade(request.headers()) {
@@ -81,31 +83,31 @@ impl Front {
     }
 }
 
-fn checked(check: &OriginCheck, request: &Request) -> Result<(), String> {
+fn checked(check: &OriginCheck, request: &Request) -> Result<(), Refusal> {
     let headers = request.headers();
     let host = match single(headers, header::HOST)? {
         Some(host) => Some(host),
         None => request.uri().authority().map(|authority| authority.as_str()),
     };
     let origin = single(headers, header::ORIGIN)?;
-    check.check(host, origin).map_err(|refusal| refusal.to_string())?;
+    check.check(host, origin)?;
     // Browsers send no `Origin` with images, scripts and the like, but say that a page of another
     // site wants them. Following a link is no harm.
     let fetch = |name: &str| headers.get(name).map(|value| value.as_bytes());
     let cross_site = fetch("sec-fetch-site") == Some(b"cross-site");
     if origin.is_none() && cross_site && fetch("sec-fetch-mode") != Some(b"navigate") {
-        return Err(Refusal::CrossSite.to_string());
+        return Err(Refusal::CrossSite);
     }
     Ok(())
 }
 
 /// The value of a header that may occur once.
-fn single(headers: &HeaderMap, name: header::HeaderName) -> Result<Option<&str>, String> {
+fn single(headers: &HeaderMap, name: header::HeaderName) -> Result<Option<&str>, Refusal> {
     let mut values = headers.get_all(&name).iter();
     let value = values.next().map(|value| value.to_str());
     match (value, values.next()) {
         (None, _) => Ok(None),
         (Some(Ok(value)), None) => Ok(Some(value)),
-        _ => Err(format!("the header {name} is not one readable value")),
+        _ => Err(Refusal::Unreadable(name)),
     }
 }

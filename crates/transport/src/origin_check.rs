@@ -8,6 +8,10 @@
 
 use std::net::{IpAddr, SocketAddr};
 
+use axum::http::header::{self, HeaderName};
+
+use crate::refusals::RefusalKind;
+
 /// Why a request is refused; the text is sent to its sender, with status 403.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Refusal {
@@ -23,6 +27,18 @@ pub(crate) enum Refusal {
     ForeignOrigin(String),
     #[error("a page of another site asks without naming its origin")]
     CrossSite,
+    #[error("the header {0} is not one readable value")]
+    Unreadable(HeaderName),
+}
+
+impl Refusal {
+    pub(crate) fn kind(&self) -> RefusalKind {
+        match self {
+            Self::NoHost | Self::ForeignHost(_) => RefusalKind::Host,
+            Self::Unreadable(name) if *name == header::HOST => RefusalKind::Host,
+            Self::ForeignOrigin(_) | Self::CrossSite | Self::Unreadable(_) => RefusalKind::Origin,
+        }
+    }
 }
 
 /// The hosts and origins that one server answers to.

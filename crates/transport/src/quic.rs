@@ -8,10 +8,9 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use axum::http::StatusCode;
-use moq_relay::auth;
 use web_transport_moq::{Request, noq, proto};
 
-use crate::session::{Ask, Backend, Failure, HANDSHAKE};
+use crate::session::{Admitted, Ask, Backend, Failure, HANDSHAKE};
 
 /// How long a refused client may take to hear so.
 const ANSWER: Duration = Duration::from_secs(1);
@@ -37,8 +36,8 @@ async fn connection(incoming: noq::Incoming, backend: Backend) -> Result<(), Fai
         Ok::<_, Failure>(Request::accept(connection).await?)
     });
     let request = request.await??;
-    let lease = match admit(&request, remote, &backend).await {
-        Ok(lease) => lease,
+    let admitted = match admit(&request, remote, &backend).await {
+        Ok(admitted) => admitted,
         Err((status, reason)) => {
             tracing::info!(%remote, %status, %reason, "WebTransport session refused");
             let connection = request.conn().clone();
@@ -54,7 +53,7 @@ async fn connection(incoming: noq::Incoming, backend: Backend) -> Result<(), Fai
         response = response.with_protocol(protocol);
     }
     let transport = request.respond(response).await?;
-    backend.serve(transport, lease).await
+    backend.serve(transport, admitted).await
 }
 
 /// Checks who asks and for what; a refusal comes with its status and reason.
@@ -62,7 +61,7 @@ async fn admit(
     request: &Request,
     remote: SocketAddr,
     backend: &Backend,
-) -> Result<auth::Lease, (StatusCode, String)> {
+) -> Result<Admitted, (StatusCode, String)> {
     let origins: Vec<_> = request.headers.get_all("origin").iter().collect();
     let origin = match origins[..] {
         [] => None,
@@ -71,7 +70,7 @@ async fn admit(
     };
     let host = Some(request.url.authority()).filter(|host| !host.is_empty());
     backend.check.check(host, origin).map_err(|refusal| {
-        backend.refuse(remote, &refusal.to_string());
+        backend.refuse(refusal.kind(), remote, &refusal.to_string());
         (StatusCode::FORBIDDEN, refusal.to_string())
     })?;
     let transport = moq_auth::Transport::Quic;

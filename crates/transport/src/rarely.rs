@@ -5,16 +5,16 @@ use std::time::{Duration, Instant};
 /// The least time from one message to the next of its kind.
 const PAUSE: Duration = Duration::from_secs(10);
 
-/// Counts what is not told.
+/// Counts what happens and tells it every ten seconds at most.
 #[derive(Debug, Default)]
-pub(crate) struct Rarely {
+pub struct Rarely {
     told: Option<Instant>,
     times: u64,
 }
 
 impl Rarely {
     /// Something has happened: how often it has since it was told last, if it is to be told now.
-    pub(crate) fn now(&mut self) -> Option<u64> {
+    pub fn now(&mut self) -> Option<u64> {
         self.times += 1;
         if self.told.is_some_and(|told| told.elapsed() < PAUSE) {
             return None;

@@ -218,8 +218,8 @@ async fn subscribe(
 #[derive(Clone)]
 pub struct RemoteBroadcast {
     path: Arc<str>,
+    session: u64,
     inner: broadcast::Consumer,
-    max_frame: usize,
 }
 
 impl RemoteBroadcast {
@@ -228,9 +228,13 @@ impl RemoteBroadcast {
         &self.path
     }
 
+    /// On a server, the number of the session that publishes it; 0 on a client.
+    pub fn session(&self) -> u64 {
+        self.session
+    }
+
     /// Reads a track until the broadcast ends.
-    pub fn subscribe(&self, track: &str, mut options: ReadOptions) -> TrackReader {
-        options.max_frame = options.max_frame.min(self.max_frame);
+    pub fn subscribe(&self, track: &str, options: ReadOptions) -> TrackReader {
         TrackReader::new(Source::Broadcast(self.inner.clone()), track, options)
     }
 }
@@ -239,8 +243,13 @@ impl RemoteBroadcast {
 pub enum Announcement {
     /// Somebody publishes this.
     Appeared(RemoteBroadcast),
-    /// Nobody publishes this path any more.
-    Gone(String),
+    /// The session does not publish this path any more.
+    Gone {
+        /// As [`RemoteBroadcast::session`].
+        session: u64,
+        /// As [`RemoteBroadcast::path`].
+        path: String,
+    },
 }
 
 /// The broadcasts of others under a path, as they appear and go. First come those already there.
@@ -248,43 +257,70 @@ pub struct Announcements {
     origin: origin::Consumer,
     updates: announce::Consumer,
     appearing: Option<String>,
-    max_frame: usize,
+    /// Paths begin with the number of a session.
+    numbered: bool,
 }
 
 impl Announcements {
-    pub(crate) fn new(origin: &origin::Consumer, prefix: &str, max_frame: usize) -> Result<Self> {
+    /// What a server shows its client.
+    pub(crate) fn of_server(origin: &origin::Consumer, prefix: &str) -> Result<Self> {
+        Self::new(origin, prefix, Pattern::subtree(prefix), false)
+    }
+
+    /// What sessions publish, each under its number.
+    pub(crate) fn of_sessions(origin: &origin::Consumer, prefix: &str) -> Result<Self> {
+        let pattern = ["*", prefix, "**"].into_iter().filter(|part| !part.is_empty());
+        Self::new(origin, prefix, pattern.collect::<Vec<_>>().join("/").parse(), true)
+    }
+
+    fn new<E: std::fmt::Display>(
+        origin: &origin::Consumer,
+        prefix: &str,
+        pattern: std::result::Result<Pattern, E>,
+        numbered: bool,
+    ) -> Result<Self> {
         let refused = |reason: String| Error::Publish { path: prefix.to_owned(), reason };
-        let pattern = Pattern::subtree(prefix).map_err(|err| refused(err.to_string()))?;
+        let pattern = pattern.map_err(|err| refused(err.to_string()))?;
         let origin =
             origin.scope("", &Patterns::from(pattern)).map_err(|err| refused(err.to_string()))?;
         let updates = origin.announced();
-        Ok(Self { origin, updates, appearing: None, max_frame })
+        Ok(Self { origin, updates, appearing: None, numbered })
     }
 
     /// The next change; `None` once the server or client is closed. Dropping the future loses
     /// nothing.
     pub async fn next(&mut self) -> Option<Announcement> {
         loop {
-            if let Some(path) = &self.appearing {
-                let found = self.origin.request_broadcast(path.as_str()).await;
-                let path: Arc<str> = path.as_str().into();
+            if let Some(full) = &self.appearing {
+                let found = self.origin.request_broadcast(full.as_str()).await;
+                let (session, path) = self.apart(full);
+                let path: Arc<str> = path.into();
                 self.appearing = None;
                 match found {
                     Ok(inner) => {
-                        let max_frame = self.max_frame;
-                        let appeared = RemoteBroadcast { path, inner, max_frame };
+                        let appeared = RemoteBroadcast { path, session, inner };
                         return Some(Announcement::Appeared(appeared));
                     }
                     Err(err) => tracing::debug!(%path, %err, "announced broadcast not found"),
                 }
             }
             let update = self.updates.next().await?;
-            let path = update.prefix.as_str().to_owned();
+            let full = update.prefix.as_str();
             match update.kind {
-                announce::Kind::Announced => self.appearing = Some(path),
+                announce::Kind::Announced => self.appearing = Some(full.to_owned()),
                 announce::Kind::Updated => {}
-                announce::Kind::Retracted => return Some(Announcement::Gone(path)),
+                announce::Kind::Retracted => {
+                    let (session, path) = self.apart(full);
+                    return Some(Announcement::Gone { session, path: path.to_owned() });
+                }
             }
         }
+    }
+
+    /// The session and the path in what is announced.
+    fn apart<'a>(&self, full: &'a str) -> (u64, &'a str) {
+        let apart = full.split_once('/').filter(|_| self.numbered);
+        let numbered = apart.and_then(|(number, path)| Some((number.parse().ok()?, path)));
+        numbered.unwrap_or((0, full))
     }
 }

@@ -14,14 +14,13 @@ use web_transport_moq::noq;
 use crate::access::{self, Access, Sessions};
 use crate::guests::Guests;
 use crate::http::Front;
+use crate::names::Names;
 use crate::origin_check::OriginCheck;
 use crate::progress::Patience;
+use crate::refusals::Refusals;
 use crate::session::{Backend, Failure};
 use crate::tls::{self, Fingerprint, Identified, Tls};
 use crate::{Announcements, Broadcast, Error, Result, descriptors, listen, quic, tcp};
-
-/// The largest frame accepted from a client, in bytes.
-const CLIENT_FRAME: usize = 1 << 20;
 
 /// Bytes of past groups kept for late readers, over all tracks; above it, the oldest go first.
 const CACHE: &str = "512MiB";
@@ -40,8 +39,12 @@ pub struct ServerConfig {
     pub allowed_hosts: Vec<String>,
     /// Origins (`scheme://host[:port]`) of pages that may connect, besides the server's own.
     pub allowed_origins: Vec<String>,
-    /// Sessions open at once, at most; a further one is refused with status 503.
+    /// Sessions open at once, at most, and half of them (at least eight) from one address that is not this
+    /// machine's; a further one is refused with status 503.
     pub max_sessions: usize,
+    /// Names that one session may publish edits under at a time; one that has more is closed. A page
+    /// needs one, a relay one for each of its editors.
+    pub max_names: usize,
     /// TCP connections open at once for HTTP, at most, and half of them from one address; a further one is
     /// closed. There are fewer where the system allows fewer descriptors.
     pub max_connections: usize,
@@ -63,6 +66,7 @@ impl ServerConfig {
             allowed_hosts: Vec::new(),
             allowed_origins: Vec::new(),
             max_sessions: 256,
+            max_names: 4,
             max_connections: 1024,
             max_requests: 256,
             patience: Patience::default(),
@@ -74,6 +78,7 @@ impl ServerConfig {
 pub struct Server {
     address: SocketAddr,
     origin: origin::Producer,
+    names: Names,
     sessions: Sessions,
     /// TCP connections that are open for HTTP.
     connections: Arc<Guests>,
@@ -113,11 +118,14 @@ impl Server {
         let sessions = Sessions::new(config.max_sessions);
         let check = OriginCheck::new(address, &config.allowed_hosts, &config.allowed_origins);
         let origin = cluster.origin.clone();
+        let names = Names::beside(&origin, config.max_names);
         let backend = Backend {
             auth,
             cluster,
             check: Arc::new(check),
             sessions: sessions.clone(),
+            visitors: Guests::with_proxies(config.max_sessions),
+            names: names.clone(),
             shutdown: observer,
             told: Arc::default(),
         };
@@ -145,6 +153,7 @@ impl Server {
         Ok(Self {
             address,
             origin,
+            names,
             sessions,
             connections,
             shutdown,
@@ -169,10 +178,9 @@ impl Server {
         self.connections.count()
     }
 
-    /// How many requests and sessions have been refused since the start: for their host, origin or
-    /// token, or because too many sessions were open.
-    pub fn refusals(&self) -> u64 {
-        self.sessions.refusals()
+    /// Who has been refused since the start.
+    pub fn refusals(&self) -> Refusals {
+        self.sessions.refusals.clone()
     }
 
     /// Makes a broadcast under this path, the name of a scene. It is known to readers once it is
@@ -181,10 +189,11 @@ impl Server {
         Broadcast::new(&self.origin, path)
     }
 
-    /// The broadcasts under this path, such as `sponza/edits`: the clients' own, as they come and go.
-    /// Of their frames, those above 1 MiB are refused.
+    /// The broadcasts of sessions under this path, such as `sponza/edits`, as they come and go. Two
+    /// sessions may publish the same path; [`RemoteBroadcast::session`](crate::RemoteBroadcast::session)
+    /// tells them apart.
     pub fn announced(&self, prefix: &str) -> Result<Announcements> {
-        Announcements::new(&self.origin.consume(), prefix, CLIENT_FRAME)
+        Announcements::of_sessions(&self.names.consume(), prefix)
     }
 
     /// Closes every session, so that clients know at once, lets answers over HTTP that have begun be

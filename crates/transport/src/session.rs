@@ -9,8 +9,11 @@ use moq_net::web_transport_trait;
 use moq_relay::{auth, cluster, shutdown};
 
 use crate::access::Sessions;
+use crate::guests::{Guest, Guests};
+use crate::names::Names;
 use crate::origin_check::OriginCheck;
 use crate::rarely::Rarely;
+use crate::refusals::RefusalKind;
 
 /// How long a client may take for each step from its first packet to its session.
 pub(crate) const HANDSHAKE: Duration = Duration::from_secs(10);
@@ -29,6 +32,9 @@ pub(crate) struct Backend {
     pub(crate) cluster: cluster::Cluster,
     pub(crate) check: Arc<OriginCheck>,
     pub(crate) sessions: Sessions,
+    /// The addresses of sessions.
+    pub(crate) visitors: Arc<Guests>,
+    pub(crate) names: Names,
     pub(crate) shutdown: shutdown::Observer,
     pub(crate) told: Arc<Mutex<Rarely>>,
 }
@@ -41,10 +47,17 @@ pub(crate) struct Ask<'a> {
     pub(crate) remote: SocketAddr,
 }
 
+/// A session that has been let in.
+pub(crate) struct Admitted {
+    lease: auth::Lease,
+    remote: SocketAddr,
+    _visitor: Guest,
+}
+
 impl Backend {
-    /// Counts and tells that a host or an origin is refused.
-    pub(crate) fn refuse(&self, remote: SocketAddr, reason: &str) {
-        self.sessions.refused();
+    /// Counts a refusal and tells it.
+    pub(crate) fn refuse(&self, kind: RefusalKind, remote: SocketAddr, reason: &str) {
+        self.sessions.refusals.count(kind);
         let told = self.told.lock().unwrap_or_else(PoisonError::into_inner).now();
         if let Some(times) = told {
             tracing::warn!(%remote, times, "refused: {reason}");
@@ -52,40 +65,64 @@ impl Backend {
     }
 
     /// Lets a session in; a refusal comes with its status and reason.
-    pub(crate) async fn admit(&self, ask: Ask<'_>) -> Result<auth::Lease, (StatusCode, String)> {
+    pub(crate) async fn admit(&self, ask: Ask<'_>) -> Result<Admitted, (StatusCode, String)> {
+        let full = |reason: &str| {
+            self.sessions.refusals.count(RefusalKind::Sessions);
+            (StatusCode::SERVICE_UNAVAILABLE, reason.to_owned())
+        };
         if self.sessions.full() {
-            self.sessions.refused();
-            let reason = "too many sessions are open; try again later";
-            return Err((StatusCode::SERVICE_UNAVAILABLE, reason.into()));
+            return Err(full("too many sessions are open; try again later"));
         }
+        let Some(visitor) = self.visitors.enter(ask.remote.ip()) else {
+            return Err(full("too many sessions of this address are open; close some"));
+        };
         let mut request = self.auth.request(ask.transport, ask.path);
         request.query = ask.query.map(str::to_owned);
         request.remote = Some(ask.remote);
-        self.auth.admit(request).await.map_err(|err| match err {
+        let lease = self.auth.admit(request).await.map_err(|err| match err {
             auth::Error::Unavailable(_) => (StatusCode::SERVICE_UNAVAILABLE, err.to_string()),
             _ => (StatusCode::UNAUTHORIZED, "the token is missing, wrong or expired".into()),
-        })
+        })?;
+        Ok(Admitted { lease, remote: ask.remote, _visitor: visitor })
     }
 
     /// Serves a session that has been let in, until it ends.
-    pub(crate) async fn serve<S>(self, transport: S, lease: auth::Lease) -> Result<(), Failure>
+    pub(crate) async fn serve<S>(self, transport: S, admitted: Admitted) -> Result<(), Failure>
     where
         S: web_transport_trait::Session,
     {
+        let Admitted { lease, remote, _visitor } = admitted;
         let token = lease.token();
         // What the client may subscribe to is what we publish to it, and the other way round.
         let mut server = moq_net::Server::new();
         if let Some(readable) = self.cluster.subscriber(token) {
             server = server.with_publisher(&readable);
         }
-        if let Some(writable) = self.cluster.publisher(token) {
-            server = server.with_subscriber(writable);
+        let published = self.names.of_session(token);
+        if let Some(published) = &published {
+            server = server.with_subscriber(published.clone());
         }
         let transport = moq_tokio::transport::Session::new(transport);
         let accept = server.accept(std::time::Instant::now(), transport);
         let (session, driver) = tokio::time::timeout(HANDSHAKE, accept).await??;
         tokio::spawn(moq_net::time::run(driver));
         tracing::debug!(version = %session.version(), "session");
-        Ok(moq_relay::supervise(session, lease, self.shutdown, None).await?)
+        let too_much = async {
+            match &published {
+                Some(published) => self.names.watch(published).await,
+                None => std::future::pending().await,
+            }
+        };
+        tokio::select! {
+            ended = moq_relay::supervise(session.clone(), lease, self.shutdown.clone(), None) => {
+                Ok(ended?)
+            }
+            reason = too_much => {
+                session.abort(moq_net::Error::Unauthorized);
+                let told = format!("a session is closed: {reason}");
+                self.refuse(RefusalKind::Names, remote, &told);
+                Err(reason)
+            }
+        }
     }
 }

@@ -15,6 +15,7 @@ use tokio_rustls::TlsAcceptor;
 use crate::http::Front;
 use crate::progress::Progress;
 use crate::rarely::Rarely;
+use crate::refusals::RefusalKind;
 use crate::session::{Failure, HANDSHAKE};
 #[cfg(target_os = "linux")]
 use crate::unsent;
@@ -44,7 +45,7 @@ pub(crate) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, front
         match listener.accept().await {
             Ok((stream, remote)) => {
                 let Some(guest) = front.connections.enter(remote.ip()) else {
-                    front.backend.sessions.refused();
+                    front.backend.sessions.refusals.count(RefusalKind::Connections);
                     if let Some(times) = full.now() {
                         tracing::warn!(%remote, times, "connection refused: too many are open");
                     }

@@ -6,13 +6,12 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use hyper::upgrade::OnUpgrade;
 use hyper_util::rt::TokioIo;
-use moq_relay::auth;
 use qmux::ws::tokio_tungstenite::WebSocketStream;
 use qmux::ws::tungstenite::handshake;
 use qmux::ws::tungstenite::protocol::{Role, WebSocketConfig};
 
 use crate::in_order;
-use crate::session::{Ask, Backend, Failure, MAX_STREAMS};
+use crate::session::{Admitted, Ask, Backend, Failure, MAX_STREAMS};
 use crate::tcp::Peer;
 
 /// The largest message, bytes: of one record or frame of 16 KiB, with its head.
@@ -45,8 +44,8 @@ pub(crate) async fn upgrade(mut request: Request, peer: Peer, backend: Backend) 
         query: path_and_query.query(),
         remote: peer.remote,
     };
-    let lease = match backend.admit(ask).await {
-        Ok(lease) => lease,
+    let admitted = match backend.admit(ask).await {
+        Ok(admitted) => admitted,
         Err((status, reason)) => {
             tracing::info!(remote = %peer.remote, %status, %reason, "WebSocket session refused");
             return refuse(status, &reason);
@@ -58,7 +57,7 @@ pub(crate) async fn upgrade(mut request: Request, peer: Peer, backend: Backend) 
     response.headers_mut().insert(header::SEC_WEBSOCKET_PROTOCOL, value);
     tokio::spawn(async move {
         let remote = peer.remote;
-        if let Err(err) = session(on_upgrade, protocol, peer, backend, lease).await {
+        if let Err(err) = session(on_upgrade, protocol, peer, backend, admitted).await {
             tracing::debug!(%remote, %err, "WebSocket session ended");
         }
     });
@@ -70,7 +69,7 @@ async fn session(
     protocol: String,
     peer: Peer,
     backend: Backend,
-    lease: auth::Lease,
+    admitted: Admitted,
 ) -> Result<(), Failure> {
     let (io, taken) = in_order::Socket::new(TokioIo::new(on_upgrade.await?));
     let limits = WebSocketConfig::default()
@@ -89,7 +88,7 @@ async fn session(
     if let Some(stats) = peer.stats {
         upgraded = upgraded.with_socket_stats(stats);
     }
-    backend.serve(in_order::Session::new(upgraded.accept(), taken), lease).await
+    backend.serve(in_order::Session::new(upgraded.accept(), taken), admitted).await
 }
 
 /// The first protocol of ours that the client offers: a MoQ version, by the framing it rides on.

@@ -75,6 +75,7 @@ function target(url: URL, options: ConnectOptions): Target {
     url,
     scene,
     client: randomName(),
+    key: randomName(),
     token: options.token ?? url.searchParams.get('jwt') ?? undefined,
     transport: options.transport ?? 'auto',
     certificateHash: options.certificateHash,

@@ -40,6 +40,8 @@ export interface Target {
   readonly scene: string;
   /** This client's name: 1 to 64 characters of A–Z a–z 0–9 - _. */
   readonly client: string;
+  /** What proves that a connection is this client's, where others know its name; of the same form. */
+  readonly key: string;
   /** A token that allows edits. */
   readonly token: string | undefined;
   /** Which transport to use; `auto` tries WebTransport first. */

@@ -11,6 +11,7 @@ use super::Scene;
 use super::nodes::Node;
 use crate::asset::Asset;
 use crate::error::Fault;
+use crate::gltf::source::shorten;
 use crate::limits;
 use crate::trs::{Trs, is_in_world, is_invertible};
 use crate::{
@@ -239,7 +240,7 @@ impl Scene {
         parent: Option<NodeId>,
         (trs, world): (Trs, Affine3A),
     ) -> Result<(), EditError> {
-        let fail = |fault| EditError::File { file: file.to_owned(), fault };
+        let fail = |fault| EditError::File { file: shorten(file), fault };
         let name = self.file_name(file).map_err(fail)?;
         let known = self.models[1..].iter().position(|model| model.name == name);
         let model = match known {
@@ -367,7 +368,7 @@ impl Scene {
         let senseless = |why| EditError::Senseless { what: "the environment".into(), why };
         environment.check().map_err(senseless)?;
         let file = match environment {
-            Environment::Image { uri, .. } => uri.clone(),
+            Environment::Image { uri, .. } => shorten(uri),
             _ => String::new(),
         };
         self.environment = self

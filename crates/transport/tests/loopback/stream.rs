@@ -140,7 +140,7 @@ async fn edits_reach_the_server(transport: Transport) {
     drop((track, broadcast, client));
     assert!(matches!(step("end", reader.next()).await, Ok(None)));
     match step("gone", announced.next()).await {
-        Some(Announcement::Gone(path)) => assert_eq!(path, "scene/edits/alice"),
+        Some(Announcement::Gone { path, .. }) => assert_eq!(path, "scene/edits/alice"),
         _ => panic!("the broadcast stayed"),
     }
 }

@@ -56,7 +56,7 @@ export class Outbox {
       const limit = reading && seq >= reading.seq ? GIVE_UP_READING : GIVE_UP;
       if (sent === undefined || now - sent < limit) continue;
       this.cache.abandon(seq);
-      const reason = `the server gave no answer for ${limit} s; it may need a token for edits`;
+      const reason = `the server gave no answer for ${limit} s; it may need a token for edits, or too many clients edit`;
       this.settle(seq, (waiting) => waiting.reject(new EditError('unanswered', reason)));
     }
     if (now - this.lastSent >= RESEND) this.sendAll(now);
