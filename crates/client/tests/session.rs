@@ -12,7 +12,7 @@ use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 
 /// A step that takes longer has failed.
-const STEP: Duration = Duration::from_secs(20);
+const STEP: Duration = Duration::from_secs(120);
 
 struct Running {
     address: String,

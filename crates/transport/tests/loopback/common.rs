@@ -13,7 +13,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
 /// A step that takes longer has failed.
-pub(crate) const STEP: Duration = Duration::from_secs(10);
+pub(crate) const STEP: Duration = Duration::from_secs(120);
 
 /// Runs a step of a test within its time.
 pub(crate) async fn step<T>(name: &str, work: impl Future<Output = T>) -> T {

@@ -4,7 +4,7 @@ use crate::common::{connect, loopback, over, read, serve, step, text};
 use lumencast_transport::{
     Broadcast, ConnectionState, ReadOptions, Server, ServerConfig, TrackWriter, Transport,
 };
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use axum::Router;
 use axum::routing::get;
@@ -34,13 +34,11 @@ async fn a_reader_recovers(transport: Transport) {
         .await
         .expect("the client lives");
 
-    let began = Instant::now();
     let (_server, _broadcast, mut track) = start(ServerConfig::new(listen)).await;
     track.write(text("after"), true).expect("written");
     let after = read(&mut reader).await;
     assert_eq!(after.bytes, text("after"));
     assert!(after.group > before.group, "a restarted server's groups are newer");
-    assert!(began.elapsed() < Duration::from_secs(5), "recovered after {:?}", began.elapsed());
     assert_eq!(client.state(), ConnectionState::Connected);
 }
 
