@@ -1,12 +1,10 @@
 import { existsSync } from 'node:fs';
 import { type Browser, chromium } from 'playwright-core';
 
-/** WebGL and WebGPU drawn by the processor. */
+/** WebGL drawn by the processor. */
 const FLAGS = [
   '--headless=new',
   '--no-sandbox',
-  '--enable-unsafe-webgpu',
-  '--use-webgpu-adapter=swiftshader',
   '--enable-features=Vulkan',
   '--use-vulkan=swiftshader',
   '--use-angle=swiftshader',
@@ -14,6 +12,8 @@ const FLAGS = [
   // Containers have little of it.
   '--disable-dev-shm-usage',
 ];
+/** WebGPU drawn by the processor. */
+const WEBGPU_FLAGS = ['--enable-unsafe-webgpu', '--use-webgpu-adapter=swiftshader'];
 
 /** A browser to drive: what the environment says, else the system's; `undefined` when there is none. */
 export const chromiumProgram = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/google-chrome'].find(
@@ -22,11 +22,24 @@ export const chromiumProgram = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr
 
 /** Starts {@link chromiumProgram}; an error where there is none. */
 export function launchBrowser(...flags: string[]): Promise<Browser> {
-  if (!chromiumProgram) throw new Error('the test needs Chromium; CHROMIUM names another place for it');
-  return launchProgram(chromiumProgram, ...flags);
+  return launchProgram(installed(), ...flags);
 }
 
 /** Starts a program that is Chromium, or becomes it. */
 export function launchProgram(program: string, ...flags: string[]): Promise<Browser> {
-  return chromium.launch({ executablePath: program, headless: true, args: [...FLAGS, ...flags] });
+  return launch(program, [...FLAGS, ...WEBGPU_FLAGS, ...flags]);
+}
+
+/** As {@link launchBrowser}, with no adapter for WebGPU: what many devices have. */
+export function launchWithoutWebGPU(): Promise<Browser> {
+  return launch(installed(), FLAGS);
+}
+
+function installed(): string {
+  if (!chromiumProgram) throw new Error('the test needs Chromium; CHROMIUM names another place for it');
+  return chromiumProgram;
+}
+
+function launch(executablePath: string, args: string[]): Promise<Browser> {
+  return chromium.launch({ executablePath, headless: true, args });
 }

@@ -142,6 +142,7 @@ class FilledGrid {
     packAtlas(this.#gather(sources), this.plan.resolution, 2, this.#scale, this.#atlas);
     if (this.platform.scaleIn === 'atlas') fillFreeChannel(this.#atlas, halfBits(Math.log2(this.#scale)));
     this.#texture.needsUpdate = true;
+    this.platform.upload?.(this.#texture);
     this.#setIntensity();
     return true;
   }

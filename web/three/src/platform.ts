@@ -31,6 +31,8 @@ export interface Platform {
   readonly gridExposure?: { value: number };
   /** Largest size of a 3D texture along an axis. */
   readonly max3DTextureSize: number;
+  /** Brings a texture's new data to the device, where the renderer does not look for it in each frame. */
+  upload?(texture: Data3DTexture): void;
   /** Gives lights glTF's falloff, and what else {@link patchMaterials} lists; may be called again. */
   patch(root: Object3D): void;
   unpatch(root: Object3D): void;

@@ -23,26 +23,34 @@ import { unitsTaken } from './units.js';
 export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
 export type { ConnectOptions } from './connect.js';
 
-/** See `connect` of `@lumencast/three`; the renderer must be initialised (`await renderer.init()`). */
-export function connect(
+/** See `connect` of `@lumencast/three`; it initialises the renderer where the program has not. */
+export async function connect(
   url: string,
   options: ConnectOptions & { renderer: WebGPURenderer },
 ): Promise<LumencastLight> {
-  return connectWith(webgpuPlatform(), url, options);
+  await options.renderer.init();
+  return connectWith(webgpuPlatform(options.renderer), url, options);
 }
 
-/** See `attach` of `@lumencast/three`. */
+/**
+ * See `attach` of `@lumencast/three`.
+ * @throws Error when the renderer is not initialised: `await renderer.init()`
+ */
 export function attach(
   session: LightSession,
   options: AttachOptions & { renderer: WebGPURenderer },
 ): LumencastLight {
-  return new LumencastLight(session, webgpuPlatform(), options);
+  if (!options.renderer.initialized) throw new Error('the renderer needs `await renderer.init()` first');
+  return new LumencastLight(session, webgpuPlatform(options.renderer), options);
 }
 
-/** Sampled textures of a shader stage that every WebGPU device has. */
+/** Sampled textures of a shader stage that every WebGPU device has, and every WebGL 2 context. */
 const MAX_TEXTURES = 16;
+/** The least that WebGPU allows a 3D texture along an axis. */
+const MAX_3D_TEXTURE_SIZE = 2048;
 
-function webgpuPlatform(): Platform {
+function webgpuPlatform(renderer: WebGPURenderer): Platform {
+  const gl = fallbackContext(renderer);
   return {
     createGrid(size, resolution) {
       const grid = new LightProbeGrid(...size, ...resolution);
@@ -52,11 +60,17 @@ function webgpuPlatform(): Platform {
     },
     scaleIn: 'intensity',
     freeGrids: (scene) => MAX_TEXTURES - unitsTaken(scene, 'webgpu'),
-    // The least that WebGPU allows.
-    max3DTextureSize: 2048,
+    max3DTextureSize: gl ? (gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) as number) : MAX_3D_TEXTURE_SIZE,
+    // Objects that stand still do not look for new data of their lights' textures.
+    upload: (texture) => renderer.initTexture(texture),
     patch: (root) => eachLight(root, (light, Falloff) => (light._lightNode = Falloff)),
     unpatch: (root) => eachLight(root, (light) => delete light._lightNode),
   };
+}
+
+/** The context of the backend that stands in where the browser has no WebGPU. */
+function fallbackContext({ backend }: WebGPURenderer): WebGL2RenderingContext | undefined {
+  return 'isWebGLBackend' in backend ? (backend as unknown as { gl: WebGL2RenderingContext }).gl : undefined;
 }
 
 /** Where WebGPURenderer looks up how a light is shaded: the light itself, then its class. */

@@ -6,6 +6,7 @@
 import { PerspectiveCamera, PointLight, SpotLight, Scene, Vector3 } from 'three';
 import { showEnvironment } from '../../src/environment.js';
 import { bright } from './bright.js';
+import { changing } from './changing.js';
 import { crowded } from './crowded.js';
 import {
   floor,
@@ -88,7 +89,7 @@ async function environment(
   return seen;
 }
 
-const measurements = { lamp, volume, environment, crowded, bright };
+const measurements = { lamp, volume, environment, crowded, bright, changing };
 
 declare global {
   interface Window {
