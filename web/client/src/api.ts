@@ -42,6 +42,35 @@ export interface LightState {
   readonly age: number | undefined;
 }
 
+/** What keeps a session from its light, as well as a browser lets a page know. */
+export type Problem =
+  /** Nobody answers, or a certificate is not trusted. */
+  | 'unreachable'
+  /** A server answers, but lets no page of this origin in. */
+  | 'origin'
+  /** What answers is no Lumencast server. */
+  | 'stranger'
+  /** The server runs and lets the page ask, but takes no session: a token is missing or bad, or it is full. */
+  | 'refused'
+  /** The server has no scene of this name. */
+  | 'scene'
+  /** The server has the scene, but sends nothing. */
+  | 'silent'
+  /** The server speaks another version of the wire format. */
+  | 'version';
+
+/** Why no connection came about: what happened, and what to do. */
+export class ConnectError extends Error {
+  override readonly name = 'ConnectError';
+  constructor(
+    readonly problem: Problem,
+    message: string,
+    options?: ErrorOptions,
+  ) {
+    super(message, options);
+  }
+}
+
 /** How a session stands. */
 export type Status =
   | {
@@ -54,6 +83,8 @@ export type Status =
       /** Nothing is received; the light stays and the session tries again by itself. */
       readonly state: 'lost';
       readonly reason: string;
+      /** Why no connection came about; absent when one that stood has ended. */
+      readonly problem?: Problem;
       /** Seconds until the next attempt. */
       readonly retryIn: number;
     }
@@ -61,6 +92,8 @@ export type Status =
       /** For good: closed by the program, or the server speaks another wire version. */
       readonly state: 'closed';
       readonly reason: string;
+      /** Absent when the program has closed it. */
+      readonly problem?: Problem;
     };
 
 /** An edit that the server has accepted, in the server's order. */
@@ -144,6 +177,8 @@ export interface Timing {
 export interface Session {
   /** The server's address, without a path. */
   readonly origin: string;
+  /** Address of the folder that the scene's files are in, with a slash at its end. */
+  readonly files: string;
   /** Name of the scene. */
   readonly scene: string;
   /** This client's name in edits. */

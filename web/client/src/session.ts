@@ -1,6 +1,8 @@
 import {
+  ConnectError,
   EditError,
   type LightState,
+  type Problem,
   type Session,
   type SessionEvents,
   type SessionStats,
@@ -16,6 +18,7 @@ import { Meter } from './session/meter.js';
 import { Outbox } from './session/outbox.js';
 import { CATALOG_PRIORITY, type TrackPlan } from './session/plan.js';
 import { Reading, type Sink } from './session/reading.js';
+import { parseTarget } from './session/target.js';
 import { reportUncaught } from './session/uncaught.js';
 import type { Connector, Link, Target } from './transport.js';
 import { moqConnector } from './transport/moq.js';
@@ -23,7 +26,7 @@ import { WireError } from './wire-error.js';
 
 /** How to connect; all of it may be left out. */
 export interface ConnectOptions {
-  /** Name of the scene; the path of the address unless given. */
+  /** Name of the scene; the last part of the address' path unless given. */
   scene?: string;
   /** A token that allows edits; the address's `jwt` parameter unless given. */
   token?: string;
@@ -53,39 +56,25 @@ const BACKOFF = { first: 0.25, most: 2 } as const;
 const SILENCE = { seconds: 3, ticks: 10 } as const;
 /** Seconds for which the catalog is waited for. */
 const CATALOG_WAIT = 5;
+/** How a connection ends over which none comes. */
+const NO_CATALOG: Ending = { reason: 'no catalog has come', problem: 'scene' };
 /** Seconds by which animations are played late unless said otherwise. */
 const ANIMATION_DELAY = 0.1;
 
+/** Why a connection ended, or did not come about. */
+interface Ending {
+  readonly reason: string;
+  readonly problem?: Problem;
+}
+
 /**
- * Connects to a scene's light, `https://host:port/scene`. Returns at once; the session connects, and
- * connects again after a loss, by itself.
+ * Connects to a scene's light, `https://host:port/scene`, or `https://host/base/scene` where a reverse
+ * proxy has the server under a path. Returns at once; the session connects, and connects again after a
+ * loss, by itself.
  * @throws TypeError when the address is none, or names no scene; WireError when `saved` is no light file.
  */
 export function connect(url: string | URL, options: ConnectOptions = {}): Session {
-  return new LiveSession(target(new URL(url), options), options);
-}
-
-function target(url: URL, options: ConnectOptions): Target {
-  if (url.protocol !== 'https:' && url.protocol !== 'http:') {
-    throw new TypeError(`${url.href} does not begin with https:// or http://`);
-  }
-  const scene = options.scene ?? decodeURIComponent(url.pathname.replace(/^\/+|\/+$/g, ''));
-  if (scene === '') throw new TypeError(`${url.href} names no scene; it should end in /scene`);
-  return {
-    url,
-    scene,
-    client: randomName(),
-    key: randomName(),
-    token: options.token ?? url.searchParams.get('jwt') ?? undefined,
-    transport: options.transport ?? 'auto',
-    certificateHash: options.certificateHash,
-  };
-}
-
-/** 128 random bits in hexadecimal. */
-function randomName(): string {
-  const bytes = crypto.getRandomValues(new Uint8Array(16));
-  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, '0')).join('');
+  return new LiveSession(parseTarget(new URL(url), options), options);
 }
 
 /** Seconds of the clock that all times of a session are told by. */
@@ -110,6 +99,8 @@ class LiveSession implements Session, Sink {
   /** What is read over the link, once it has given a catalog. */
   private reading: Reading | undefined;
   private camera: Vec3 | undefined;
+  /** Where the server answers plain requests, as far as is known. */
+  private base: URL;
   /** Seconds awake since the link was made, or last gave a frame. */
   private silence = 0;
 
@@ -117,7 +108,8 @@ class LiveSession implements Session, Sink {
     private readonly target: Target,
     options: ConnectOptions,
   ) {
-    this.origin = target.url.origin;
+    this.origin = target.base.origin;
+    this.base = target.base;
     this.scene = target.scene;
     this.client = target.client;
     this.connector = options.connector ?? moqConnector;
@@ -140,35 +132,35 @@ class LiveSession implements Session, Sink {
     let backoff: number = BACKOFF.first;
     for (let attempt = 1; !this.ending.signal.aborted; attempt++) {
       this.setStatus({ state: 'connecting', attempt });
-      const reason = await this.attempt();
+      const { reason, problem } = await this.attempt();
       if (this.ending.signal.aborted) return;
       if (this.current.state === 'connected') {
         attempt = 0;
         backoff = BACKOFF.first;
       }
-      this.setStatus({ state: 'lost', reason, retryIn: backoff });
+      this.setStatus({ state: 'lost', reason, ...(problem && { problem }), retryIn: backoff });
       await pause(backoff, this.ending.signal);
       backoff = Math.min(2 * backoff, BACKOFF.most);
     }
   }
 
   /** Connects once and stays until the connection ends; returns why it did. */
-  private async attempt(): Promise<string> {
+  private async attempt(): Promise<Ending> {
     let link: Link;
     try {
       const limit = AbortSignal.any([this.ending.signal, AbortSignal.timeout(ATTEMPT)]);
       link = await this.connector(this.target, limit);
     } catch (error) {
-      // Browsers do not tell a page whether it was refused or nobody was there.
-      const hint = this.target.token ? '; the token may be wrong or have expired' : '';
-      return `no answer from ${this.origin} (${describe(error)})${hint}`;
+      const { message, problem = 'unreachable' } = error as Partial<ConnectError> & Error;
+      return { reason: message, problem };
     }
     if (this.ending.signal.aborted) {
       link.close();
-      return 'closed';
+      return { reason: 'closed' };
     }
-    let die = (_reason: string): void => {};
-    const dead = new Promise<string>((resolve) => (die = resolve));
+    this.base = link.base ?? this.target.base;
+    let die = (_ending: Ending): void => {};
+    const dead = new Promise<Ending>((resolve) => (die = resolve));
     this.link = link;
     this.silence = 0;
     const catalog = link.subscribe('catalog', { priority: CATALOG_PRIORITY, maxAge: 0 }, (frame) =>
@@ -180,9 +172,9 @@ class LiveSession implements Session, Sink {
       this.beat(now, now - beaten, die);
       beaten = now;
     }, BEAT);
-    const aborted = () => die('closed');
+    const aborted = () => die({ reason: 'closed' });
     this.ending.signal.addEventListener('abort', aborted, { once: true });
-    const reason = await Promise.race([link.ended, dead]);
+    const ending = await Promise.race([link.ended.then((reason) => ({ reason })), dead]);
     this.ending.signal.removeEventListener('abort', aborted);
     clearInterval(beat);
     catalog.close();
@@ -191,19 +183,28 @@ class LiveSession implements Session, Sink {
     this.outbox.disconnected();
     this.link = undefined;
     link.close();
-    return reason;
+    return ending === NO_CATALOG ? this.withoutCatalog(link) : ending;
   }
 
-  private beat(now: number, elapsed: number, die: (reason: string) => void): void {
+  /** A connection over which no catalog comes. */
+  private async withoutCatalog(link: Link): Promise<Ending> {
+    const { base, scene } = this;
+    const casts = await link.casts?.();
+    if (casts === scene) return { problem: 'silent', reason: `${base} casts ${scene}, but sends no light` };
+    const hint = casts === undefined ? '' : `; it casts ${casts}: connect to ${base}${casts}`;
+    return { problem: 'scene', reason: `${base} has no scene named ${scene}${hint}` };
+  }
+
+  private beat(now: number, elapsed: number, die: (ending: Ending) => void): void {
     // A page that is busy or in the background beats late, and has not heard what came meanwhile.
     this.silence += Math.min(elapsed, (2 * BEAT) / 1000);
     if (!this.reading) {
-      if (this.silence > CATALOG_WAIT) die(`${this.origin} has no scene named ${this.scene}`);
+      if (this.silence > CATALOG_WAIT) die(NO_CATALOG);
       return;
     }
     const tick = this.cache.catalog?.tickSeconds ?? 0;
     const limit = Math.max(SILENCE.seconds, SILENCE.ticks * tick);
-    if (this.silence > limit) return die(`nothing has come for ${limit} s`);
+    if (this.silence > limit) return die({ reason: `nothing has come for ${limit} s` });
     this.reading.adapt(now);
     this.outbox.check(now);
   }
@@ -221,7 +222,7 @@ class LiveSession implements Session, Sink {
     try {
       changed = this.cache.addCatalog(frame);
     } catch (error) {
-      if (error instanceof WireError && error.kind === 'version') return this.end(error.message);
+      if (error instanceof WireError && error.kind === 'version') return this.end(error.message, 'version');
       return this.drop(error);
     }
     this.dispatch();
@@ -309,6 +310,10 @@ class LiveSession implements Session, Sink {
 
   // What a program asks
 
+  get files(): string {
+    return new URL('scene/', this.base).href;
+  }
+
   get status(): Status {
     return this.current;
   }
@@ -373,21 +378,14 @@ class LiveSession implements Session, Sink {
   }
 
   /** Ends the session for good. */
-  private end(reason: string): void {
+  private end(reason: string, problem?: Problem): void {
     if (this.ending.signal.aborted) return;
     this.ending.abort();
     this.link?.close();
     this.outbox.close(reason);
-    this.settleReady?.reject(new Error(reason));
-    this.setStatus({ state: 'closed', reason });
+    this.settleReady?.reject(problem ? new ConnectError(problem, reason) : new Error(reason));
+    this.setStatus({ state: 'closed', reason, ...(problem && { problem }) });
   }
-}
-
-/** An error in words; those of several attempts one after the other, each once. */
-function describe(error: unknown): string {
-  if (error instanceof AggregateError) return [...new Set(error.errors.map(describe))].join('; ');
-  const message = error instanceof Error ? error.message : String(error);
-  return message.replace(/\.$/, '') || 'no reason given';
 }
 
 /** Waits for some seconds, or less when `signal` is aborted. */

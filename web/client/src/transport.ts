@@ -5,6 +5,10 @@
 /** One connection to a server; it is not made again once it is lost. */
 export interface Link {
   readonly kind: 'webtransport' | 'websocket';
+  /** Where the server answers plain requests, if otherwise than {@link Target.base} says. */
+  readonly base?: URL;
+  /** Name of the scene that the server says it casts, if it says so. */
+  casts?(): Promise<string | undefined>;
   /** Reads a track of the scene's broadcast, frame by frame, through stale groups, until closed. */
   subscribe(track: string, options: ReadOptions, onFrame: (frame: Uint8Array) => void): TrackReader;
   /** Sends a frame on this client's `edits` track. */
@@ -29,13 +33,16 @@ export interface TrackReader {
   close(): void;
 }
 
-/** Makes connections. Rejects when none comes about, or `signal` is aborted. */
+/**
+ * Makes connections. Rejects when none comes about, or `signal` is aborted; with a `ConnectError` where
+ * it knows why.
+ */
 export type Connector = (target: Target, signal: AbortSignal) => Promise<Link>;
 
 /** What to connect to. */
 export interface Target {
-  /** The server's address, of which the path does not count. */
-  readonly url: URL;
+  /** The server's address; its path ends in a slash, and is longer behind a reverse proxy. */
+  readonly base: URL;
   /** The scene's broadcast. */
   readonly scene: string;
   /** This client's name: 1 to 64 characters of A–Z a–z 0–9 - _. */

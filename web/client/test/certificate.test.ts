@@ -2,7 +2,7 @@ import { createServer, type Server } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { afterEach, expect, it } from 'vitest';
 
-import { offeredCertificateHash } from '../src/transport/certificate.js';
+import { developmentServer } from '../src/transport/certificate.js';
 
 const HASH = 'ab'.repeat(32);
 const servers: Server[] = [];
@@ -17,26 +17,29 @@ async function serve(status: number, body: string): Promise<URL> {
   });
   servers.push(server);
   await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
-  return new URL(`https://127.0.0.1:${(server.address() as AddressInfo).port}/scene`);
+  return new URL(`https://127.0.0.1:${(server.address() as AddressInfo).port}/`);
 }
 
 const never = new AbortController().signal;
 
 it('is taken from a server on this machine that offers it', async () => {
-  expect(await offeredCertificateHash(await serve(200, `${HASH}\n`), never)).toBe(HASH);
+  const url = await serve(200, `${HASH}\n`);
+  const found = await developmentServer(url, never);
+  expect(found?.hash).toBe(HASH);
+  expect(found?.base.href).toBe(`http://${url.host}/`);
 });
 
 it('is not taken where there is none, or something else', async () => {
-  expect(await offeredCertificateHash(await serve(404, HASH), never)).toBeUndefined();
-  expect(await offeredCertificateHash(await serve(200, '<html>'), never)).toBeUndefined();
-  expect(await offeredCertificateHash(new URL('https://127.0.0.1:1/'), never)).toBeUndefined();
+  expect(await developmentServer(await serve(404, HASH), never)).toBeUndefined();
+  expect(await developmentServer(await serve(200, '<html>'), never)).toBeUndefined();
+  expect(await developmentServer(new URL('https://127.0.0.1:1/'), never)).toBeUndefined();
 });
 
 it('is not asked from other machines', async () => {
-  expect(await offeredCertificateHash(new URL('https://light.example/'), never)).toBeUndefined();
+  expect(await developmentServer(new URL('https://light.example/'), never)).toBeUndefined();
 });
 
 it('is given up when the attempt is', async () => {
   const url = await serve(200, HASH);
-  expect(await offeredCertificateHash(url, AbortSignal.abort())).toBeUndefined();
+  expect(await developmentServer(url, AbortSignal.abort())).toBeUndefined();
 });

@@ -1,6 +1,13 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 
-import { type AcceptedEdit, EditError, type RefusedEdit, type Session, type Status } from '../src/api.js';
+import {
+  type AcceptedEdit,
+  ConnectError,
+  EditError,
+  type RefusedEdit,
+  type Session,
+  type Status,
+} from '../src/api.js';
 import type { Edit } from '../src/edit.js';
 import { connect, type ConnectOptions } from '../src/session.js';
 import { FakeNet } from './support/fake-link.js';
@@ -55,8 +62,9 @@ describe('connecting', () => {
     const session = connect('https://host:4443/a/b/?jwt=x.y.z', { connector: net.connector });
     sessions.push(session);
     await pass(0);
-    expect([session.origin, session.scene]).toEqual(['https://host:4443', 'a/b']);
-    expect(net.link.target).toMatchObject({ scene: 'a/b', token: 'x.y.z', client: session.client });
+    expect([session.origin, session.scene]).toEqual(['https://host:4443', 'b']);
+    expect(session.files).toBe('https://host:4443/a/scene/');
+    expect(net.link.target).toMatchObject({ scene: 'b', token: 'x.y.z', client: session.client });
     expect(session.client).toMatch(/^[0-9a-f]{32}$/);
   });
 
@@ -122,7 +130,39 @@ describe('connecting', () => {
   it('says so when the server has no such scene', async () => {
     const { statuses } = open(new FakeNet());
     await pass(6);
-    expect(statuses.find((status) => status.state === 'lost')?.reason).toContain('no scene named test');
+    const lost = statuses.find((status) => status.state === 'lost');
+    expect(lost).toMatchObject({ problem: 'scene', reason: expect.stringContaining('no scene named test') });
+  });
+
+  it.each([
+    {
+      casts: 'cornell',
+      problem: 'scene',
+      reason: 'it casts cornell: connect to https://localhost:4443/cornell',
+    },
+    { casts: 'test', problem: 'silent', reason: 'sends no light' },
+  ])('asks a server that sends no catalog: it casts $casts', async ({ casts, problem, reason }) => {
+    const net = new FakeNet();
+    const { statuses } = open(net);
+    await pass(0);
+    net.link.scene = casts;
+    await pass(6);
+    const lost = statuses.find((status) => status.state === 'lost');
+    expect(lost).toMatchObject({ problem, reason: expect.stringContaining(reason) });
+  });
+
+  it('says what its connector knows, and that a connection broke', async () => {
+    const net = new FakeNet();
+    net.refuse = new ConnectError('origin', 'not from there');
+    const { statuses } = open(net);
+    await pass(0.1);
+    expect(statuses.at(-1)).toMatchObject({ state: 'lost', problem: 'origin', reason: 'not from there' });
+    net.refuse = undefined;
+    await pass(0.5);
+    net.link.deliver('catalog', new FakeServer().catalog);
+    net.link.break('gone');
+    await pass(0);
+    expect(statuses.at(-1)).toEqual({ state: 'lost', reason: 'gone', retryIn: expect.any(Number) });
   });
 
   it('stops for good at a server of another wire version', async () => {
@@ -130,7 +170,7 @@ describe('connecting', () => {
     const { session, statuses } = open(net);
     await pass(0);
     net.link.deliver('catalog', json({ lumencast: 2 }));
-    expect(statuses.at(-1)).toMatchObject({ state: 'closed', reason: expect.stringContaining('version 2') });
+    expect(statuses.at(-1)).toMatchObject({ state: 'closed', problem: 'version' });
     await expect(session.ready).rejects.toThrow('version 2');
     await pass(60);
     expect(net.links.length).toBe(1);

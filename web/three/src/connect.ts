@@ -1,7 +1,8 @@
 import { connect, type ConnectOptions as SessionOptions, type Session } from '@lumencast/client';
 import type { Mesh, Scene } from 'three';
 import { loadGltf } from './content.js';
-import { type AttachOptions, LumencastLight, type SceneEvent, sceneFile } from './light.js';
+import { joined, reportLosses } from './joining.js';
+import { type AttachOptions, LumencastLight, type SceneEvent, sceneFile, warnInConsole } from './light.js';
 import type { Platform } from './platform.js';
 
 export interface ConnectOptions extends AttachOptions {
@@ -16,15 +17,18 @@ export async function connectWith(
   url: string,
   options: ConnectOptions,
 ): Promise<LumencastLight> {
+  const { scene, onProgress, onWarning = warnInConsole } = options;
   const session = connect(url, options.session);
   const missed = record(session);
   try {
     let { gltf } = options;
-    if (!gltf && !hasMesh(options.scene)) {
-      // A saved light field knows its scene without a server.
-      if (!session.catalog) await session.ready;
-      gltf = await loadGltf(sceneFile(session.origin, session.catalog!.scene.root), options.onProgress);
-      options.scene.add(gltf.scene);
+    const isEmpty = !gltf && !hasMesh(scene);
+    // A saved light field knows its scene without a server.
+    if (isEmpty && !session.catalog) await joined(session);
+    reportLosses(session, onWarning);
+    if (isEmpty) {
+      gltf = await loadGltf(sceneFile(session, session.catalog!.scene.root), onProgress);
+      scene.add(gltf.scene);
     }
     return new LumencastLight(session, platform, { ...options, gltf }, missed());
   } catch (error) {

@@ -15,6 +15,7 @@ import { webglPlatform } from './webgl.js';
 
 export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
 export type { ConnectOptions } from './connect.js';
+export { ConnectError, type Problem } from '@lumencast/client';
 export { Content, loadGltf } from './content.js';
 export type { ProbeGrid } from './platform.js';
 export { isHidden } from './exported.js';
@@ -25,8 +26,13 @@ export type { ShadowOptions } from './shadows.js';
  * Connects to the light of a scene. Without `gltf`, and when the scene shows nothing yet, the server's
  * scene file is loaded and added to it. With `session: { saved }`, the bytes of a `.light` file, its
  * light shows before the server answers, and without one.
- * @param url the server's address with the scene's name as path
- * @throws Error when the scene's file cannot be loaded; connections are tried until one comes about
+ *
+ * Connections are tried until one comes about, and again after a loss. `onWarning` hears of each loss,
+ * with its reason, and of its end.
+ * @param url the server's address with the scene's name as last part of its path
+ * @throws ConnectError when there is nothing to show and no connection comes about: after three attempts,
+ * or at once where a further one would fail alike. It says what happened and what to do.
+ * @throws Error when the scene's file cannot be loaded
  */
 export function connect(
   url: string,

@@ -13,7 +13,7 @@ import { type ShadowOptions, Shadows } from './shadows.js';
 /** What a session must offer; {@link Session} does. */
 export type LightSession = Pick<
   Session,
-  'origin' | 'catalog' | 'status' | 'stats' | 'on' | 'edit' | 'light' | 'sceneTime' | 'setCamera' | 'close'
+  'files' | 'catalog' | 'status' | 'stats' | 'on' | 'edit' | 'light' | 'sceneTime' | 'setCamera' | 'close'
 >;
 
 export interface AttachOptions {
@@ -44,9 +44,14 @@ export function nameOf(uri: string): string {
   });
 }
 
-/** The address of a file of a server's scene, by its name. */
-export function sceneFile(origin: string, file: string): string {
-  return new URL(`/scene/${file.split('/').map(encodeURIComponent).join('/')}`, origin).href;
+/** The address of a file of a session's scene, by its name. */
+export function sceneFile({ files }: Pick<LightSession, 'files'>, name: string): string {
+  return new URL(name.split('/').map(encodeURIComponent).join('/'), files).href;
+}
+
+/** Where warnings go unless a program takes them. */
+export function warnInConsole(message: string): void {
+  console.warn(`Lumencast: ${message}`);
 }
 
 /** What a session tells of the scene. */
@@ -94,7 +99,7 @@ export class LumencastLight {
     missed: readonly SceneEvent[] = [],
   ) {
     const { scene, gltf, shadows = {} } = options;
-    this.#warn = options.onWarning ?? ((message) => console.warn(`Lumencast: ${message}`));
+    this.#warn = options.onWarning ?? warnInConsole;
     this.#grids = new ProbeGrids(scene, platform);
     this.#shadows = shadows === false ? undefined : new Shadows(shadows);
     this.#replica = new Replica(scene, gltf, session, (file) => this.urlOf(file), {
@@ -198,7 +203,7 @@ export class LumencastLight {
 
   /** The address of a file of the scene, which edits name by its URI. */
   urlOf(uri: string): string {
-    return sceneFile(this.session.origin, nameOf(uri));
+    return sceneFile(this.session, nameOf(uri));
   }
 
   /** Ends the session and gives the scene back without its indirect light. */

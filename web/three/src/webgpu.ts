@@ -22,6 +22,7 @@ import { unitsTaken } from './units.js';
 
 export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
 export type { ConnectOptions } from './connect.js';
+export { ConnectError, type Problem } from '@lumencast/client';
 
 /** See `connect` of `@lumencast/three`; it initialises the renderer where the program has not. */
 export async function connect(

@@ -1,4 +1,5 @@
 /** Connecting a scene to a light, with and without a server. */
+import { ConnectError } from '@lumencast/client';
 import { type Mesh, PerspectiveCamera, Scene } from 'three';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { FakeNet } from '../../client/test/support/fake-link.js';
@@ -79,4 +80,54 @@ describe('connect', () => {
     expect(light.content.object(0)).toBe(scene.getObjectByName('wall') as Mesh);
     light.dispose();
   });
+
+  it('rejects when there is nothing to show and three attempts have failed', async () => {
+    net.refuse = new ConnectError('unreachable', 'nobody answers');
+    const attempts = vi.fn(net.connector);
+    const connecting = connectWith(platform, 'http://localhost:4443/test', {
+      scene: new Scene(),
+      session: { connector: attempts },
+    });
+    await expect(connecting).rejects.toMatchObject({ problem: 'unreachable', message: 'nobody answers' });
+    expect(attempts).toHaveBeenCalledTimes(3);
+    await new Promise((resolve) => setTimeout(resolve, 1100));
+    expect(attempts).toHaveBeenCalledTimes(3);
+  });
+
+  it('rejects at once where further attempts would fail alike', async () => {
+    net.refuse = new ConnectError('origin', 'not from there');
+    const attempts = vi.fn(net.connector);
+    const connecting = connectWith(platform, 'http://localhost:4443/test', {
+      scene: new Scene(),
+      session: { connector: attempts },
+    });
+    await expect(connecting).rejects.toMatchObject({ problem: 'origin' });
+    expect(attempts).toHaveBeenCalledTimes(1);
+  });
+
+  it('warns once of a server that is not there while the page has a scene, and goes on trying', async () => {
+    net.refuse = new ConnectError('unreachable', 'nobody answers');
+    const attempts = vi.fn(net.connector);
+    const onWarning = vi.fn<(message: string) => void>();
+    const gltf = await load(ROOM);
+    const scene = new Scene().add(gltf.scene);
+    const session = { connector: attempts };
+    const light = await connectWith(platform, 'http://localhost:4443/test', {
+      ...{ scene, gltf, onWarning, session },
+    });
+    await vi.waitFor(() => expect(attempts.mock.calls.length).toBeGreaterThan(2), { timeout: 10_000 });
+    expect(onWarning.mock.calls).toEqual([['nobody answers; trying again']]);
+    net.refuse = new ConnectError('origin', 'not from there');
+    await vi.waitFor(() => expect(onWarning).toHaveBeenCalledTimes(2), { timeout: 10_000 });
+    expect(onWarning).toHaveBeenLastCalledWith('not from there; trying again');
+    net.refuse = undefined;
+    await vi.waitFor(() => net.link, { timeout: 10_000 });
+    net.link.deliver('catalog', new FakeServer().catalog);
+    expect(onWarning).toHaveBeenLastCalledWith('connected to the server');
+    net.link.break('the server has gone');
+    await vi.waitFor(() => expect(onWarning).toHaveBeenCalledTimes(4));
+    expect(onWarning).toHaveBeenLastCalledWith('the server has gone; trying again');
+    light.dispose();
+    expect(onWarning).toHaveBeenCalledTimes(4);
+  }, 60_000);
 });

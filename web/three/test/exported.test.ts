@@ -200,7 +200,8 @@ describe('padding', () => {
 
 describe('the address of a file', () => {
   it('is that of its name', () => {
-    expect(sceneFile('http://a', 'the data/50%.bin')).toBe('http://a/scene/the%20data/50%25.bin');
+    const files = 'http://a/b/scene/';
+    expect(sceneFile({ files }, 'the data/50%.bin')).toBe('http://a/b/scene/the%20data/50%25.bin');
     for (const uri of ['caf%C3%A9 50%.bin', 'caf%c3%a9%2050%25.bin', 'café 50%.bin'])
       expect(nameOf(uri)).toBe('café 50%.bin');
     expect(nameOf('caf%E9.bin')).toBe('caf%E9.bin');

@@ -24,7 +24,7 @@ const settle = () => new Promise((resolve) => setTimeout(resolve));
 
 class FakeSession {
   readonly sent: { edit: Edit; accept: () => void; refuse: (error: Error) => void }[] = [];
-  readonly origin = 'http://localhost:1';
+  readonly files = 'http://localhost:1/scene/';
   catalog: SessionEvents['catalog'] | undefined;
   state: LightState = { fields: [], age: undefined };
   closed = false;

@@ -2,7 +2,8 @@ import { Broadcast, Connection, Group, Path, Time, type Track } from '@moq/net';
 
 import { LIMITS } from '../codec/limits.js';
 import type { Connector, Link, ReadOptions, Target, TrackReader } from '../transport.js';
-import { offeredCertificateHash } from './certificate.js';
+import { developmentServer } from './certificate.js';
+import { castScene, diagnose } from './diagnosis.js';
 
 /**
  * Milliseconds before a WebSocket is tried beside WebTransport. Long, because a page that is busy
@@ -16,35 +17,34 @@ const GROUP_FRAMES = 512;
 
 /** Connects by Media over QUIC, over WebTransport or, where that fails, a WebSocket. */
 export const moqConnector: Connector = async (target, signal) => {
-  const connection = await Connection.connect(address(target), {
-    signal,
-    webtransport: await webTransportOptions(target, signal),
-    websocket: {
-      enabled: target.transport !== 'webtransport',
-      delay: target.transport === 'websocket' ? 0 : WEBSOCKET_DELAY,
-    },
-  });
-  return new MoqLink(connection, target);
+  const { base, transport, certificateHash } = target;
+  // With an http address the library asks for the hash itself.
+  const asked = base.protocol === 'https:' && !certificateHash;
+  const found = asked ? await developmentServer(base, signal) : undefined;
+  const hash = certificateHash ?? found?.hash;
+  try {
+    const connection = await Connection.connect(dialled(base, target), {
+      signal,
+      webtransport: hash ? { serverCertificateHashes: [{ value: hash }] } : {},
+      websocket: {
+        enabled: transport !== 'webtransport',
+        delay: transport === 'websocket' ? 0 : WEBSOCKET_DELAY,
+        url: dialled(found?.base ?? base, target),
+      },
+    });
+    return new MoqLink(connection, target, found?.base ?? base);
+  } catch (error) {
+    throw await diagnose(target, found?.base ?? base, error);
+  }
 };
 
-/** The root is dialled, so that names mean the same through any relay. */
-function address(target: Target): URL {
-  const url = new URL('/', target.url);
-  if (target.token) url.searchParams.set('jwt', target.token);
+/** The base is dialled and not the scene, so that names mean the same through any relay. */
+function dialled(base: URL, { token, transport }: Target): URL {
+  const url = new URL(base);
+  if (token) url.searchParams.set('jwt', token);
   // WebTransport refuses these schemes, which leaves the WebSocket.
-  if (target.transport === 'websocket') url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+  if (transport === 'websocket') url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
   return url;
-}
-
-async function webTransportOptions(
-  target: Target,
-  signal: AbortSignal,
-): Promise<Connection.WebTransportProps> {
-  // With an http address the library asks for the hash itself.
-  const asked = target.url.protocol === 'https:' && target.transport !== 'websocket';
-  const hash =
-    target.certificateHash ?? (asked ? await offeredCertificateHash(target.url, signal) : undefined);
-  return hash ? { serverCertificateHashes: [{ value: hash }] } : {};
 }
 
 class MoqLink implements Link {
@@ -56,6 +56,7 @@ class MoqLink implements Link {
   constructor(
     private readonly connection: Connection.Established,
     target: Target,
+    readonly base: URL,
   ) {
     this.kind = connection.transport;
     this.scene = Path.from(target.scene);
@@ -65,6 +66,10 @@ class MoqLink implements Link {
       () => 'the server closed the connection',
       (error: unknown) => `the connection broke: ${(error as Error)?.message || 'no reason given'}`,
     );
+  }
+
+  casts(): Promise<string | undefined> {
+    return castScene(this.base);
   }
 
   subscribe(track: string, options: ReadOptions, onFrame: (frame: Uint8Array) => void): TrackReader {

@@ -15,6 +15,8 @@ export class FakeLink implements Link {
   private end: (reason: string) => void = () => {};
   closed = false;
   bitsPerSecond: number | undefined;
+  /** The scene that the server says it casts. */
+  scene: string | undefined;
 
   constructor(readonly target: Target) {
     this.ended = new Promise((resolve) => (this.end = resolve));
@@ -34,6 +36,10 @@ export class FakeLink implements Link {
 
   sendEdit(frame: Uint8Array): void {
     this.edits.push(JSON.parse(new TextDecoder().decode(frame)));
+  }
+
+  casts(): Promise<string | undefined> {
+    return Promise.resolve(this.scene);
   }
 
   bandwidth(): number | undefined {
@@ -69,10 +75,10 @@ export class FakeLink implements Link {
 /** A connector whose connections a test answers. */
 export class FakeNet {
   readonly links: FakeLink[] = [];
-  refuse: string | undefined;
+  refuse: string | Error | undefined;
 
   readonly connector: Connector = async (target) => {
-    if (this.refuse !== undefined) throw new Error(this.refuse);
+    if (this.refuse !== undefined) throw this.refuse instanceof Error ? this.refuse : new Error(this.refuse);
     const link = new FakeLink(target);
     this.links.push(link);
     return link;

@@ -37,7 +37,7 @@ export function session(light: LightState, fields: readonly Field[] = []): Light
     fields,
   };
   return {
-    origin: location.origin,
+    files: `${location.origin}/scene/`,
     catalog,
     light: () => light,
     on: () => () => {},

@@ -1,9 +1,7 @@
-import { mkdtempSync, rmSync } from 'node:fs';
-import { tmpdir } from 'node:os';
-import { join, resolve } from 'node:path';
+import { resolve } from 'node:path';
 import type { Page } from 'playwright-core';
-import { build, preview } from 'vite';
 import { launchBrowser } from '../../../testing/chromium.js';
+import { servePages } from '../../../testing/page.js';
 
 /** The page of `test/render` in a headless browser. */
 export interface RenderPage {
@@ -14,28 +12,7 @@ export interface RenderPage {
 }
 
 export async function openRenderPage(): Promise<RenderPage> {
-  const folder = mkdtempSync(join(tmpdir(), 'lumencast-render-'));
-  const root = resolve(import.meta.dirname, '../render');
-  await build({
-    configFile: false,
-    root,
-    logLevel: 'error',
-    mode: 'production',
-    resolve: { conditions: ['lumencast-source', 'module', 'browser', 'import', 'default'] },
-    build: {
-      outDir: folder,
-      emptyOutDir: true,
-      target: 'es2023',
-      minify: false,
-      chunkSizeWarningLimit: 5000,
-    },
-  });
-  const vite = await preview({
-    configFile: false,
-    root,
-    build: { outDir: folder },
-    preview: { host: '127.0.0.1', port: 0 },
-  });
+  const pages = await servePages(resolve(import.meta.dirname, '../render'));
   const browser = await launchBrowser();
   const page = await browser.newPage();
   const complaints: string[] = [];
@@ -43,15 +20,14 @@ export async function openRenderPage(): Promise<RenderPage> {
   page.on('console', (message) => {
     if (['error', 'warning'].includes(message.type())) complaints.push(message.text());
   });
-  await page.goto(vite.resolvedUrls!.local[0]);
+  await page.goto(`http://127.0.0.1:${pages.port}/`);
   await page.waitForFunction(() => window.measure);
   return {
     page,
     complaints,
     async close() {
       await browser.close();
-      await vite.close();
-      rmSync(folder, { recursive: true, force: true });
+      await pages.close();
     },
   };
 }

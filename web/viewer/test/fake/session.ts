@@ -24,6 +24,7 @@ const RESOLUTION: Vec3 = [8, 6, 8];
 /** A session without a server, for looking at the page: light that glows warm on one side and cool on the other. */
 export class FakeSession implements Session {
   readonly origin = location.origin;
+  readonly files = `${location.origin}/scene/`;
   readonly scene = 'fake';
   readonly client = 'fake';
   readonly ready = Promise.resolve();
