@@ -89,6 +89,10 @@ export type Status =
       readonly retryIn: number;
     }
   | {
+      /** A saved light field, without any server: see `openLight`. */
+      readonly state: 'saved';
+    }
+  | {
       /** For good: closed by the program, or the server speaks another wire version. */
       readonly state: 'closed';
       readonly reason: string;
@@ -173,7 +177,7 @@ export interface Timing {
   readonly bytes: number;
 }
 
-/** A live connection to the light of one scene. */
+/** A connection to the light of one scene, or a saved light field that stands in for one. */
 export interface Session {
   /** The server's address, without a path. */
   readonly origin: string;
@@ -225,9 +229,9 @@ export class EditError extends Error {
   constructor(
     /**
      * `refused` by the server, `unanswered` though it is connected, `restarted` server, `closed`
-     * session, or `full` list of pending edits.
+     * session, `full` list of pending edits, or `saved` light without a server.
      */
-    readonly kind: 'refused' | 'unanswered' | 'restarted' | 'closed' | 'full',
+    readonly kind: 'refused' | 'unanswered' | 'restarted' | 'closed' | 'full' | 'saved',
     reason: string,
   ) {
     super(reason);

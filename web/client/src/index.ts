@@ -27,6 +27,7 @@ export { type LightFile, readLightFile } from './codec/file.js';
 export { ProbeDecoder, type RegionLight } from './codec/probes.js';
 export { parseState, type StateFrame } from './codec/state.js';
 export type * from './edit.js';
+export { fetchLight, openLight, type SavedOptions } from './saved.js';
 export { connect, type ConnectOptions } from './session.js';
 export type { Connector, Link, ReadOptions, Target, TrackReader } from './transport.js';
 export { WireError, type WireErrorKind } from './wire-error.js';

@@ -16,6 +16,9 @@ import { isPunctualLight, type PunctualLight } from './lights.js';
 import { copyParts } from './materials.js';
 import { materialsOf } from './patch.js';
 
+/** What a web page begins with, <. */
+const MARKUP = 0x3c;
+
 /** An animation and the object whose descendants it moves. */
 export interface Animation {
   readonly clip: AnimationClip;
@@ -162,21 +165,37 @@ function associationsOf({
   return parser.associations;
 }
 
-/** Loads a glTF file; `progress` gets bytes so far and, where known, of all. */
+/**
+ * Loads a glTF file; `progress` gets bytes so far and, where known, of all.
+ * @throws Error, with the address and what was answered, when there is none
+ */
 export async function loadGltf(
   url: string,
   progress?: (loaded: number, total: number | undefined) => void,
 ): Promise<GLTF> {
-  const file = await new FileLoader()
-    .setResponseType('arraybuffer')
-    .loadAsync(url, (event) => progress?.(event.loaded, event.lengthComputable ? event.total : undefined));
+  const file = await loadFile(url, progress);
   const folder = LoaderUtils.extractUrlBase(url);
   const loader = new GLTFLoader().register((parser) => new SpecularGlossiness(parser));
-  const gltf = await loader.parseAsync(blankPadding(file as ArrayBuffer), folder);
+  const gltf = await loader.parseAsync(blankPadding(file), folder);
   if (gltf.scenes.length > 1) await nameNodes(gltf);
   // Matrices decompose into what edits set.
   gltf.scene.traverse((object) => void (object.matrixAutoUpdate = true));
   return gltf;
+}
+
+async function loadFile(url: string, progress: Parameters<typeof loadGltf>[1]): Promise<ArrayBuffer> {
+  const file = await new FileLoader()
+    .setResponseType('arraybuffer')
+    .loadAsync(url, (event) => progress?.(event.loaded, event.lengthComputable ? event.total : undefined))
+    .catch((error: Error & { response?: Response }) => {
+      const status = error.response?.status;
+      const what = status === 404 ? 'is missing' : 'cannot be read';
+      throw new Error(`${url} ${what} (${status ? `HTTP ${status}` : error.message})`, { cause: error });
+    });
+  // Development servers answer with their page where a file is missing; glTF begins with { or glTF.
+  if (new Uint8Array(file as ArrayBuffer)[0] === MARKUP)
+    throw new Error(`${url} is missing (a web page was answered)`);
+  return file as ArrayBuffer;
 }
 
 /** Of a file with several scenes GLTFLoader forgets which object is which node; its parser still knows. */

@@ -9,12 +9,12 @@
  * ```
  */
 import type { WebGLRenderer } from 'three';
-import { type ConnectOptions, connectWith } from './connect.js';
+import { type ConnectOptions, connectWith, type ShowOptions, showWith } from './connect.js';
 import { type AttachOptions, type LightSession, LumencastLight } from './light.js';
 import { webglPlatform } from './webgl.js';
 
 export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
-export type { ConnectOptions } from './connect.js';
+export type { ConnectOptions, ShowOptions } from './connect.js';
 export { ConnectError, type Problem } from '@lumencast/client';
 export { Content, loadGltf } from './content.js';
 export type { ProbeGrid } from './platform.js';
@@ -39,6 +39,18 @@ export function connect(
   options: ConnectOptions & { renderer: WebGLRenderer },
 ): Promise<LumencastLight> {
   return connectWith(webglPlatform(options.renderer), url, options);
+}
+
+/**
+ * Shows a saved light field, the address or the bytes of a `.light` file, without a server. Without
+ * `gltf`, and when the scene shows nothing yet, the scene's file is loaded and added to it.
+ * @throws Error, with the address and what was answered, when a file is missing
+ */
+export function show(
+  light: string | URL | Uint8Array,
+  options: ShowOptions & { renderer: WebGLRenderer },
+): Promise<LumencastLight> {
+  return showWith(webglPlatform(options.renderer), light, options);
 }
 
 /**

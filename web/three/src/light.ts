@@ -1,4 +1,4 @@
-import type { AcceptedEdit, Edit, Environment, Field, Session } from '@lumencast/client';
+import type { AcceptedEdit, Edit, Environment, Field, Session, Status } from '@lumencast/client';
 import { type Camera, type Light, type Object3D, type Scene, Vector3 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import type { Content } from './content.js';
@@ -32,6 +32,9 @@ export type Shown = 'both' | 'direct' | 'indirect';
 
 /** Edits of one object that may be under way at once: more would only queue on a slow link. */
 const MAX_UNDER_WAY = 4;
+
+/** States of a session in which there is nobody to send edits to, and never will be. */
+const NOBODY: ReadonlySet<Status['state']> = new Set<Status['state']>(['saved', 'closed']);
 
 /** The name of the file that a URI stands for; what is no sequence of UTF-8 stays as it is. */
 export function nameOf(uri: string): string {
@@ -132,7 +135,8 @@ export class LumencastLight {
   /**
    * This page moves the object, and changes it when it is a light; the server and every other page
    * follow, up to 30 times a second. Until the returned function is called, others' edits of it do
-   * not show here. A light that is not in the server's scene is added to it.
+   * not show here. A light that is not in the server's scene is added to it. With saved light, nobody
+   * is told.
    * @throws Error when the server cannot know the object.
    */
   follow(object: Object3D): () => void {
@@ -266,6 +270,7 @@ export class LumencastLight {
   }
 
   #sendNow(followed: Followed, now: number): void {
+    if (NOBODY.has(this.session.status.state)) return;
     if (followed.node === undefined) return this.#adopt(followed, now);
     const { node, sent } = followed;
     const pose = this.#poseOf(followed);

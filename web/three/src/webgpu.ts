@@ -14,14 +14,14 @@ import {
   SpotLightNode,
   type WebGPURenderer,
 } from 'three/webgpu';
-import { type ConnectOptions, connectWith } from './connect.js';
+import { type ConnectOptions, connectWith, type ShowOptions, showWith } from './connect.js';
 import { MIN_CONE, MIN_DISTANCE } from './falloff.js';
 import { type AttachOptions, type LightSession, LumencastLight } from './light.js';
 import type { Platform } from './platform.js';
 import { unitsTaken } from './units.js';
 
 export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
-export type { ConnectOptions } from './connect.js';
+export type { ConnectOptions, ShowOptions } from './connect.js';
 export { ConnectError, type Problem } from '@lumencast/client';
 
 /** See `connect` of `@lumencast/three`; it initialises the renderer where the program has not. */
@@ -31,6 +31,15 @@ export async function connect(
 ): Promise<LumencastLight> {
   await options.renderer.init();
   return connectWith(webgpuPlatform(options.renderer), url, options);
+}
+
+/** See `show` of `@lumencast/three`; it initialises the renderer where the program has not. */
+export async function show(
+  light: string | URL | Uint8Array,
+  options: ShowOptions & { renderer: WebGPURenderer },
+): Promise<LumencastLight> {
+  await options.renderer.init();
+  return showWith(webgpuPlatform(options.renderer), light, options);
 }
 
 /**

@@ -1,11 +1,11 @@
 /** Connecting a scene to a light, with and without a server. */
 import { ConnectError } from '@lumencast/client';
-import { type Mesh, PerspectiveCamera, Scene } from 'three';
+import { type Mesh, PerspectiveCamera, PointLight, Scene } from 'three';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { FakeNet } from '../../client/test/support/fake-link.js';
 import { FakeServer } from '../../client/test/support/fake-server.js';
 import { lightFile } from '../../client/test/support/light-file.js';
-import { connectWith } from '../src/connect.js';
+import { connectWith, showWith } from '../src/connect.js';
 import { glbUrl, load, POSITION } from './support/glb.js';
 import { platform } from './support/platform.js';
 
@@ -130,4 +130,65 @@ describe('connect', () => {
     light.dispose();
     expect(onWarning).toHaveBeenCalledTimes(4);
   }, 60_000);
+});
+
+describe('show', () => {
+  const saved = lightFile(new FakeServer({ brightness: () => 7 }));
+
+  it('draws a saved light field in the scene beside it, and asks for nothing else', async () => {
+    const served = vi.fn((request: Request | URL) => {
+      const { href } = new URL(request instanceof URL ? request : request.url);
+      return href.endsWith('.light') ? Promise.resolve(new Response(saved as BodyInit)) : fetch(glbUrl(ROOM));
+    });
+    const { fetch } = globalThis;
+    vi.stubGlobal('fetch', served);
+    const scene = new Scene();
+    const light = await showWith(platform, 'http://host/shop/room.light', { scene });
+    expect(scene.getObjectByName('wall')).toBeDefined();
+    expect(
+      served.mock.calls.map(([request]) => String(request instanceof URL ? request : request.url)),
+    ).toEqual(['http://host/shop/room.light', 'http://host/shop/test.glb']);
+    expect(light.urlOf('sky.hdr')).toBe('http://host/shop/sky.hdr');
+    light.update(camera);
+    expect(light.lightRevision).toBe(1);
+    expect(brightest(light.grids[0].texture!.image.data as Uint16Array)).toBeGreaterThan(0);
+    light.dispose();
+    expect(served).toHaveBeenCalledTimes(2);
+  });
+
+  it('lets a page move things, refuses edits in words, and warns of nothing', async () => {
+    const gltf = await load(ROOM);
+    const scene = new Scene().add(gltf.scene);
+    const onWarning = vi.fn();
+    const light = await showWith(platform, saved, { scene, gltf, onWarning });
+    const wall = scene.getObjectByName('wall')!;
+    light.follow(wall);
+    light.follow(new PointLight());
+    for (const x of [1, 2, 3]) {
+      wall.position.x = x;
+      light.update(camera, 1000 * x);
+    }
+    await Promise.resolve();
+    expect(onWarning).not.toHaveBeenCalled();
+    const edit = light.edit({
+      edit: 'set_environment',
+      environment: { type: 'constant', radiance: [1, 1, 1] },
+    });
+    await expect(edit).rejects.toThrow('there is no server');
+    light.dispose();
+  });
+
+  it('names a file that is missing', async () => {
+    vi.stubGlobal('fetch', () => Promise.resolve(new Response('', { status: 404 })));
+    const scene = new Scene();
+    const missing = 'http://host/room.light is missing (HTTP 404)';
+    await expect(showWith(platform, 'http://host/room.light', { scene })).rejects.toThrow(missing);
+    const options = { scene, file: 'http://host/room.glb' };
+    await expect(showWith(platform, saved, options)).rejects.toThrow(
+      'http://host/room.glb is missing (HTTP 404)',
+    );
+    vi.stubGlobal('ProgressEvent', class {});
+    vi.stubGlobal('fetch', () => Promise.resolve(new Response('<!doctype html>')));
+    await expect(showWith(platform, saved, options)).rejects.toThrow('a web page was answered');
+  });
 });

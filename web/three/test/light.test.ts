@@ -25,6 +25,7 @@ const settle = () => new Promise((resolve) => setTimeout(resolve));
 class FakeSession {
   readonly sent: { edit: Edit; accept: () => void; refuse: (error: Error) => void }[] = [];
   readonly files = 'http://localhost:1/scene/';
+  readonly status = { state: 'connected', transport: 'websocket' } as const;
   catalog: SessionEvents['catalog'] | undefined;
   state: LightState = { fields: [], age: undefined };
   closed = false;

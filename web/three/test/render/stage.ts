@@ -39,6 +39,7 @@ export function session(light: LightState, fields: readonly Field[] = []): Light
   return {
     files: `${location.origin}/scene/`,
     catalog,
+    status: { state: 'connected', transport: 'websocket' },
     light: () => light,
     on: () => () => {},
     sceneTime: () => 0,
