@@ -10,6 +10,7 @@ import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { loadGltf } from './content.js';
 import { joined, reportLosses } from './joining.js';
 import { type AttachOptions, LumencastLight, type SceneEvent, sceneFile, warnInConsole } from './light.js';
+import { type NamedNode, readNames } from './names.js';
 import type { Platform } from './platform.js';
 
 interface LoadOptions extends AttachOptions {
@@ -39,7 +40,8 @@ export async function connectWith(
     if (isToLoad(options) && !session.catalog) await joined(session);
     reportLosses(session, options.onWarning ?? warnInConsole);
     const gltf = await sceneOf(session, options);
-    return new LumencastLight(session, platform, { ...options, gltf }, missed());
+    const names = gltf ? undefined : namesOn(session);
+    return new LumencastLight(session, platform, { ...options, gltf }, missed(), names);
   } catch (error) {
     session.close();
     throw error;
@@ -59,6 +61,12 @@ export async function showWith(
   const session = openLight(bytes, files === undefined ? {} : { files });
   const gltf = await sceneOf(session, options, file);
   return new LumencastLight(session, platform, { ...options, gltf });
+}
+
+/** The names of the server's nodes, by which a page's own scene is matched with them. */
+async function namesOn(session: Session): Promise<readonly NamedNode[]> {
+  await session.ready;
+  return readNames(sceneFile(session, session.catalog!.scene.root));
 }
 
 /** Whether the scene shows nothing yet. */

@@ -13,14 +13,23 @@ export interface Pose {
 
 /** A node's place relative to its parent, and its light where it has one. */
 export function poseOf(object: Object3D, light: PunctualLight | undefined): Pose {
+  const isAimed = light === object && 'target' in light && light.target.parent !== light;
+  const rotation = isAimed ? aimed(light) : object.quaternion;
   return {
     transform: {
       translation: object.position.toArray(),
-      rotation: object.quaternion.toArray() as [number, number, number, number],
+      rotation: rotation.toArray() as [number, number, number, number],
       scale: object.scale.toArray(),
     },
     light: light && lightSpec(light),
   };
+}
+
+/** The rotation below its parent by which a light shines at a target that is not its own. */
+function aimed(light: PunctualLight): Quaternion {
+  const { rotation } = worldPoseOf(light).transform;
+  const parent = light.parent?.getWorldQuaternion(new Quaternion()) ?? new Quaternion();
+  return parent.invert().multiply(new Quaternion(...rotation));
 }
 
 /** The same in world space, for a light of the program's own: it may have a parent, and a target. */

@@ -3,7 +3,7 @@
  * WebGPURenderer import the same names from `@lumencast/three/webgpu`.
  *
  * ```ts
- * const light = await connect('https://localhost:4443/sponza', { scene, renderer });
+ * const light = await connect('http://localhost:4443/sponza', { scene, renderer });
  * light.follow(lamp); // this page moves it; the server and everyone else follow
  * renderer.setAnimationLoop(() => { light.update(camera); renderer.render(scene, camera); });
  * ```
@@ -13,19 +13,13 @@ import { type ConnectOptions, connectWith, type ShowOptions, showWith } from './
 import { type AttachOptions, type LightSession, LumencastLight } from './light.js';
 import { webglPlatform } from './webgl.js';
 
-export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
-export type { ConnectOptions, ShowOptions } from './connect.js';
-export { ConnectError, type Problem } from '@lumencast/client';
-export { Content, loadGltf } from './content.js';
-export type { ProbeGrid } from './platform.js';
-export { isHidden } from './exported.js';
-export { createLight, isPunctualLight, lightSpec, type PunctualLight } from './lights.js';
-export type { ShadowOptions } from './shadows.js';
+export * from './common.js';
 
 /**
  * Connects to the light of a scene. Without `gltf`, and when the scene shows nothing yet, the server's
- * scene file is loaded and added to it. With `session: { saved }`, the bytes of a `.light` file, its
- * light shows before the server answers, and without one.
+ * scene file is loaded and added to it. A scene of the program's own is matched with the server's by the
+ * names of its objects. With `session: { saved }`, the bytes of a `.light` file, its light shows before
+ * the server answers.
  *
  * Connections are tried until one comes about, and again after a loss. `onWarning` hears of each loss,
  * with its reason, and of its end.

@@ -1,11 +1,12 @@
-import type { AcceptedEdit, Edit, Environment, Field, Session, Status } from '@lumencast/client';
+import type { AcceptedEdit, Edit, Environment, Field, Session } from '@lumencast/client';
 import { type Camera, type Light, type Object3D, type Scene, Vector3 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import type { Content } from './content.js';
 import { expose, type SetWhileDrawn, whileDrawn } from './exposure.js';
-import { changedParts, FOLLOW_INTERVAL, type Pose, poseOf, worldPoseOf } from './follow.js';
+import { Following } from './following.js';
 import { ProbeGrids } from './grids.js';
-import { describeLight, isPunctualLight } from './lights.js';
+import { isPunctualLight } from './lights.js';
+import type { NamedNode } from './names.js';
 import type { Platform, ProbeGrid } from './platform.js';
 import { Replica } from './replica.js';
 import { type ShadowOptions, Shadows } from './shadows.js';
@@ -29,12 +30,6 @@ export interface AttachOptions {
 
 /** Which part of the light is drawn; emission and background are in all of them. */
 export type Shown = 'both' | 'direct' | 'indirect';
-
-/** Edits of one object that may be under way at once: more would only queue on a slow link. */
-const MAX_UNDER_WAY = 4;
-
-/** States of a session in which there is nobody to send edits to, and never will be. */
-const NOBODY: ReadonlySet<Status['state']> = new Set<Status['state']>(['saved', 'closed']);
 
 /** The name of the file that a URI stands for; what is no sequence of UTF-8 stays as it is. */
 export function nameOf(uri: string): string {
@@ -60,16 +55,6 @@ export function warnInConsole(message: string): void {
 /** What a session tells of the scene. */
 export type SceneEvent = { readonly snapshot: readonly Edit[] } | { readonly accepted: AcceptedEdit };
 
-interface Followed {
-  readonly object: Object3D;
-  node: number | undefined;
-  release: (() => void) | undefined;
-  sent: Pose | undefined;
-  sentAt: number;
-  /** Edits that the server has not dealt with yet. */
-  readonly underWay: Set<Promise<void>>;
-}
-
 /** A scene lit by a server: streamed indirect light, and the server's edits applied. */
 export class LumencastLight {
   /**
@@ -84,7 +69,7 @@ export class LumencastLight {
   readonly #replica: Replica;
   readonly #grids: ProbeGrids;
   readonly #shadows: Shadows | undefined;
-  readonly #followed = new Map<Object3D, Followed>();
+  readonly #following: Following;
   readonly #unsubscribe: (() => void)[];
   readonly #camera = new Vector3();
   readonly #warn: (message: string) => void;
@@ -100,6 +85,7 @@ export class LumencastLight {
     private readonly platform: Platform,
     private readonly options: AttachOptions,
     missed: readonly SceneEvent[] = [],
+    names?: Promise<readonly NamedNode[]>,
   ) {
     const { scene, gltf, shadows = {} } = options;
     this.#warn = options.onWarning ?? warnInConsole;
@@ -110,6 +96,7 @@ export class LumencastLight {
       removed: (object) => this.#shadows?.remove(object),
       warning: this.#warn,
     });
+    this.#following = new Following(session, this.#replica, this.#warn);
     this.#added(scene);
     this.#restoreHooks = whileDrawn(scene, (set) => this.#changeWhileDrawn(set));
     this.#unsubscribe = [
@@ -119,6 +106,7 @@ export class LumencastLight {
     ];
     for (const event of missed) this.#receive(event);
     if (session.catalog) this.#setFields(session.catalog.fields);
+    if (names) void this.#following.match(names, scene);
   }
 
   /** To be called each frame, before rendering. `now` is `performance.now()`. */
@@ -126,7 +114,7 @@ export class LumencastLight {
     this.session.setCamera(this.#camera.setFromMatrixPosition(camera.matrixWorld).toArray());
     this.#warnOnce(this.#grids.fit());
     if (this.#grids.update(this.session.light(now))) this.#lightRevision++;
-    for (const followed of this.#followed.values()) this.#send(followed, now);
+    this.#following.send(now);
     this.#replica.update(this.session.sceneTime(now));
     this.platform.patch(this.options.scene);
     this.#fitShadows(now);
@@ -135,30 +123,22 @@ export class LumencastLight {
   /**
    * This page moves the object, and changes it when it is a light; the server and every other page
    * follow, up to 30 times a second. Until the returned function is called, others' edits of it do
-   * not show here. A light that is not in the server's scene is added to it. With saved light, nobody
-   * is told.
+   * not show here. A light that is not in the server's scene is added to it, with a warning. With saved
+   * light, nobody is told.
    * @throws Error when the server cannot know the object.
    */
   follow(object: Object3D): () => void {
-    if (this.#followed.has(object)) return () => this.#unfollow(object);
-    const node = this.#replica.content.nodeOf(object);
-    if (node === undefined && !isPunctualLight(object)) {
-      throw new Error(`${object.name || object.type} is not part of the server's scene, and not a light`);
-    }
-    const followed: Followed = {
-      object,
-      node,
-      release: undefined,
-      sent: undefined,
-      sentAt: 0,
-      underWay: new Set(),
-    };
-    if (node !== undefined) {
-      followed.release = this.#replica.hold(node);
-      followed.sent = this.#poseOf(followed);
-    }
-    this.#followed.set(object, followed);
-    return () => this.#unfollow(object);
+    this.#following.add(object);
+    return () => this.#following.remove(object);
+  }
+
+  /**
+   * Says that an object of the program's own scene stands for a node of the server's: what changes the
+   * one changes the other from now on. It must hang below what stands for the node's parent, as edits
+   * place nodes relative to theirs. Needed only where names do not say it.
+   */
+  setNode(object: Object3D, node: number): void {
+    this.#replica.setNodes([[object, node]]);
   }
 
   /** Shows an edit at once and sends it. Rejects, with the scene as before, when it is refused. */
@@ -212,7 +192,7 @@ export class LumencastLight {
 
   /** Ends the session and gives the scene back without its indirect light. */
   dispose(): void {
-    for (const object of [...this.#followed.keys()]) this.#unfollow(object);
+    this.#following.clear();
     for (const unsubscribe of this.#unsubscribe) unsubscribe();
     this.#restoreHooks();
     this.#grids.dispose();
@@ -247,11 +227,7 @@ export class LumencastLight {
   /** The file's state and a snapshot on it; what this page follows stays as it is and is sent anew. */
   #joined(edits: readonly Edit[]): void {
     this.#replica.applySnapshot(edits);
-    for (const followed of this.#followed.values()) {
-      followed.sent = undefined;
-      if (followed.node !== undefined && this.content.object(followed.node) === undefined)
-        followed.node = undefined;
-    }
+    this.#following.restart();
   }
 
   #fitShadows(now: number): void {
@@ -262,65 +238,6 @@ export class LumencastLight {
       this.#shadows?.fit(this.options.gltf?.scene ?? this.options.scene);
     }
     this.#shadows?.update();
-  }
-
-  #send(followed: Followed, now: number): void {
-    if (now - followed.sentAt < FOLLOW_INTERVAL || followed.underWay.size >= MAX_UNDER_WAY) return;
-    this.#sendNow(followed, now);
-  }
-
-  #sendNow(followed: Followed, now: number): void {
-    if (NOBODY.has(this.session.status.state)) return;
-    if (followed.node === undefined) return this.#adopt(followed, now);
-    const { node, sent } = followed;
-    const pose = this.#poseOf(followed);
-    const transform = changedParts(sent?.transform, pose.transform);
-    const light = pose.light && changedParts(sent?.light, pose.light);
-    if (!transform && !light) return;
-    followed.sent = pose;
-    followed.sentAt = now;
-    this.#replica.revision++;
-    if (transform) this.#track(followed, this.session.edit({ edit: 'move_node', node, ...transform }));
-    if (light) this.#track(followed, this.session.edit({ edit: 'set_light', node, ...light }));
-  }
-
-  #poseOf({ object, node }: Followed): Pose {
-    if (isPunctualLight(object) && (node === undefined || this.#replica.isAdopted(node)))
-      return worldPoseOf(object);
-    if (node === undefined) return poseOf(object, undefined);
-    return poseOf(this.content.object(node) ?? object, this.content.light(node));
-  }
-
-  #adopt(followed: Followed, now: number): void {
-    const { object } = followed;
-    if (!isPunctualLight(object) || followed.underWay.size > 0) return;
-    const pose = this.#poseOf(followed);
-    followed.sent = pose;
-    followed.sentAt = now;
-    const adopted = this.#replica.adoptLight(object, describeLight(object), pose.transform).then((node) => {
-      followed.node = node;
-      followed.release = this.#replica.hold(node);
-    });
-    this.#track(followed, adopted);
-  }
-
-  #track(followed: Followed, edit: Promise<void>): void {
-    const settled = edit
-      .catch((error: unknown) => {
-        const { name, type } = followed.object;
-        if (this.#followed.has(followed.object)) this.#warn(`${name || type}: ${(error as Error).message}`);
-      })
-      .finally(() => followed.underWay.delete(settled));
-    followed.underWay.add(settled);
-  }
-
-  #unfollow(object: Object3D): void {
-    const followed = this.#followed.get(object);
-    if (!followed) return;
-    this.#sendNow(followed, performance.now());
-    this.#followed.delete(object);
-    // The last of our edits must be in the server's order before others' show again.
-    void Promise.all(followed.underWay).then(() => followed.release?.());
   }
 
   #changeWhileDrawn(set: SetWhileDrawn): void {

@@ -121,6 +121,13 @@ export class Replica implements Values {
     });
   }
 
+  /** Lets objects of the program's own scene stand for nodes, as they now are on the server. */
+  setNodes(pairs: readonly (readonly [object: Object3D, node: number])[]): void {
+    for (const [object, node] of pairs) this.content.setNode(node, object);
+    this.#reconciler.arrived();
+    this.revision++;
+  }
+
   /** Whether a node is one of the program's own lights. */
   isAdopted(node: number): boolean {
     return this.#adopted.has(node);

@@ -20,9 +20,7 @@ import { type AttachOptions, type LightSession, LumencastLight } from './light.j
 import type { Platform } from './platform.js';
 import { unitsTaken } from './units.js';
 
-export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
-export type { ConnectOptions, ShowOptions } from './connect.js';
-export { ConnectError, type Problem } from '@lumencast/client';
+export * from './common.js';
 
 /** See `connect` of `@lumencast/three`; it initialises the renderer where the program has not. */
 export async function connect(

@@ -1,6 +1,6 @@
 /** Connecting a scene to a light, with and without a server. */
 import { ConnectError } from '@lumencast/client';
-import { type Mesh, PerspectiveCamera, PointLight, Scene } from 'three';
+import { Mesh, PerspectiveCamera, PointLight, Scene } from 'three';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { FakeNet } from '../../client/test/support/fake-link.js';
 import { FakeServer } from '../../client/test/support/fake-server.js';
@@ -23,8 +23,8 @@ beforeEach(() => {
   net = new FakeNet();
   asked = [];
   const { fetch } = globalThis;
-  vi.stubGlobal('fetch', (request: Request) => {
-    asked.push(request.url);
+  vi.stubGlobal('fetch', (request: Request | string) => {
+    asked.push(new Request(request).url);
     return fetch(glbUrl(ROOM));
   });
 });
@@ -78,6 +78,35 @@ describe('connect', () => {
     });
     expect(asked).toEqual([]);
     expect(light.content.object(0)).toBe(scene.getObjectByName('wall') as Mesh);
+    light.dispose();
+  });
+
+  it('matches a page’s own scene with the server’s by name', async () => {
+    const wall = new Mesh();
+    wall.name = 'wall';
+    const [stray, plant] = [new PointLight(), new Mesh()];
+    stray.name = 'stray';
+    plant.name = 'plant';
+    const scene = new Scene().add(wall, stray, plant);
+    const onWarning = vi.fn<(message: string) => void>();
+    const light = await connectWith(platform, 'http://localhost:4443/test', {
+      ...{ scene, onWarning, session: { connector: net.connector } },
+    });
+    // Before the server has said what it has.
+    for (const object of [wall, stray, plant]) light.follow(object);
+    light.update(camera, 100);
+    expect(onWarning).not.toHaveBeenCalled();
+    net.link.deliver('catalog', new FakeServer().catalog);
+    await vi.waitFor(() => expect(light.content.object(0)).toBe(wall));
+    expect(asked).toEqual(['http://localhost:4443/scene/test.glb']);
+    await vi.waitFor(() => expect(onWarning).toHaveBeenCalledTimes(1));
+    expect(onWarning.mock.lastCall![0]).toContain('plant is not part of the server');
+    light.update(camera, 200);
+    expect(onWarning.mock.lastCall![0]).toContain('stray is no light of the server');
+    expect(net.link.edits.map(({ edit }) => edit)).toMatchObject([
+      { edit: 'move_node', node: 0 },
+      { edit: 'add_light', light: { type: 'point' } },
+    ]);
     light.dispose();
   });
 

@@ -9,10 +9,12 @@ import {
   MeshStandardMaterial,
   PerspectiveCamera,
   PointLight,
+  Quaternion,
   Scene,
   SpotLight,
   SRGBColorSpace,
   Texture,
+  Vector3,
 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { beforeEach, describe, expect, it, vi } from 'vitest';
@@ -197,6 +199,39 @@ describe('follow', () => {
     lamp.intensity = 8;
     light.update(camera, 300);
     expect(edits()[1]).toEqual({ edit: 'set_light', node: 12, intensity: 8 });
+    expect(warnings).toEqual(["SpotLight is no light of the server's scene, and is added to it"]);
+  });
+
+  it('lets an object of the page stand for a node, a light aimed as it is', () => {
+    const arm = new Group();
+    arm.rotation.y = Math.PI / 2;
+    const lamp = new SpotLight();
+    lamp.position.set(0, 0, 0);
+    lamp.target.position.set(5, 0, 0);
+    scene.add(arm.add(lamp), lamp.target);
+    session.tell('edit', { edit: { edit: 'set_light', node: 9, intensity: 3 }, own: false });
+    light.setNode(lamp, 9);
+    expect(lamp.intensity).toBe(3);
+    light.follow(lamp);
+    lamp.target.position.set(0, 0, -5);
+    light.update(camera, 100);
+    const [moved] = edits() as [Edit & { edit: 'move_node' }];
+    expect(moved).toMatchObject({ edit: 'move_node', node: 9 });
+    const forward = new Vector3(0, 0, -1).applyQuaternion(new Quaternion(...moved.rotation!));
+    // An edit's rotation is relative to the parent's.
+    expect(forward.applyQuaternion(arm.quaternion).distanceTo(new Vector3(0, 0, -1))).toBeLessThan(1e-6);
+    expect(warnings).toEqual([]);
+  });
+
+  it('does not take a light for the node that it hangs below', () => {
+    const lamp = new PointLight();
+    lamp.name = 'torch';
+    mesh.add(lamp);
+    light.setNode(new Group().add(mesh), 3);
+    light.follow(lamp);
+    light.update(camera, 100);
+    expect(edits()).toMatchObject([{ edit: 'add_light' }]);
+    expect(warnings).toEqual(["torch is no light of the server's scene, and is added to it"]);
   });
 
   it('refuses what the server cannot know, and warns of what it refuses', async () => {

@@ -1,0 +1,9 @@
+/** What both entry points export. */
+export { ConnectError, type Edit, type Problem } from '@lumencast/client';
+export type { ConnectOptions, ShowOptions } from './connect.js';
+export { Content, loadGltf } from './content.js';
+export { isHidden } from './exported.js';
+export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
+export { createLight, isPunctualLight, lightSpec, type PunctualLight } from './lights.js';
+export type { ProbeGrid } from './platform.js';
+export type { ShadowOptions } from './shadows.js';
