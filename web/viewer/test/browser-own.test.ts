@@ -7,6 +7,7 @@ import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
 import { type ServedPages, servePages } from '../../testing/page.js';
+import { startProxy } from '../../testing/proxy.js';
 import type { Outcome } from './own/own.js';
 import { freePort, lumencastProgram, Server } from './server.js';
 
@@ -57,6 +58,22 @@ describe('a page of one’s own', () => {
     },
     60_000,
   );
+
+  it('gets in through a reverse proxy that has the server under a path', async () => {
+    const proxy = await startProxy('/light', server.port);
+    try {
+      const outcome = await connected(`http://localhost:${proxy.port}/light/cornell`);
+      expect(outcome).toMatchObject({ transport: 'websocket', isLit: true });
+      expect(proxy.asked).toContain('/light/scene/cornell.glb');
+      expect(proxy.asked).toContain('websocket /light/');
+      const wrong = await connected(`http://localhost:${proxy.port}/light/sponza`);
+      expect(wrong).toMatchObject({ problem: 'scene', message: expect.stringContaining('/light/cornell') });
+      const outside = await connected(`http://localhost:${proxy.port}/cornell`);
+      expect(outside.problem).toBe('origin');
+    } finally {
+      await proxy.close();
+    }
+  }, 120_000);
 
   it('elsewhere is told how to be let in', async () => {
     const outcome = await connected(`http://127.0.0.1:${server.port}/cornell`, ELSEWHERE);

@@ -67,7 +67,7 @@ function foreignPage(base: URL): string {
   const origin = globalThis.location?.origin ?? 'this program';
   const isName = !isLoopback(base.hostname) && !/^[\d.]+$|^\[/.test(base.hostname);
   const host = isName ? ` and --allow-host ${base.hostname}` : '';
-  return `${base} answers, but lets no page of ${origin} in: start the server with --allow-origin ${origin}${host}; or the port is another program's`;
+  return `${base} answers, but lets no page of ${origin} in: start the server with --allow-origin ${origin}${host}; or another program answers there`;
 }
 
 function nobodyThere(base: URL): string {
