@@ -21,7 +21,7 @@ async function serve(status: number, body: string): Promise<URL> {
 }
 
 async function found(base: URL, token?: string) {
-  const target = { base, scene: 'cornell', client: 'c', token, certificateHash: undefined };
+  const target = { base, scene: 'cornell', client: 'c', key: 'k', token, certificateHash: undefined };
   const { problem, message, cause } = await diagnose({ ...target, transport: 'auto' }, base, 'no socket');
   expect(cause).toBe('no socket');
   return { problem, message };
