@@ -12,9 +12,9 @@ import type { Gizmo } from './view/selection.js';
 import { SKY } from './view/sky.js';
 import type { Viewer } from './viewer.js';
 
-/** The panels over the picture, and the keys. */
+/** The bar beside the picture, the panels over it, and the keys. */
 export class Controls {
-  readonly element: HTMLElement;
+  readonly overlay: HTMLElement;
   readonly notices = new Notices();
   readonly #dock: Dock;
   readonly #inspector: Inspector;
@@ -40,20 +40,23 @@ export class Controls {
       close: () => selection.select(undefined),
     });
     selection.onChange = (object) => this.#inspector.show(object, selection.gizmo);
-    this.#stats.element.hidden = innerWidth < 720;
-    this.element = h(
+    this.#stats.element.hidden = innerWidth < 720 || innerHeight < 480;
+    this.overlay = h(
       'div',
       { class: 'controls' },
       this.#brand,
       this.notices.element,
       h('div', { class: 'side' }, this.#stats.element, this.#inspector.element),
       this.#help,
-      this.#dock.element,
     );
     addEventListener('keydown', (event) => this.#key(event));
     session.on('status', (status) => this.#say(status));
     this.#say(session.status);
     for (const notice of capabilities().notices) this.notices.passing(notice, 14);
+  }
+
+  get bar(): HTMLElement {
+    return this.#dock.element;
   }
 
   /** Shows how things are; to be called each frame. */
@@ -182,6 +185,7 @@ export class Controls {
     this.viewer.flashlight.on = false;
     this.viewer.selection.select(undefined);
     this.#help.hidden = true;
+    this.#dock.closeSettings();
   }
 
   #say(status: Status): void {

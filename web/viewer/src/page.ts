@@ -31,11 +31,12 @@ export interface Inside extends Pick<Viewer, 'light' | 'scene' | 'renderer' | 's
   pixels: Viewer['pixels'];
 }
 
-/** Builds the page: a curtain with progress, then the picture, or why there is none. */
+/** Builds the page: a curtain with progress, then the picture beside its controls, or why there is none. */
 export async function openPage(find: () => Promise<Source>): Promise<void> {
   const canvas = h('canvas', { class: 'view', tabindex: '0' });
   const curtain = new Curtain();
-  document.body.replaceChildren(canvas, curtain.element);
+  const stage = h('main', { class: 'stage' }, canvas);
+  document.body.replaceChildren(stage, curtain.element);
   try {
     const { name, file, connect } = await find();
     document.title = `${name} · Lumencast`;
@@ -55,7 +56,8 @@ export async function openPage(find: () => Promise<Source>): Promise<void> {
     warn = (message) => viewer.controls.notices.passing(message);
     early.forEach(warn);
     curtain.say('Connecting to the light…');
-    document.body.insertBefore(viewer.controls.element, curtain.element);
+    stage.append(viewer.controls.overlay);
+    stage.after(viewer.controls.bar);
     // Compiling shaders keeps the page busy for so long that WebTransport would lose against a WebSocket.
     if (!viewer.session.catalog) await Promise.race([viewer.session.ready, afterSeconds(4)]);
     curtain.say('Preparing the picture…');

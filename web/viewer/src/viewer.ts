@@ -104,11 +104,7 @@ export class Viewer {
     this.probes.group.name = 'probes';
     this.selection.overlay.add(this.probes.group);
     scene.add(this.selection.overlay);
-    this.#resolution = new Resolution(renderer, options.pixelRatio);
-    addEventListener('resize', () => {
-      this.#resolution.apply();
-      this.rig.resize();
-    });
+    this.#resolution = new Resolution(renderer, canvas, options.pixelRatio);
     this.controls = new Controls(this);
     this.#timer.connect(document);
   }
@@ -139,6 +135,7 @@ export class Viewer {
 
   /** One picture, at a time as of `performance.now()`. */
   draw(now: number = performance.now(), seconds = 0): void {
+    this.#resolution.fit();
     this.rig.update(seconds);
     this.rig.camera.updateMatrixWorld();
     this.flashlight.update(this.spot);

@@ -9,7 +9,7 @@ import { crc32, deflateSync } from 'node:zlib';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { buildPage, draw, look, openPage, type Pixel, shoot } from './browser.js';
+import { buildPage, draw, look, onScreen, openPage, type Pixel, shoot } from './browser.js';
 import { freePort, lumencastProgram, Server } from './server.js';
 
 const VIEWPORT = { width: 800, height: 600 };
@@ -180,19 +180,16 @@ it('shows instances and no hidden nodes', async () => {
   });
   await visit(scene, async (page) => {
     const found = await page.evaluate(() => {
-      const { light, viewer, camera } = window.lumencast!;
-      const hidden = light.content.object(1)!;
-      const points = [
-        [-1, 0, -1],
-        [1, 0, 1],
-        [0, 0, 0],
-      ].map(([x, y, z]) => {
-        const at = camera.position.clone().set(x, y, z).project(camera);
-        return [((at.x + 1) / 2) * innerWidth, ((1 - at.y) / 2) * innerHeight] as const;
-      });
-      return { pixels: viewer.pixels(points), hidden: hidden.visible, height: camera.position.y };
+      const { light, camera } = window.lumencast!;
+      return { hidden: light.content.object(1)!.visible, height: camera.position.y };
     });
-    const [near, far, between] = found.pixels.map(([r, g, b]) => r + g + b);
+    const points = [
+      await onScreen(page, [-1, 0, -1]),
+      await onScreen(page, [1, 0, 1]),
+      await onScreen(page, [0, 0, 0]),
+    ];
+    const pixels = await page.evaluate((points) => window.lumencast!.pixels(points), points);
+    const [near, far, between] = pixels.map(([r, g, b]) => r + g + b);
     expect(Math.min(near, far)).toBeGreaterThan(100);
     expect(between).toBeLessThan(30);
     expect(found.hidden).toBe(false);

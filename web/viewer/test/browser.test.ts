@@ -10,7 +10,17 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { buildPage, difference, look, looks, openPage, type Pixel, SHOTS, shoot } from './browser.js';
+import {
+  buildPage,
+  difference,
+  look,
+  looks,
+  onScreen,
+  openPage,
+  type Pixel,
+  SHOTS,
+  shoot,
+} from './browser.js';
 import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
 
 /** Small: every pixel is drawn by the processor. */
@@ -193,7 +203,6 @@ describe('the page', () => {
           .toBeLessThan(1e-3);
       };
 
-      // The bar of controls must not cover what is to be taken.
       await page.setViewportSize({ width: 800, height: 600 });
       // The server that was restarted plays again; and nothing is to stand in the hand's way.
       await page.evaluate(async () => {
@@ -204,12 +213,11 @@ describe('the page', () => {
       });
       await page.waitForTimeout(500);
       const sphere = await place(page, 'sphere');
-      const [x, y] = await page.evaluate(() => {
-        const { scene, camera } = window.lumencast!;
-        const sphere = scene.getObjectByName('sphere')!;
-        const at = sphere.getWorldPosition(sphere.position.clone()).project(camera);
-        return [((at.x + 1) / 2) * innerWidth, ((1 - at.y) / 2) * innerHeight];
+      const at = await page.evaluate(() => {
+        const sphere = window.lumencast!.scene.getObjectByName('sphere')!;
+        return sphere.getWorldPosition(sphere.position.clone()).toArray();
       });
+      const [x, y] = await onScreen(page, at);
       const { mouse } = page;
       await gesture(
         () => mouse.click(x, y),

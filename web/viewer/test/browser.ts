@@ -63,10 +63,11 @@ export async function look(page: Page, shown: Shown): Promise<Pixel[]> {
 /** The parts of the light one by one, all at one instant: between two, light goes on changing. */
 export function looks(page: Page, parts: readonly Shown[]): Promise<Pixel[][]> {
   return page.evaluate((parts) => {
-    const { pixels, setMode } = window.lumencast!;
+    const { pixels, renderer, setMode } = window.lumencast!;
+    const { clientWidth, clientHeight } = renderer.domElement;
     const points: [number, number][] = [];
-    for (let y = 10; y < innerHeight; y += 15) {
-      for (let x = 10; x < innerWidth; x += 15) points.push([x, y]);
+    for (let y = 10; y < clientHeight; y += 15) {
+      for (let x = 10; x < clientWidth; x += 15) points.push([x, y]);
     }
     const now = performance.now();
     return parts.map((shown) => {
@@ -102,6 +103,31 @@ export async function shoot(page: Page, name: string): Promise<void> {
   });
 }
 
+/** Where a point of the scene is on the page, whose canvas begins at the page's corner. */
+export function onScreen(page: Page, point: readonly [number, number, number]): Promise<[number, number]> {
+  return page.evaluate(([x, y, z]) => {
+    const { camera, renderer } = window.lumencast!;
+    const at = camera.position.clone().set(x, y, z).project(camera);
+    const { clientWidth, clientHeight } = renderer.domElement;
+    return [((at.x + 1) / 2) * clientWidth, ((1 - at.y) / 2) * clientHeight];
+  }, point);
+}
+
+/**
+ * Does something with a control that may be among the settings, which are a panel where the bar has no
+ * room for them: opens it and closes it again.
+ */
+export async function among(
+  page: Page,
+  selector: string,
+  act: (selector: string) => Promise<unknown>,
+): Promise<void> {
+  const isHidden = !(await page.isVisible(selector));
+  if (isHidden) await page.click('.dock .open');
+  await act(selector);
+  if (isHidden) await page.click('.dock .open');
+}
+
 /** One picture, so many seconds after the one before, and the panels as they then are. */
 export function draw(page: Page, seconds = 0): Promise<void> {
   return page.evaluate((seconds) => {
@@ -109,4 +135,18 @@ export function draw(page: Page, seconds = 0): Promise<void> {
     viewer.draw(performance.now(), seconds);
     viewer.controls.update();
   }, seconds);
+}
+
+/** Texts of bar and panels that do not fit where they stand, and what the window cuts. */
+export function cutOff(page: Page): Promise<string[]> {
+  return page.evaluate(() =>
+    [...document.querySelectorAll<HTMLElement>('.controls *, .dock, .dock *')]
+      .filter((element) => element.checkVisibility() && !element.closest('svg'))
+      .filter((element) => {
+        const { left, right, top, bottom } = element.getBoundingClientRect();
+        const outside = left < -1 || top < -1 || right > innerWidth + 1 || bottom > innerHeight + 1;
+        return outside || (element.children.length === 0 && element.scrollWidth > element.clientWidth + 1);
+      })
+      .map((element) => `${element.tagName}.${element.className}: ${element.textContent}`),
+  );
 }

@@ -1,6 +1,6 @@
 import type { Shown } from '@lumencast/three';
 import { STOPS } from '../view/exposure.js';
-import { choice, h, type Icon, iconButton, setPressed, slider } from './dom.js';
+import { choice, h, type Icon, labelledButton, setPressed, slider } from './dom.js';
 
 /** What the dock's controls do. */
 export interface DockActions {
@@ -22,22 +22,34 @@ const SHOWN: readonly [shown: Shown, label: string][] = [
   ['indirect', 'Indirect'],
   ['both', 'Both'],
 ];
-const TOGGLES: readonly [toggle: Toggle, icon: Icon, title: string][] = [
-  ['fly', 'fly', 'Fly with W A S D, Q E and the mouse (C)'],
-  ['playing', 'pause', 'Pause or play the animation (space)'],
-  ['flashlight', 'flashlight', 'Take the flashlight, aim with the mouse (F)'],
-  ['probes', 'probes', 'Show the light probes (P)'],
-  ['stats', 'stats', 'Figures (I)'],
-  ['help', 'help', 'Keys (?)'],
+
+type Entry = readonly [toggle: Toggle, icon: Icon, label: string, title: string];
+
+/** What stands in the bar at any size. */
+const FIRST: readonly Entry[] = [
+  ['flashlight', 'flashlight', 'Flashlight', 'Take the flashlight, aim with the pointer (F)'],
+  ['playing', 'pause', 'Pause', 'Pause or play the animation (space)'],
+];
+/** What stands among the settings. */
+const FURTHER: readonly Entry[] = [
+  ['fly', 'fly', 'Fly', 'Fly with W A S D, Q E and the mouse (C)'],
+  ['probes', 'probes', 'Probes', 'Show the light probes (P)'],
+  ['stats', 'stats', 'Figures', 'Figures (I)'],
+  ['help', 'help', 'Help', 'Keys and gestures (?)'],
 ];
 
-/** The bar of controls at the lower edge. */
+/**
+ * The bar of controls beside the picture. The settings are part of it where there is room, else a panel
+ * that a button opens; which of both is the style sheet's matter.
+ */
 export class Dock {
   readonly element: HTMLElement;
   readonly #shown = new Map<Shown, HTMLButtonElement>();
   readonly #toggles = new Map<Toggle, HTMLButtonElement>();
   readonly #exposure: ReturnType<typeof slider>;
-  readonly #lights: HTMLSelectElement;
+  readonly #lights: ReturnType<typeof choice>;
+  readonly #settings: HTMLElement;
+  readonly #open: HTMLButtonElement;
 
   constructor(actions: DockActions, tones: readonly string[], cameras: readonly string[]) {
     const segments = SHOWN.map(([shown, label], i) => {
@@ -46,42 +58,40 @@ export class Dock {
       this.#shown.set(shown, button);
       return button;
     });
-    const toggles = TOGGLES.map(([toggle, icon, title]) => {
-      const button = iconButton(icon, title, () => actions.toggle(toggle));
+    const toggle = ([toggle, icon, label, title]: Entry) => {
+      const button = labelledButton(icon, label, title, () => actions.toggle(toggle));
       this.#toggles.set(toggle, button);
       return button;
-    });
+    };
     this.#exposure = slider('Exposure', { ...STOPS, step: 0.05 }, stops, (value) => actions.exposure(value));
-    const auto = h(
-      'button',
-      {
-        type: 'button',
-        class: 'text',
-        title: 'Exposure by the picture (X)',
-        onclick: () => actions.autoExposure(),
-      },
-      'Auto',
-    );
+    const title = 'Exposure by the picture (X)';
+    const auto = h('button', { type: 'button', title, onclick: () => actions.autoExposure() }, 'Auto');
     const view = choice('View', ['Overview', ...cameras], (index) => actions.camera(index - 1));
-    view.selectedIndex = cameras.length > 0 ? 1 : 0;
+    view.select.selectedIndex = cameras.length > 0 ? 1 : 0;
     this.#lights = choice('Lights', ['Lights'], (index) => {
       actions.select(index - 1);
-      this.#lights.selectedIndex = 0;
+      this.#lights.select.selectedIndex = 0;
     });
+    const tone = choice('Tone mapping', tones, (index) => actions.tone(tones[index]));
+    this.#settings = h(
+      'div',
+      { class: 'settings', id: 'settings', role: 'group', 'aria-label': 'Settings' },
+      h('div', { class: 'group exposure' }, this.#exposure.element, auto),
+      h('div', { class: 'group choices' }, tone.element, view.element, this.#lights.element),
+      h('div', { class: 'group' }, ...FURTHER.map(toggle)),
+    );
+    this.#open = labelledButton('settings', 'More', 'More settings', () => this.#setOpen(!this.#isOpen));
+    this.#open.classList.add('open');
+    this.#open.setAttribute('aria-controls', this.#settings.id);
     this.element = h(
       'nav',
-      { class: 'panel dock', 'aria-label': 'Controls' },
+      { class: 'dock', 'aria-label': 'Controls' },
       h('div', { class: 'segments', role: 'group', 'aria-label': 'Light shown' }, ...segments),
-      h('div', { class: 'group exposure' }, this.#exposure.element, auto),
-      h(
-        'div',
-        { class: 'group' },
-        choice('Tone mapping', tones, (index) => actions.tone(tones[index])),
-        view,
-        this.#lights,
-      ),
-      h('div', { class: 'group' }, ...toggles),
+      h('div', { class: 'group' }, ...FIRST.map(toggle)),
+      this.#settings,
+      this.#open,
     );
+    this.#setOpen(false);
   }
 
   set shown(shown: Shown) {
@@ -93,9 +103,10 @@ export class Dock {
   }
 
   set lights(names: readonly string[]) {
-    if (this.#lights.length === names.length + 1) return;
-    this.#lights.replaceChildren(...['Lights', ...names].map((name) => h('option', {}, name)));
-    this.#lights.hidden = names.length === 0;
+    const { element, select } = this.#lights;
+    element.hidden = names.length === 0;
+    if (select.length === names.length + 1) return;
+    select.replaceChildren(...['Lights', ...names].map((name) => h('option', {}, name)));
   }
 
   set(toggle: Toggle, on: boolean): void {
@@ -104,6 +115,20 @@ export class Dock {
 
   hide(toggle: Toggle, hidden: boolean): void {
     this.#toggles.get(toggle)!.hidden = hidden;
+  }
+
+  closeSettings(): void {
+    this.#setOpen(false);
+  }
+
+  get #isOpen(): boolean {
+    return this.#settings.classList.contains('opened');
+  }
+
+  #setOpen(open: boolean): void {
+    this.#settings.classList.toggle('opened', open);
+    this.#open.setAttribute('aria-expanded', String(open));
+    setPressed(this.#open, open);
   }
 }
 

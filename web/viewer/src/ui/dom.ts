@@ -25,6 +25,7 @@ const PATHS = {
   pause: 'M8 5v14M16 5v14',
   stats: 'M4 20V10M10 20V4M16 20v-7M21 20H3',
   help: 'M9 9a3 3 0 1 1 4.5 2.6c-1 .6-1.5 1.2-1.5 2.4M12 18h.01',
+  settings: 'M4 7h8M18 7h2M15 4v6M4 17h2M12 17h8M9 14v6',
   close: 'M6 6l12 12M18 6L6 18',
   sun: 'M12 8a4 4 0 1 0 0 8 4 4 0 0 0 0-8M12 2v2M12 20v2M2 12h2M20 12h2M5 5l1.4 1.4M17.6 17.6L19 19M19 5l-1.4 1.4M6.4 17.6L5 19',
   move: 'M12 3v18M3 12h18M12 3L9 6M12 3l3 3M12 21l-3-3M12 21l3-3M3 12l3-3M3 12l3 3M21 12l-3-3M21 12l-3 3',
@@ -47,6 +48,16 @@ export function icon(name: Icon): SVGSVGElement {
 /** A button with an icon; `title` is shown on hovering and read aloud. */
 export function iconButton(name: Icon, title: string, onclick: () => void): HTMLButtonElement {
   return h('button', { type: 'button', class: 'icon', title, 'aria-label': title, onclick }, icon(name));
+}
+
+/** A button with an icon over a word. */
+export function labelledButton(
+  name: Icon,
+  label: string,
+  title: string,
+  onclick: () => void,
+): HTMLButtonElement {
+  return h('button', { type: 'button', class: 'labelled', title, onclick }, icon(name), h('span', {}, label));
 }
 
 /** Shows on a button whether what it stands for is on. */
@@ -89,16 +100,16 @@ export function slider(
   };
 }
 
-/** A choice among names. */
+/** A choice among names, in an element with its label. */
 export function choice(
   label: string,
   names: readonly string[],
   onChange: (index: number) => void,
-): HTMLSelectElement {
+): { element: HTMLElement; select: HTMLSelectElement } {
   const select = h(
     'select',
     { 'aria-label': label, title: label, onchange: () => onChange(select.selectedIndex) },
     ...names.map((name) => h('option', {}, name)),
   );
-  return select;
+  return { element: h('label', { class: 'choice' }, h('span', {}, label), select), select };
 }

@@ -61,7 +61,7 @@ export class CameraRig {
     this.camera.position.copy(target).addScaledVector(new Vector3(0.35, 0.25, 1).normalize(), distance);
     this.camera.lookAt(target);
     this.#orbit.target.copy(target);
-    this.resize();
+    this.#fit();
   }
 
   /** Goes to where a camera of the file stands; at once when `instant`. */
@@ -74,14 +74,13 @@ export class CameraRig {
     if (camera instanceof PerspectiveCamera) this.#view = { fov: camera.fov, aspect: camera.aspect };
     const calm = instant || matchMedia('(prefers-reduced-motion: reduce)').matches;
     this.#flight = { from: this.#pose(), to, seconds: calm ? FLIGHT : 0 };
-    this.resize();
     this.update(0);
   }
 
-  /** Fits the camera to the window: what a camera of the file shows stays in sight in a narrow one. */
-  resize(): void {
+  /** Fits the camera to the canvas: what a camera of the file shows stays in sight in a narrow one. */
+  #fit(): void {
     const { camera } = this;
-    camera.aspect = innerWidth / innerHeight;
+    camera.aspect = this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1);
     const half = Math.tan(MathUtils.degToRad(this.#view.fov / 2));
     const widened = Math.max(half, (half * this.#view.aspect) / camera.aspect);
     camera.fov = Math.min(MathUtils.radToDeg(2 * Math.atan(widened)), 110);
@@ -90,6 +89,7 @@ export class CameraRig {
 
   /** Moves on by a frame of that many seconds. */
   update(seconds: number): void {
+    this.#fit();
     this.#orbit.enabled = this.#mode === 'orbit' && !this.#locked && this.#flight === undefined;
     if (this.#flight) this.#fly(this.#flight, seconds);
     else if (this.#mode === 'orbit') this.#orbit.update(seconds);
@@ -160,7 +160,7 @@ export class CameraRig {
   #turn({ pointerId, clientX, clientY }: PointerEvent): void {
     const look = this.#look;
     if (look?.id !== pointerId || this.#locked) return;
-    const perPixel = MathUtils.degToRad(this.camera.fov) / innerHeight;
+    const perPixel = MathUtils.degToRad(this.camera.fov) / this.canvas.clientHeight;
     const euler = new Euler().setFromQuaternion(this.camera.quaternion, 'YXZ');
     euler.y += (clientX - look.x) * perPixel;
     euler.x = MathUtils.clamp(euler.x + (clientY - look.y) * perPixel, -1.55, 1.55);

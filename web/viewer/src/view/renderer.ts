@@ -57,19 +57,27 @@ export class Resolution {
   #scale = 1;
   #slow = 0;
   #fast = 0;
+  /** Of the drawn picture, in CSS pixels, and pixels a CSS pixel. */
+  #drawn = { width: 0, height: 0, ratio: 0 };
 
   constructor(
     private readonly renderer: AnyRenderer,
+    private readonly canvas: HTMLCanvasElement,
     /** Pixels a CSS pixel that never change, or `undefined` to adapt. */
     private readonly fixed: number | undefined,
   ) {
-    this.apply();
+    this.fit();
   }
 
-  apply(): void {
+  /** Gives the picture the room that the canvas has on the page; to be called before each picture. */
+  fit(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
     const ratio = this.fixed ?? Math.min(devicePixelRatio, 2) * this.#scale;
+    const drawn = this.#drawn;
+    if (width === drawn.width && height === drawn.height && ratio === drawn.ratio) return;
+    this.#drawn = { width, height, ratio };
     this.renderer.setPixelRatio(ratio);
-    this.renderer.setSize(innerWidth, innerHeight, false);
+    this.renderer.setSize(width, height, false);
   }
 
   /** To be called each frame with its length in milliseconds. */
@@ -84,6 +92,5 @@ export class Resolution {
   #set(scale: number): void {
     this.#scale = scale;
     this.#slow = this.#fast = 0;
-    this.apply();
   }
 }
