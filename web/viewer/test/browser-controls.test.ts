@@ -479,6 +479,27 @@ describe('a scene of two volumes', () => {
   }, 120_000);
 });
 
+describe('the tomb', () => {
+  it('keeps its colours where the flashlight shines', async () => {
+    const server = await start('tomb');
+    try {
+      const page = await openPage(browser, server.address, VIEWPORT, SCALE);
+      await page.waitForTimeout(1000);
+      await page.evaluate(() => window.lumencast!.viewer.meter());
+      const picture = await look(page, 'both');
+      await shoot(page, 'tomb.png');
+      const share = (fits: (pixel: Pixel) => boolean) => picture.filter(fits).length / picture.length;
+      expect(share(([r, g, b]) => Math.min(r, g, b) > 225)).toBeLessThan(0.04);
+      // The curtain is red, not pink, and what lies around it is not black.
+      expect(share(([r, g, b]) => r > 180 && Math.max(g, b) < 0.65 * r)).toBeGreaterThan(0.01);
+      expect(share((pixel) => sum(pixel) < 30)).toBeLessThan(0.2);
+      await page.close();
+    } finally {
+      await server.kill();
+    }
+  });
+});
+
 describe('a page without a server', () => {
   it('shows a saved light field, and says what it is', async () => {
     execFileSync(program, ['bake', 'cornell', '-o', join(folder, 'cornell.light'), '--samples', '64']);

@@ -12,7 +12,7 @@ import {
 import { describe, expect, it } from 'vitest';
 import { readVectors } from '../../client/test/support/vectors.js';
 import { INTENSITY, intensityAt, intensityText } from '../src/ui/intensity.js';
-import { exposureFor, STOPS, withinStops } from '../src/view/exposure.js';
+import { burnt, exposureFor, MIDDLE_GREY, MOST_BURNT, STOPS, withinStops } from '../src/view/exposure.js';
 import { findFlashlight } from '../src/view/flashlight.js';
 import { irradianceWeights } from '../src/view/probes.js';
 import { isDark, SKY } from '../src/view/sky.js';
@@ -29,9 +29,42 @@ describe('exposureFor', () => {
     expect(exposureFor(new Array(100).fill(50))).toBeCloseTo(0.2 / 50);
   });
 
-  it('does not burn out a small bright part', () => {
-    const picture = [...new Array(900).fill(0.01), ...new Array(100).fill(10)];
-    expect(exposureFor(picture)! * 10).toBeLessThanOrEqual(3);
+  /** Luminances of a dim room, two stops to either side of 0.1, a part of which a lamp makes so much brighter. */
+  const room = (share: number, times: number) =>
+    Array.from({ length: 1000 }, (_, i) => {
+      const luminance = 0.1 * 2 ** (((i * 7) % 41) / 10 - 2);
+      return i < share * 1000 ? luminance * times : luminance;
+    });
+
+  it('keeps contrast and colour in what a flashlight shows', () => {
+    for (const times of [8, 16, 32]) {
+      const picture = room(0.16, times);
+      const exposure = exposureFor(picture)!;
+      expect(burnt(picture, exposure)).toBeLessThanOrEqual(MOST_BURNT);
+      // Above 1, colours pale; the room around is not given up for it.
+      expect(picture.filter((value) => value * exposure > 1).length).toBeLessThan(100);
+      expect(exposure * 0.1).toBeGreaterThan(MIDDLE_GREY / 8);
+    }
+  });
+
+  it('takes a lamp of few pixels for what it is', () => {
+    const [without, withLamp] = [exposureFor(room(0, 1))!, exposureFor(room(0.03, 1000))!];
+    expect(Math.abs(Math.log2(withLamp / without))).toBeLessThan(0.3);
+  });
+
+  it('does not jump where a bright part grows', () => {
+    for (const times of [10, 30, 100]) {
+      const parts = Array.from({ length: 60 }, (_, i) => i / 200);
+      const stops = parts.map((share) => Math.log2(exposureFor(room(share, times))!));
+      for (let i = 1; i < stops.length; i++) {
+        expect(stops[i]).toBeLessThan(stops[i - 1] + 0.02);
+        expect(stops[i - 1] - stops[i]).toBeLessThan(0.8);
+      }
+    }
+  });
+
+  it('leaves a room with a large window visible', () => {
+    expect(exposureFor(room(0.3, 1000))! * 0.1).toBeGreaterThan(MIDDLE_GREY / 64);
   });
 
   it('leaves a black picture alone', () => {
