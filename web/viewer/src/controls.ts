@@ -2,7 +2,7 @@ import { capabilities, type Status } from '@lumencast/client';
 import type { Shown } from '@lumencast/three';
 import { Dock, type Toggle } from './ui/dock.js';
 import { h } from './ui/dom.js';
-import { helpPanel } from './ui/help.js';
+import { flashlightHint, flyHint, helpPanel } from './ui/help.js';
 import { Inspector, nameOf } from './ui/inspector.js';
 import { Notices } from './ui/notices.js';
 import { StatsPanel } from './ui/stats.js';
@@ -19,7 +19,7 @@ export class Controls {
   readonly #dock: Dock;
   readonly #inspector: Inspector;
   readonly #stats = new StatsPanel();
-  readonly #help = helpPanel();
+  readonly #help = helpPanel(() => this.#toggle('help'));
   readonly #brand: HTMLElement;
   #statsAt = 0;
 
@@ -110,8 +110,7 @@ export class Controls {
     switch (what) {
       case 'fly':
         viewer.rig.mode = viewer.rig.mode === 'fly' ? 'orbit' : 'fly';
-        if (viewer.rig.mode === 'fly')
-          this.notices.passing('Fly with W A S D, Q and E; drag to look around', 4);
+        if (viewer.rig.mode === 'fly') this.notices.passing(flyHint(), 6);
         return;
       case 'probes':
         viewer.probes.group.visible = !viewer.probes.group.visible;
@@ -142,15 +141,19 @@ export class Controls {
   }
 
   #takeFlashlight(): void {
-    const { flashlight, spot } = this.viewer;
-    flashlight.on = !flashlight.on;
-    if (!flashlight.on) return;
-    this.viewer.selection.select(undefined);
-    if (spot) return;
-    flashlight.add().catch((error: Error) => {
-      flashlight.on = false;
-      this.notices.passing(`No flashlight: ${error.message}`);
-    });
+    const { flashlight, selection } = this.viewer;
+    if (flashlight.on) return this.#putFlashlightAway();
+    selection.select(undefined);
+    flashlight.take().then(
+      () => flashlight.on && this.notices.passing(flashlightHint(flashlight.isAdded), 9),
+      (error: Error) => this.notices.passing(`No flashlight: ${error.message}`),
+    );
+  }
+
+  #putFlashlightAway(): void {
+    this.viewer.flashlight
+      .putAway()
+      .catch((error: Error) => this.notices.passing(`The flashlight stays: ${error.message}`));
   }
 
   #setGizmo(mode: Gizmo): void {
@@ -182,7 +185,7 @@ export class Controls {
   }
 
   #letGo(): void {
-    this.viewer.flashlight.on = false;
+    this.#putFlashlightAway();
     this.viewer.selection.select(undefined);
     this.#help.hidden = true;
     this.#dock.closeSettings();

@@ -15,7 +15,7 @@ import { Controls } from './controls.js';
 import type { Figures } from './ui/stats.js';
 import { CameraRig } from './view/camera-rig.js';
 import { meter, withinStops } from './view/exposure.js';
-import { findFlashlight, Flashlight } from './view/flashlight.js';
+import { Flashlight } from './view/flashlight.js';
 import { ProbeSpheres } from './view/probes.js';
 import { type AnyRenderer, createRenderer, isWebGPU, Resolution } from './view/renderer.js';
 import { Selection } from './view/selection.js';
@@ -95,12 +95,16 @@ export class Viewer {
     this.selection = new Selection(light, gltf.scene, this.rig.camera, canvas, this.touch, (dragging) => {
       this.rig.locked = dragging;
     });
-    this.flashlight = new Flashlight(
+    this.flashlight = new Flashlight({
       light,
-      this.rig.camera,
-      this.touch,
-      bounds.getSize(new Vector3()).length() || 1,
-    );
+      camera: this.rig.camera,
+      canvas,
+      touch: this.touch,
+      content: gltf.scene,
+      reach: bounds.getSize(new Vector3()).length() || 1,
+      lights: () => this.lights,
+      exposure: () => this.exposure,
+    });
     this.probes.group.name = 'probes';
     this.selection.overlay.add(this.probes.group);
     scene.add(this.selection.overlay);
@@ -136,9 +140,10 @@ export class Viewer {
   /** One picture, at a time as of `performance.now()`. */
   draw(now: number = performance.now(), seconds = 0): void {
     this.#resolution.fit();
+    this.rig.fingerPoints = this.flashlight.on;
     this.rig.update(seconds);
     this.rig.camera.updateMatrixWorld();
-    this.flashlight.update(this.spot);
+    this.flashlight.update(now);
     this.touch.update(now);
     this.light.update(this.rig.camera, now);
     this.selection.update();
@@ -166,11 +171,6 @@ export class Viewer {
       this.#isDark = isDark(this.gltf.scene, light.environment);
     }
     return this.#isDark;
-  }
-
-  /** The spot light that the hand takes. */
-  get spot(): ReturnType<typeof findFlashlight> {
-    return findFlashlight(this.selection.lights);
   }
 
   get lights(): PunctualLight[] {

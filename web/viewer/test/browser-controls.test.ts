@@ -8,6 +8,7 @@ import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import type { Edit } from '@lumencast/client';
 import type { Browser, Page } from 'playwright-core';
+import type { SpotLight } from 'three';
 import { preview } from 'vite';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
@@ -278,7 +279,7 @@ describe('a person at the page', () => {
       });
     const lamp = () =>
       page.evaluate(() => {
-        const { intensity, angle } = window.lumencast!.viewer.spot!;
+        const { intensity, angle } = window.lumencast!.viewer.lights[0] as SpotLight;
         return { intensity, angle };
       });
     await choose('Lights', { index: 1 });
@@ -313,11 +314,11 @@ describe('a person at the page', () => {
   }, 90_000);
 
   it('finds a faint lamp as faint as it is, and does not change it by a touch', async () => {
-    const lamp = () => page.evaluate(() => window.lumencast!.viewer.spot!.intensity);
+    const lamp = () => page.evaluate(() => window.lumencast!.viewer.lights[0].intensity);
     const set = (intensity: number) =>
       page.evaluate((intensity) => {
         const { light, viewer } = window.lumencast!;
-        return light.edit({ edit: 'set_light', node: light.content.nodeOf(viewer.spot!)!, intensity });
+        return light.edit({ edit: 'set_light', node: light.content.nodeOf(viewer.lights[0])!, intensity });
       }, intensity);
     const home = await lamp();
     await choose('Lights', { index: 1 });
@@ -345,8 +346,8 @@ describe('a person at the page', () => {
     const where = () =>
       page.evaluate(() => {
         const { viewer, light, camera } = window.lumencast!;
-        const at = viewer.spot!.getWorldPosition(camera.position.clone());
-        return { node: light.content.nodeOf(viewer.spot!)!, at: at.toArray() };
+        const at = viewer.lights[0].getWorldPosition(camera.position.clone());
+        return { node: light.content.nodeOf(viewer.lights[0])!, at: at.toArray() };
       });
     const home = await where();
     const [x, y] = await onScreen(page, home.at);
@@ -383,7 +384,8 @@ describe('a person at the page', () => {
       .poll(async () => (await draw(page), figures.innerText()), { timeout: 10_000 })
       .toMatch(/ticks\s+\d+\.\d Hz[^]*tick\s+\d+\.\d ms[^]*samples\s+\d+[^]*age\s+\d+ ms[^]*network\s+\d/);
     await click('Keys and');
-    expect(await page.isVisible('.keys')).toBe(true);
+    expect(await page.isVisible('.help .keys')).toBe(true);
+    expect(await page.isVisible('.help .gestures')).toBe(false);
     // Nothing is wider than what it stands in.
     await shoot(page, 'panels.png');
     expect(await cutOff(page)).toEqual([]);

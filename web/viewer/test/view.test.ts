@@ -132,12 +132,12 @@ describe('sun angles', () => {
 });
 
 describe('findFlashlight', () => {
-  it('prefers the one that is named so', () => {
+  it('takes the one that is named so, and no other lamp', () => {
     const [ceiling, flashlight] = [new SpotLight(), new SpotLight()];
     ceiling.name = 'ceiling';
     new Group().add(flashlight).name = 'Flashlight';
     expect(findFlashlight([new PointLight(), ceiling, flashlight])).toBe(flashlight);
-    expect(findFlashlight([ceiling])).toBe(ceiling);
+    expect(findFlashlight([ceiling])).toBeUndefined();
     expect(findFlashlight([new PointLight()])).toBeUndefined();
   });
 });

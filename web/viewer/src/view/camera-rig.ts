@@ -1,4 +1,13 @@
-import { type Box3, type Camera, Euler, MathUtils, PerspectiveCamera, Quaternion, Vector3 } from 'three';
+import {
+  type Box3,
+  type Camera,
+  Euler,
+  MathUtils,
+  PerspectiveCamera,
+  Quaternion,
+  TOUCH,
+  Vector3,
+} from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
 export type CameraMode = 'orbit' | 'fly';
@@ -18,7 +27,10 @@ export class CameraRig {
   #view: { fov: number; aspect: number } = { fov: 50, aspect: 16 / 9 };
   #flight: { from: Pose; to: Pose; seconds: number } | undefined;
   #look: { id: number; x: number; y: number } | undefined;
+  /** Pointers that are down on the canvas while flying. */
+  readonly #fingers = new Map<number, { x: number; y: number }>();
   #locked = false;
+  #fingerPoints = false;
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -50,6 +62,12 @@ export class CameraRig {
   set locked(locked: boolean) {
     this.#locked = locked;
     if (locked) this.#orbit.enabled = false;
+  }
+
+  /** Set while one finger points at something: it takes two to move the camera. */
+  set fingerPoints(points: boolean) {
+    this.#fingerPoints = points;
+    this.#orbit.touches.ONE = points ? null : TOUCH.ROTATE;
   }
 
   /** A view of the whole scene. */
@@ -143,12 +161,19 @@ export class CameraRig {
     });
     addEventListener('keyup', (event) => this.#pressed.delete(event.code));
     addEventListener('blur', () => this.#pressed.clear());
-    this.canvas.addEventListener('pointerdown', ({ pointerId: id, clientX: x, clientY: y }) => {
-      if (this.#mode === 'fly' && !this.#locked) this.#look = { id, x, y };
+    this.canvas.addEventListener('pointerdown', ({ pointerId: id, pointerType, clientX: x, clientY: y }) => {
+      if (this.#mode !== 'fly' || this.#locked) return;
+      this.#fingers.set(id, { x, y });
+      const points = this.#fingerPoints && pointerType === 'touch';
+      this.#look = points || this.#fingers.size > 1 ? undefined : { id, x, y };
     });
-    addEventListener('pointermove', (event) => this.#turn(event));
+    addEventListener('pointermove', (event) => {
+      this.#turn(event);
+      this.#push(event);
+    });
     for (const end of ['pointerup', 'pointercancel'] as const) {
       addEventListener(end, ({ pointerId }) => {
+        this.#fingers.delete(pointerId);
         if (pointerId === this.#look?.id) this.#look = undefined;
       });
     }
@@ -167,6 +192,19 @@ export class CameraRig {
     euler.z = 0;
     this.camera.quaternion.setFromEuler(euler);
     Object.assign(look, { x: clientX, y: clientY });
+  }
+
+  /** Two fingers fly: dragged aside and up, spread ahead. The height of the canvas is four seconds' way. */
+  #push({ pointerId, clientX, clientY }: PointerEvent): void {
+    const moved = this.#fingers.get(pointerId);
+    if (!moved || this.#fingers.size !== 2 || this.#locked) return;
+    const [other] = [...this.#fingers].filter(([id]) => id !== pointerId).map(([, at]) => at);
+    const gap = (x: number, y: number) => Math.hypot(x - other.x, y - other.y);
+    const spread = gap(clientX, clientY) - gap(moved.x, moved.y);
+    const step = new Vector3((moved.x - clientX) / 2, (clientY - moved.y) / 2, -spread);
+    const perPixel = (4 * this.#speed) / this.canvas.clientHeight;
+    this.camera.position.addScaledVector(step.applyQuaternion(this.camera.quaternion), perPixel);
+    Object.assign(moved, { x: clientX, y: clientY });
   }
 }
 

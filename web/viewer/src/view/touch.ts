@@ -17,11 +17,13 @@ export class Touch {
     else this.#held.set(object, { release: this.light.follow(object), until: now + LINGER });
   }
 
+  /** The page is done with the object at once. */
+  release(object: Object3D): void {
+    this.#held.get(object)?.release();
+    this.#held.delete(object);
+  }
+
   update(now: number): void {
-    for (const [object, { release, until }] of this.#held) {
-      if (now < until) continue;
-      this.#held.delete(object);
-      release();
-    }
+    for (const [object, { until }] of this.#held) if (now >= until) this.release(object);
   }
 }
