@@ -123,6 +123,7 @@ export class Controls {
         this.#stats.element.hidden = !this.#stats.element.hidden;
         return;
       case 'help':
+        this.#dock.closeSettings();
         this.#help.hidden = !this.#help.hidden;
     }
   }

@@ -18,16 +18,16 @@ export async function buildPage(folder: string): Promise<void> {
 /**
  * Opens the page and waits for its first light, at a fixed exposure. From then on it draws when asked
  * to: a page that draws without pause in software leaves the server no processor, and never comes to
- * rest for a screenshot. What goes wrong in it is added to `errors`.
+ * rest for a screenshot. What goes wrong in it is added to `errors`. With `touch`, it is a phone's.
  */
 export async function openPage(
   browser: Browser,
   address: string,
-  viewport: { width: number; height: number },
+  { touch = false, ...viewport }: { width: number; height: number; touch?: boolean },
   query: Readonly<Record<string, string>> = {},
   errors: string[] = [],
 ): Promise<Page> {
-  const page = await browser.newPage({ viewport });
+  const page = await browser.newPage({ viewport, hasTouch: touch, isMobile: touch });
   page.on('pageerror', (error) => errors.push(String(error)));
   page.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
   try {
@@ -125,7 +125,7 @@ export async function among(
   const isHidden = !(await page.isVisible(selector));
   if (isHidden) await page.click('.dock .open');
   await act(selector);
-  if (isHidden) await page.click('.dock .open');
+  if (isHidden && (await page.isVisible(selector))) await page.click('.dock .open');
 }
 
 /** One picture, so many seconds after the one before, and the panels as they then are. */

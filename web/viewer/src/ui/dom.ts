@@ -17,7 +17,6 @@ export function h<K extends keyof HTMLElementTagNameMap>(
 }
 
 const PATHS = {
-  orbit: 'M12 4a8 8 0 1 0 8 8M12 9a3 3 0 1 0 0 6 3 3 0 0 0 0-6M17 3l3 3-3 3',
   fly: 'M3 12l18-8-6 17-3.5-7z',
   probes: 'M6 6h.01M12 6h.01M18 6h.01M6 12h.01M12 12h.01M18 12h.01M6 18h.01M12 18h.01M18 18h.01',
   flashlight: 'M7 3h10v4l-2.5 3v11h-5V10L7 7zM7 7h10M12 13v2',
@@ -45,12 +44,7 @@ export function icon(name: Icon): SVGSVGElement {
   return svg;
 }
 
-/** A button with an icon; `title` is shown on hovering and read aloud. */
-export function iconButton(name: Icon, title: string, onclick: () => void): HTMLButtonElement {
-  return h('button', { type: 'button', class: 'icon', title, 'aria-label': title, onclick }, icon(name));
-}
-
-/** A button with an icon over a word. */
+/** A button with an icon over a word; `title` is shown on hovering. */
 export function labelledButton(
   name: Icon,
   label: string,

@@ -2,7 +2,7 @@ import { isPunctualLight } from '@lumencast/three';
 import { DirectionalLight, type Object3D, PointLight, SpotLight, SRGBColorSpace } from 'three';
 import { setSunAngles, sunAngles } from '../view/sun.js';
 import type { Gizmo } from '../view/selection.js';
-import { h, iconButton, setPressed, slider } from './dom.js';
+import { h, type Icon, labelledButton, setPressed, slider } from './dom.js';
 import { INTENSITY, intensityAt, intensityText } from './intensity.js';
 
 export interface InspectorActions {
@@ -43,7 +43,7 @@ export class Inspector {
       'header',
       {},
       h('div', {}, h('strong', {}, nameOf(object)), h('small', {}, kindOf(object))),
-      iconButton('close', 'Close (Esc)', () => this.actions.close()),
+      labelledButton('close', 'Close', 'Close (Esc)', () => this.actions.close()),
     );
   }
 
@@ -113,10 +113,10 @@ export class Inspector {
 
   #gizmo(object: Object3D, gizmo: Gizmo): HTMLElement[] {
     if (object instanceof DirectionalLight) return [];
-    const modes: [Gizmo, 'move' | 'rotate', string][] = [['translate', 'move', 'Move (G)']];
-    if (!(object instanceof PointLight)) modes.push(['rotate', 'rotate', 'Turn (R)']);
-    const buttons = modes.map(([mode, name, title]) => {
-      const button = iconButton(name, title, () => this.actions.gizmo(mode));
+    const modes: [Gizmo, Icon, label: string, key: string][] = [['translate', 'move', 'Move', 'G']];
+    if (!(object instanceof PointLight)) modes.push(['rotate', 'rotate', 'Turn', 'R']);
+    const buttons = modes.map(([mode, name, label, key]) => {
+      const button = labelledButton(name, label, `${label} (${key})`, () => this.actions.gizmo(mode));
       setPressed(button, mode === gizmo);
       return button;
     });
