@@ -11,6 +11,7 @@ import { TONE_MAPPINGS } from './view/renderer.js';
 import type { Gizmo } from './view/selection.js';
 import { SKY } from './view/sky.js';
 import type { Viewer } from './viewer.js';
+import { wordsFor } from './words.js';
 
 /** The bar beside the picture, the panels over it, and the keys. */
 export class Controls {
@@ -30,7 +31,7 @@ export class Controls {
       { class: 'panel brand' },
       h('i', { class: 'dot' }),
       h('strong', {}, 'Lumencast'),
-      h('span', {}, session.scene),
+      h('span', {}, viewer.options.isSaved ? `${session.scene} · saved light` : session.scene),
     );
     this.#dock = this.#createDock(gltf.cameras.map((camera, i) => camera.name || `Camera ${i + 1}`));
     this.#inspector = new Inspector({
@@ -70,7 +71,10 @@ export class Controls {
     dock.set('probes', viewer.probes.group.visible);
     dock.set('flashlight', viewer.flashlight.on);
     dock.set('playing', !viewer.playing);
-    dock.hide('playing', viewer.light.content.animations.size === 0);
+    // Without a server, nothing moves and nobody computes another light's way.
+    const { isSaved } = viewer.options;
+    dock.hide('playing', isSaved || viewer.light.content.animations.size === 0);
+    dock.hide('flashlight', isSaved);
     dock.set('stats', !this.#stats.element.hidden);
     dock.set('help', !this.#help.hidden);
     this.#inspector.update();
@@ -174,9 +178,10 @@ export class Controls {
       Space: 'playing',
     };
     const { code } = event;
+    const toggle = this.#dock.has(toggles[code]) ? toggles[code] : undefined;
     if (event.key === '?') this.#toggle('help');
     else if (shown[code]) this.viewer.setMode(shown[code]);
-    else if (toggles[code]) this.#toggle(toggles[code]);
+    else if (toggle) this.#toggle(toggle);
     else if (code === 'KeyX') void this.viewer.meter();
     else if (code === 'KeyG') this.#setGizmo('translate');
     else if (code === 'KeyR') this.#setGizmo('rotate');
@@ -193,19 +198,10 @@ export class Controls {
   }
 
   #say(status: Status): void {
-    this.#brand.dataset.state = status.state;
-    switch (status.state) {
-      case 'connecting':
-        // The first attempt shows as the dim dot; after a loss the message stays.
-        return;
-      case 'connected':
-        return this.notices.standing(undefined);
-      case 'lost':
-        return this.notices.standing(
-          `Connection lost: ${status.reason}. The light stays as it was; trying again…`,
-        );
-      case 'closed':
-        return this.notices.standing(`Not connected: ${status.reason}`);
-    }
+    const { isSaved } = this.viewer.options;
+    this.#brand.dataset.state = isSaved ? 'saved' : status.state;
+    // While it connects, first or again, what was said stays.
+    if (status.state === 'connecting' || isSaved) return;
+    this.notices.standing(wordsFor(status, this.viewer.session.catalog !== undefined));
   }
 }

@@ -1,12 +1,13 @@
 import { connect, type ConnectOptions, type Session } from '@lumencast/client';
 import './style.css';
 import { openPage } from './page.js';
+import { Failure, missingFile } from './words.js';
 
-/** What the server says of itself, under `/lumencast.json`. */
+/** What the server says of itself, in `lumencast.json`. */
 interface Served {
   /** Name of the scene's broadcast. */
   readonly broadcast: string;
-  /** The scene's file under `/scene/`. */
+  /** The scene's file under `scene/`. */
   readonly root: string;
 }
 
@@ -16,30 +17,70 @@ interface Served {
  */
 const query = new URLSearchParams(location.search);
 
+/** An address, beside the page unless it begins at its root. */
+const beside = (path: string) => new URL(path, location.href);
+
 void openPage(async () => {
   const [light, gltf] = [query.get('light'), query.get('gltf')];
-  const saved = light === null ? undefined : await readLight(light);
+  const saved = light === null ? undefined : await readLight(beside(light));
   if (saved && gltf !== null) {
-    const file = new URL(gltf, location.href);
+    const file = beside(gltf);
     const name = decodeURIComponent(file.pathname.split('/').at(-1) ?? '') || 'scene';
-    return { name, file: file.href, connect: () => savedLight(name, saved) };
+    return { name, file: file.href, isSaved: true, connect: () => withFile(() => savedLight(name, saved)) };
   }
-  const response = await fetch('/lumencast.json').catch(() => undefined);
-  if (!response?.ok) throw new Error(`The server does not answer${response ? ` (${response.status})` : ''}.`);
-  const { broadcast, root } = (await response.json()) as Served;
-  const address = new URL(`/${encodeURIComponent(broadcast)}${location.search}`, location.href);
+  const { broadcast, root } = await askServer();
+  const address = beside(`/${encodeURIComponent(broadcast)}${location.search}`);
   const options: ConnectOptions = { scene: broadcast, transport: transport(), ...(saved && { saved }) };
   return {
     name: root,
-    file: new URL(`/scene/${root.split('/').map(encodeURIComponent).join('/')}`, location.href).href,
-    connect: () => connect(address, options),
+    file: beside(`/scene/${root.split('/').map(encodeURIComponent).join('/')}`).href,
+    connect: () => withFile(() => connect(address, options)),
   };
 });
 
-async function readLight(address: string): Promise<Uint8Array> {
-  const response = await fetch(new URL(address, location.href)).catch(() => undefined);
-  if (!response?.ok) throw new Error(`${address} cannot be read${response ? ` (${response.status})` : ''}.`);
+async function askServer(): Promise<Served> {
+  const address = beside('/lumencast.json');
+  const response = await fetch(address).catch((cause: unknown) => {
+    throw new Failure('The server does not answer.', 'Is it still running? Its terminal says more.', {
+      cause,
+    });
+  });
+  const served = response.ok ? await response.json().catch(() => undefined) : undefined;
+  if (isServed(served)) return served;
+  throw new Failure(
+    'There is no Lumencast server here.',
+    'lumencast serve starts one. Saved light is shown by ?light=FILE.light&gltf=FILE.glb.',
+    { cause: new Error(`${address.href} answers ${response.status}`) },
+  );
+}
+
+function isServed(value: unknown): value is Served {
+  const { broadcast, root } = (value ?? {}) as Partial<Served>;
+  return typeof broadcast === 'string' && typeof root === 'string';
+}
+
+async function readLight({ href }: URL): Promise<Uint8Array> {
+  const response = await fetch(href).catch((error: unknown) => {
+    throw missingFile('The file of the light', href, 'nobody answers', error);
+  });
+  if (!response.ok) throw missingFile('The file of the light', href, String(response.status));
+  // Servers of single pages answer with their page where there is no file.
+  if (response.headers.get('content-type')?.startsWith('text/html'))
+    throw missingFile('The file of the light', href, '404');
   return new Uint8Array(await response.arrayBuffer());
+}
+
+/** Makes a session, which reads the saved light if there is any. */
+function withFile(session: () => Session): Session {
+  try {
+    return session();
+  } catch (cause) {
+    throw new Failure(
+      'The file of the light cannot be read.',
+      'Has lumencast bake of this version written it?',
+      { cause },
+    );
+  }
 }
 
 /** A session that asks no server. */

@@ -2,6 +2,7 @@ import type { Session } from '@lumencast/client';
 import { Curtain } from './ui/curtain.js';
 import { h } from './ui/dom.js';
 import { openViewer, type Viewer } from './viewer.js';
+import { Failure } from './words.js';
 
 /** Where the scene and its light come from. */
 export interface Source {
@@ -9,6 +10,8 @@ export interface Source {
   readonly name: string;
   /** Address of its glTF file. */
   readonly file: string;
+  /** Saved light, without a server: nothing of it changes. */
+  readonly isSaved?: boolean;
   readonly connect: () => Session;
 }
 
@@ -38,7 +41,7 @@ export async function openPage(find: () => Promise<Source>): Promise<void> {
   const stage = h('main', { class: 'stage' }, canvas);
   document.body.replaceChildren(stage, curtain.element);
   try {
-    const { name, file, connect } = await find();
+    const { name, file, isSaved = false, connect } = await find();
     document.title = `${name} · Lumencast`;
     const query = new URLSearchParams(location.search);
     const pixelRatio = Number(query.get('scale')) || undefined;
@@ -48,6 +51,7 @@ export async function openPage(find: () => Promise<Source>): Promise<void> {
       canvas,
       renderer: query.get('renderer') === 'webgpu' ? 'webgpu' : 'webgl',
       file,
+      isSaved,
       connect,
       pixelRatio,
       onProgress: (loaded, total) => curtain.progress(name, loaded, total),
@@ -67,8 +71,7 @@ export async function openPage(find: () => Promise<Source>): Promise<void> {
   } catch (error) {
     console.error(error);
     curtain.fail(
-      error instanceof Error ? error.message : String(error),
-      'Is the server still running? Its terminal says more: lumencast serve prints what goes wrong.',
+      error instanceof Failure ? error : new Failure('The picture cannot be shown.', '', { cause: error }),
     );
   }
 }

@@ -21,12 +21,15 @@ import { type AnyRenderer, createRenderer, isWebGPU, Resolution } from './view/r
 import { Selection } from './view/selection.js';
 import { isDark } from './view/sky.js';
 import { Touch } from './view/touch.js';
+import { Failure, missingFile } from './words.js';
 
 export interface ViewerOptions {
   readonly canvas: HTMLCanvasElement;
   readonly renderer: 'webgl' | 'webgpu';
   /** Address of the scene's glTF file. */
   readonly file: string;
+  /** Saved light, without a server. */
+  readonly isSaved: boolean;
   /** Makes the session, once the scene is loaded. */
   readonly connect: () => Session;
   /** Pixels a CSS pixel; adapts to the device's speed unless given. */
@@ -44,8 +47,8 @@ const ASK_INTERVAL = 3000;
 /** Loads everything that a viewer needs, in the order in which it can fail. */
 export async function openViewer(options: ViewerOptions): Promise<Viewer> {
   const renderer = await createRenderer(options.renderer, options.canvas);
-  const gltf = await loadGltf(options.file, options.onProgress).catch((error: Error) => {
-    throw new Error(`The scene's file cannot be shown (${error.message}).`, { cause: error });
+  const gltf = await loadGltf(options.file, options.onProgress).catch((error: unknown) => {
+    throw sceneFailure(options.file, error);
   });
   const scene = new Scene();
   scene.add(gltf.scene);
@@ -55,6 +58,17 @@ export async function openViewer(options: ViewerOptions): Promise<Viewer> {
     ? (await import('@lumencast/three/webgpu')).attach(session, { ...attached, renderer })
     : attach(session, { ...attached, renderer });
   return new Viewer(options, renderer, gltf, session, light, scene);
+}
+
+/** Why a scene's file is not shown. */
+function sceneFailure(file: string, error: unknown): Failure {
+  const what = "The scene's file";
+  const thrown = (error as Error).cause ?? error;
+  // What three.js throws has the answer with it; fetch throws a TypeError when nobody answers.
+  const { response } = thrown as { response?: Response };
+  if (response) return missingFile(what, file, String(response.status), error);
+  if (thrown instanceof TypeError) return missingFile(what, file, 'nobody answers', error);
+  return new Failure(`${what} cannot be read: ${file}`, 'Is it a glTF file?', { cause: error });
 }
 
 /** The picture and what one can do with it. The page's controls are in {@link Controls}. */

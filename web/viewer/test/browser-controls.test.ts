@@ -384,8 +384,8 @@ describe('a person at the page', () => {
       .poll(async () => (await draw(page), figures.innerText()), { timeout: 10_000 })
       .toMatch(/ticks\s+\d+\.\d Hz[^]*tick\s+\d+\.\d ms[^]*samples\s+\d+[^]*age\s+\d+ ms[^]*network\s+\d/);
     await click('Keys and');
-    expect(await page.isVisible('.help .keys')).toBe(true);
-    expect(await page.isVisible('.help .gestures')).toBe(false);
+    expect(await page.isVisible('.guide .keys')).toBe(true);
+    expect(await page.isVisible('.guide .gestures')).toBe(false);
     // Nothing is wider than what it stands in.
     await shoot(page, 'panels.png');
     expect(await cutOff(page)).toEqual([]);
@@ -521,7 +521,14 @@ describe('a page without a server', () => {
       const address = files.resolvedUrls!.local[0].replace(/\/$/, '');
       const query = { ...SCALE, light: 'cornell.light', gltf: 'cornell.glb' };
       const page = await openPage(browser, address, VIEWPORT, query, errors);
-      expect(await page.textContent('.notice.standing')).toContain('saved light');
+      await draw(page);
+      expect(await page.textContent('.brand')).toContain('saved light');
+      expect(await page.isVisible('.notice')).toBe(false);
+      // Neither figures that nobody knows nor what only a server can do.
+      await page.waitForTimeout(300);
+      await draw(page);
+      expect(await page.innerText('.stats')).toMatch(/^frames\s+\d+ fps$/);
+      expect(await page.isVisible('[title^="Take the flashlight"]')).toBe(false);
       const [direct, both] = await looks(page, ['direct', 'both']);
       expect(brightness(both)).toBeGreaterThan(1.1 * brightness(direct));
       await shoot(page, 'saved.png');
@@ -534,6 +541,20 @@ describe('a page without a server', () => {
       expect(refused).toContain('without a server');
       expect(errors).toEqual([]);
       await page.close();
+      // What is missing is named, with the address that it was looked for at.
+      for (const [light, gltf, missing] of [
+        ['other.light', 'cornell.glb', 'other.light'],
+        ['cornell.light', 'rooms/other.glb', 'rooms/other.glb'],
+      ]) {
+        const lost = await browser.newPage();
+        await lost.route(`**/${missing}`, (route) => route.fulfill({ status: 404 }));
+        await lost.goto(`${address}/?${new URLSearchParams({ light, gltf })}`);
+        const said = await lost.textContent('.curtain.failed');
+        expect(said).toMatch(/file.* is missing/);
+        expect(said).toContain(`${address}/${missing}`);
+        expect(said).not.toContain('server');
+        await lost.close();
+      }
     } finally {
       await files.close();
     }

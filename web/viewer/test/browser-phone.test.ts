@@ -70,12 +70,12 @@ it.each(SIZES)('has room for a thumb and for words at $width by $height', async 
   await page.tap('[title^="Keys and gestures"]');
   await draw(page);
   await shoot(page, `phone-help-${size.width}.png`);
-  expect(await page.isVisible('.help .keys')).toBe(false);
-  expect(await page.innerText('.help')).toMatch(/one finger[^]*two fingers[^]*tap/);
+  expect(await page.isVisible('.guide .keys')).toBe(false);
+  expect(await page.innerText('.guide')).toMatch(/one finger[^]*two fingers[^]*tap/);
   expect(await tooSmall()).toEqual([]);
   expect(await cutOff(page)).toEqual([]);
-  await page.tap('.help button');
-  expect(await page.isVisible('.help')).toBe(false);
+  await page.tap('.guide button');
+  expect(await page.isVisible('.guide')).toBe(false);
   expect(await page.isVisible('.settings')).toBe(false);
   await page.evaluate(() => window.lumencast!.viewer.selection.select(window.lumencast!.viewer.lights[0]));
   await draw(page);

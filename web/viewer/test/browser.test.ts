@@ -125,7 +125,11 @@ describe('the page', () => {
     const { port } = server;
     await server.kill();
     await page.waitForSelector('.notice.standing', { timeout: 15_000 });
-    expect(await page.textContent('.notice.standing')).toMatch(/lost/i);
+    expect(await page.textContent('.notice.standing')).toMatch(
+      /The server is gone\. The light stays; trying again\./,
+    );
+    await page.click('.notice.standing button');
+    expect(await page.textContent('.notice.standing small')).toMatch(/\w/);
     const after = await look(page, 'both');
     expect(difference(before, after)).toBeLessThan(0.05);
     await shoot(page, 'connection-lost.png');

@@ -17,6 +17,7 @@ import { findFlashlight } from '../src/view/flashlight.js';
 import { irradianceWeights } from '../src/view/probes.js';
 import { isDark, SKY } from '../src/view/sky.js';
 import { setSunAngles, sunAngles } from '../src/view/sun.js';
+import { missingFile, wordsFor } from '../src/words.js';
 
 describe('exposureFor', () => {
   it('scales with the light', () => {
@@ -194,5 +195,38 @@ describe('isDark', () => {
 
   it('is mended by the sky of the command line', () => {
     expect(SKY).toEqual(sky);
+  });
+});
+
+describe('what the page says', () => {
+  const technical = 'no answer from http://host:4443 (WebSocket connection failed)';
+  const lost = (reason: string, problem = '') => ({ state: 'lost', reason, ...(problem && { problem }) });
+
+  it('is plain when the server is gone, with the reason for those who ask', () => {
+    const words = wordsFor(lost(technical), true)!;
+    expect(words.message).toBe('The server is gone. The light stays; trying again.');
+    expect(words.details).toBe(technical);
+    expect(wordsFor(lost(technical), false)!.message).toBe('The server does not answer. Trying again.');
+  });
+
+  it('names what keeps it out', () => {
+    const said = (reason: string, problem?: string) => wordsFor(lost(reason, problem), false)!.message;
+    expect(said(`${technical}; the token may be wrong or have expired`)).toContain('token');
+    expect(said('http://host has no scene named tomb')).toContain('does not show this scene');
+    expect(said(technical, 'origin')).toContain('no pages from this address');
+    expect(wordsFor({ state: 'closed', reason: 'a catalog of version 9' }, false)!.message).toContain(
+      'version',
+    );
+  });
+
+  it('is nothing where all is well', () => {
+    for (const state of ['connecting', 'connected', 'saved'])
+      expect(wordsFor({ state }, true)).toBeUndefined();
+  });
+
+  it('calls a missing file missing, and gives its address', () => {
+    const address = 'https://host/light/room.light';
+    expect(missingFile('The file', address, '404').message).toBe(`The file is missing: ${address}`);
+    expect(missingFile('The file', address, '503').message).toContain('503');
   });
 });

@@ -1,4 +1,5 @@
-import { h } from './dom.js';
+import type { Failure } from '../words.js';
+import { h, more } from './dom.js';
 
 /** What lies over the page until there is a picture: progress, or why there will be none. */
 export class Curtain {
@@ -30,13 +31,14 @@ export class Curtain {
   }
 
   /** There will be no picture: says why and what helps. */
-  fail(message: string, help: string): void {
+  fail({ message, help, details }: Failure): void {
     this.element.classList.add('failed');
     this.element.setAttribute('role', 'alert');
     this.#card.replaceChildren(
       h('h1', {}, 'Lumencast'),
       h('p', {}, message),
-      h('p', { class: 'help' }, help),
+      ...(help ? [h('p', { class: 'help' }, help)] : []),
+      ...(details ? [more(details)] : []),
       h('button', { type: 'button', onclick: () => location.reload() }, 'Try again'),
     );
   }

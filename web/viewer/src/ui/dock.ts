@@ -117,6 +117,11 @@ export class Dock {
     this.#toggles.get(toggle)!.hidden = hidden;
   }
 
+  /** Whether it offers this. */
+  has(toggle: Toggle | undefined): boolean {
+    return toggle !== undefined && !this.#toggles.get(toggle)!.hidden;
+  }
+
   closeSettings(): void {
     this.#setOpen(false);
   }

@@ -54,6 +54,16 @@ export function labelledButton(
   return h('button', { type: 'button', class: 'labelled', title, onclick }, icon(name), h('span', {}, label));
 }
 
+/** A button that makes way for details. */
+export function more(details: string): HTMLElement {
+  const button = h(
+    'button',
+    { type: 'button', class: 'more', onclick: () => button.replaceWith(h('small', {}, details)) },
+    'More',
+  );
+  return button;
+}
+
 /** Shows on a button whether what it stands for is on. */
 export function setPressed(button: HTMLButtonElement, pressed: boolean): void {
   button.setAttribute('aria-pressed', String(pressed));

@@ -33,7 +33,7 @@ export function helpPanel(close: () => void): HTMLElement {
     );
   return h(
     'aside',
-    { class: 'panel help', hidden: true, 'aria-label': 'Help' },
+    { class: 'panel guide', hidden: true, 'aria-label': 'Help' },
     list('gestures', GESTURES, (gesture) => [gesture]),
     list('keys', KEYS, (keys) => keys.split(' ').map((key) => h('kbd', {}, key))),
     h('button', { type: 'button', onclick: close }, 'Close'),

@@ -1,24 +1,28 @@
-import { h } from './dom.js';
+import type { Words } from '../words.js';
+import { h, more } from './dom.js';
 
 /** Short messages over the picture: one that stays as long as its cause, others that go by themselves. */
 export class Notices {
   readonly element = h('div', { class: 'notices', role: 'status', 'aria-live': 'polite' });
-  #standing: HTMLElement | undefined;
+  #standing: { element: HTMLElement; message: string } | undefined;
   #offer: HTMLElement | undefined;
 
   /** A message that stays until it is replaced or, by `undefined`, taken away. */
-  standing(message: string | undefined): void {
-    if (this.#standing?.textContent === message) return;
-    this.#standing?.remove();
+  standing(words: Words | undefined): void {
+    if (this.#standing?.message === words?.message) return;
+    this.#standing?.element.remove();
     this.#standing = undefined;
-    if (message === undefined) return;
-    this.#standing = h(
+    if (words === undefined) return;
+    const { message, details } = words;
+    const element = h(
       'div',
       { class: 'notice standing' },
       h('i', { class: 'pulse' }),
       h('span', {}, message),
+      ...(details ? [more(details)] : []),
     );
-    this.element.prepend(this.#standing);
+    this.#standing = { element, message };
+    this.element.prepend(element);
   }
 
   /** A message with something to do about it, until it is taken away by `undefined`. */

@@ -8,7 +8,7 @@ export interface Figures extends SessionStats {
   readonly clients: number | undefined;
 }
 
-const ROWS: readonly [label: string, title: string, text: (figures: Figures) => string][] = [
+const ROWS: readonly [label: string, title: string, text: (figures: Figures) => string | undefined][] = [
   [
     'ticks',
     'Ticks of the server a second',
@@ -22,29 +22,35 @@ const ROWS: readonly [label: string, title: string, text: (figures: Figures) => 
   ['samples', 'Paths traced a probe and tick', ({ samples }) => known(samples, (n) => n.toFixed(0))],
   ['age', 'Time since the light on the screen was computed', ({ age }) => known(age, seconds)],
   ['delay', 'Time that light waits on the way', ({ delay }) => known(delay, seconds)],
-  ['network', 'Received from the server', ({ bandwidth }) => bytes(bandwidth)],
+  [
+    'network',
+    'Received from the server',
+    // Nothing is expected where no server has said anything.
+    ({ bandwidth, tickRate }) => known(tickRate, () => bytes(bandwidth)),
+  ],
   ['clients', 'Who watches this scene', ({ clients }) => known(clients, (n) => n.toFixed(0))],
   ['frames', 'Pictures a second on this page', ({ framesPerSecond }) => `${framesPerSecond.toFixed(0)} fps`],
 ];
 
 export class StatsPanel {
   readonly #values = ROWS.map(() => h('dd'));
-  readonly element = h(
-    'dl',
-    { class: 'panel stats' },
-    ...ROWS.map(([label, title], i) => h('div', { title }, h('dt', {}, label), this.#values[i])),
+  readonly #rows = ROWS.map(([label, title], i) =>
+    h('div', { title, hidden: true }, h('dt', {}, label), this.#values[i]),
   );
+  readonly element = h('dl', { class: 'panel stats' }, ...this.#rows);
 
+  /** Shows the figures that are known. */
   update(figures: Figures): void {
     ROWS.forEach(([, , text], i) => {
       const value = text(figures);
-      if (this.#values[i].textContent !== value) this.#values[i].textContent = value;
+      this.#rows[i].hidden = value === undefined;
+      if (value !== undefined && this.#values[i].textContent !== value) this.#values[i].textContent = value;
     });
   }
 }
 
-function known(value: number | undefined, text: (value: number) => string): string {
-  return value === undefined ? '–' : text(value);
+function known(value: number | undefined, text: (value: number) => string): string | undefined {
+  return value === undefined ? undefined : text(value);
 }
 
 function seconds(value: number): string {

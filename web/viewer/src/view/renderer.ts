@@ -7,6 +7,7 @@ import {
   WebGLRenderer,
 } from 'three';
 import type { WebGPURenderer } from 'three/webgpu';
+import { Failure } from '../words.js';
 
 export type AnyRenderer = WebGLRenderer | WebGPURenderer;
 
@@ -35,8 +36,9 @@ function createWebGL(canvas: HTMLCanvasElement): WebGLRenderer {
   try {
     return new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
   } catch {
-    throw new Error(
-      'This browser offers no WebGL 2, which the picture is drawn with. Is hardware acceleration off?',
+    throw new Failure(
+      'This browser offers no WebGL 2, which the picture is drawn with.',
+      'Is hardware acceleration off?',
     );
   }
 }
