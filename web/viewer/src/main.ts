@@ -17,7 +17,7 @@ interface Served {
  */
 const query = new URLSearchParams(location.search);
 
-/** An address, beside the page unless it begins at its root. */
+/** An address beside the page, which a proxy may have under any path. */
 const beside = (path: string) => new URL(path, location.href);
 
 void openPage(async () => {
@@ -29,17 +29,17 @@ void openPage(async () => {
     return { name, file: file.href, isSaved: true, connect: () => withFile(() => savedLight(name, saved)) };
   }
   const { broadcast, root } = await askServer();
-  const address = beside(`/${encodeURIComponent(broadcast)}${location.search}`);
+  const address = beside(`./${encodeURIComponent(broadcast)}${location.search}`);
   const options: ConnectOptions = { scene: broadcast, transport: transport(), ...(saved && { saved }) };
   return {
     name: root,
-    file: beside(`/scene/${root.split('/').map(encodeURIComponent).join('/')}`).href,
+    file: beside(`scene/${root.split('/').map(encodeURIComponent).join('/')}`).href,
     connect: () => withFile(() => connect(address, options)),
   };
 });
 
 async function askServer(): Promise<Served> {
-  const address = beside('/lumencast.json');
+  const address = beside('lumencast.json');
   const response = await fetch(address).catch((cause: unknown) => {
     throw new Failure('The server does not answer.', 'Is it still running? Its terminal says more.', {
       cause,

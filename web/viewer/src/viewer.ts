@@ -246,7 +246,7 @@ export class Viewer {
   async #askClients(): Promise<void> {
     if (document.hidden || this.session.status.state !== 'connected') return;
     try {
-      const metrics = await (await fetch(new URL('/metrics', this.session.origin))).text();
+      const metrics = await (await fetch(new URL('metrics', location.href))).text();
       const count = /^lumencast_clients(?:\{[^}]*\})? (\d+)/m.exec(metrics)?.[1];
       this.#clients = count === undefined ? undefined : Number(count);
     } catch {

@@ -1,4 +1,4 @@
-/** The page at the sizes that people have: nothing covers the picture, and nothing is cut off. */
+/** Where the page stands: nothing covers the picture at the sizes that people have, and no path is its own. */
 import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -68,4 +68,32 @@ it.each(SIZES)('shows the whole picture beside the bar at %i by %i', async (widt
   expect(await cutOff(page)).toEqual([]);
   await page.keyboard.press('Escape');
   expect(await page.isVisible('.settings')).toBe(false);
+});
+
+it('finds all that it is made of beside itself, wherever a proxy has it', async () => {
+  const { origin } = new URL(server.address);
+  const base = `${origin}/light/`;
+  const proxied = await browser.newPage();
+  try {
+    const root: string[] = [];
+    const asked: string[] = [];
+    proxied.on('request', (request) => {
+      const { pathname, protocol } = new URL(request.url());
+      // The session's own requests are the client's matter.
+      if (!/^http/.test(protocol) || pathname.endsWith('/certificate.sha256')) return;
+      if (request.url().startsWith(base)) asked.push(request.url().slice(base.length));
+      else root.push(pathname);
+    });
+    await proxied.route(`${base}**`, (route) =>
+      route.continue({ url: route.request().url().replace(base, `${origin}/`) }),
+    );
+    await proxied.goto(`${base}?scale=0.25&transport=websocket`);
+    await proxied.waitForFunction(() => window.lumencast, undefined, { timeout: 120_000 });
+    expect(asked).toContain('lumencast.json');
+    expect(asked).toContain('scene/cornell.glb');
+    expect(asked.some((path) => path.startsWith('assets/'))).toBe(true);
+    expect(root).toEqual([]);
+  } finally {
+    await proxied.close();
+  }
 });
