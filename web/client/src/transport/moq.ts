@@ -61,7 +61,10 @@ class MoqLink implements Link {
     this.kind = connection.transport;
     this.scene = Path.from(target.scene);
     this.edits = new EditTrack();
-    connection.publish(Path.from(target.scene, 'edits', `${target.client}.${target.key}`), this.edits.broadcast);
+    connection.publish(
+      Path.from(target.scene, 'edits', `${target.client}.${target.key}`),
+      this.edits.broadcast,
+    );
     this.ended = connection.closed.then(
       () => 'the server closed the connection',
       (error: unknown) => `the connection broke: ${(error as Error)?.message || 'no reason given'}`,
