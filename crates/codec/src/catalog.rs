@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use glam::{IVec3, Quat};
 use lumencast_light::{Grid, Offset, Order, ProbeVolume, VolumeId};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
 use crate::{DecodeError, Region, VERSION, limits};
@@ -94,16 +94,30 @@ pub struct Field {
     pub layers: u8,
     /// log2 of the field's scale ([`lumencast_light::ScaleRule`]); none before there was any light.
     /// It follows the light: a server sends the catalog again when it has changed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "scale", skip_serializing_if = "Option::is_none")]
     pub scale_log2: Option<i8>,
     /// What computes it, in words: `cpu path tracing`. At most [`limits::SOURCE_BYTES`] bytes, no
     /// control characters; empty where nobody says.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    #[serde(default, deserialize_with = "words", skip_serializing_if = "String::is_empty")]
     pub source: String,
     /// The run of the server that computes it, where that is not the catalog's; see
     /// [`Catalog::epoch_of`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub epoch: Option<Epoch>,
+}
+
+/// A scale, or none where there is something else.
+fn scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<i8>, D::Error> {
+    let value = Value::deserialize(from)?;
+    Ok(value.as_f64().filter(|v| v.fract() == 0.0 && (-128.0..128.0).contains(v)).map(|v| v as i8))
+}
+
+/// A source, which is printed on terminals, or nothing where there is something else.
+fn words<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+    let value = Value::deserialize(from)?;
+    let is_sound =
+        |text: &&str| text.len() <= limits::SOURCE_BYTES && !text.chars().any(char::is_control);
+    Ok(value.as_str().filter(is_sound).unwrap_or_default().to_owned())
 }
 
 fn is_usual(offset: &Offset) -> bool {
@@ -157,7 +171,8 @@ impl Catalog {
         serde_json::to_vec(&frame).expect("numbers, text and lists have a JSON form")
     }
 
-    /// Reads a frame of the `catalog` track. Fields of unknown kinds are left out.
+    /// Reads a frame of the `catalog` track. Fields of unknown kinds, and those that contradict
+    /// themselves or exceed a limit, are left out; so are members of fields that may be absent and are none.
     ///
     /// # Errors
     /// [`DecodeError::Version`] when the server speaks another version; others when the bytes are
@@ -176,12 +191,12 @@ impl Catalog {
         if !(1e-4..=3600.0).contains(&frame.tick_seconds) {
             return Err(DecodeError::Malformed("tick_seconds"));
         }
-        let fields = frame
+        let fields: Vec<Field> = frame
             .fields
             .into_iter()
             .filter(|field| field["kind"] == "volume" && field["basis"] == "sh")
-            .map(|field| json(serde_json::from_value::<Field>(field)).and_then(Field::validated))
-            .collect::<Result<Vec<_>, _>>()?;
+            .filter_map(|field| json(serde_json::from_value::<Field>(field)).ok()?.validated().ok())
+            .collect();
         let ids: HashSet<u32> = fields.iter().map(|field| field.id).collect();
         if ids.len() < fields.len() {
             return Err(DecodeError::Malformed("two fields have the same id"));
@@ -252,11 +267,6 @@ impl Field {
         }
         if !(1..=3).contains(&self.layers) {
             return Err(DecodeError::Malformed("layers"));
-        }
-        DecodeError::limit("bytes of a field's source", self.source.len(), limits::SOURCE_BYTES)?;
-        // It is printed on terminals.
-        if self.source.chars().any(char::is_control) {
-            return Err(DecodeError::Malformed("control characters in a field's source"));
         }
         self.check_regions()?;
         Ok(self)
@@ -372,36 +382,12 @@ mod tests {
 
     #[test]
     fn contradictions_and_excesses_are_refused() {
-        let cases: [(&str, Value, &str); 25] = [
+        let cases = [
             ("/lumencast", json!(2), "version"),
             ("/lumencast", json!("1"), "malformed"),
             ("/epoch", json!(null), "json"),
             ("/epoch", json!("12"), "json"),
             ("/tick_seconds", json!(0), "malformed"),
-            ("/fields/0/order", json!(5), "json"),
-            ("/fields/0/offset", json!(0.5), "json"),
-            ("/fields/0/offset", json!({ "feet": 0.5 }), "json"),
-            ("/fields/0/offset", json!({ "metres": 1e39 }), "malformed"),
-            ("/fields/0/layers", json!(4), "malformed"),
-            ("/fields/0/scale_log2", json!(128), "json"),
-            ("/fields/0/scale_log2", json!(0.5), "json"),
-            ("/fields/0/source", json!("x".repeat(129)), "limit"),
-            ("/fields/0/source", json!("\u{1b}[2J"), "malformed"),
-            ("/fields/0/source", json!(1), "json"),
-            ("/fields/0/epoch", json!("5"), "json"),
-            ("/fields/0/grid/resolution", json!([0, 6, 7]), "malformed"),
-            (
-                "/fields/0/grid/resolution",
-                json!([4_294_967_295_u32, 4_294_967_295_u32, 4_294_967_295_u32]),
-                "limit",
-            ),
-            ("/fields/0/grid/resolution", json!([13, 6, 7]), "malformed"),
-            ("/fields/0/grid/size", json!([8, -6, 4]), "malformed"),
-            ("/fields/0/grid/center", json!([1e39, 0, 0]), "malformed"),
-            ("/fields/0/grid/rotation", json!([0, 0, 0, 2]), "malformed"),
-            ("/fields/0/regions/1/min", json!([5, 0, 0]), "malformed"),
-            ("/fields/0/regions/1/min", json!([4_294_967_295_u32, 0, 0]), "malformed"),
-            ("/fields/0/regions/1/size", json!([17, 6, 7]), "limit"),
         ];
         for (place, wrong, kind) in cases {
             let mut value: Value = serde_json::from_slice(&catalog().encode()).unwrap();

@@ -61,17 +61,17 @@ pub struct RefusedEdit {
     pub reason: String,
 }
 
-/// A frame, its edits not yet looked into (`E` is [`Value`] when reading).
-#[derive(Serialize, Deserialize)]
-struct Frame<E> {
-    #[serde(skip_serializing_if = "Option::is_none", default = "none")]
-    snapshot: Option<Vec<E>>,
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    acks: BTreeMap<String, u64>,
-    #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty")]
-    edits: Vec<Entry<E>>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    refused: Vec<RefusedEdit>,
+/// A frame as it is written.
+#[derive(Serialize)]
+struct Written<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    snapshot: Option<&'a [Edit]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    acks: Option<&'a BTreeMap<String, u64>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    edits: Vec<Entry<'a>>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    refused: &'a [RefusedEdit],
     tick: u64,
     time: f64,
     clock: f64,
@@ -80,31 +80,53 @@ struct Frame<E> {
     samples: f64,
 }
 
-fn none<T>() -> Option<T> {
-    None
+#[derive(Serialize)]
+struct Entry<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    client: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seq: Option<u64>,
+    edit: &'a Edit,
 }
 
-#[derive(Serialize, Deserialize)]
-struct Entry<E> {
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    client: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    seq: Option<u64>,
-    edit: E,
+impl<'a> Entry<'a> {
+    fn of(accepted: &'a AcceptedEdit) -> Self {
+        let source = accepted.source.as_ref();
+        let (client, seq) = source.map(|(client, seq)| (client.as_str(), *seq)).unzip();
+        Self { client, seq, edit: &accepted.edit }
+    }
+}
+
+/// A frame as it is read: what may be passed over is not yet looked into.
+#[derive(Deserialize)]
+struct Read {
+    #[serde(default)]
+    snapshot: Option<Vec<Value>>,
+    #[serde(default)]
+    acks: Value,
+    #[serde(default)]
+    edits: Vec<Value>,
+    #[serde(default)]
+    refused: Vec<Value>,
+    tick: Value,
+    time: f64,
+    clock: f64,
+    version: Value,
+    #[serde(default)]
+    tick_ms: Value,
+    #[serde(default)]
+    samples: Value,
 }
 
 impl StateFrame {
     /// The frame as JSON.
     pub fn encode(&self) -> Vec<u8> {
-        let entry = |accepted: &AcceptedEdit| {
-            let (client, seq) = accepted.source.clone().unzip();
-            Entry { client, seq, edit: accepted.edit.clone() }
-        };
-        let frame = Frame {
-            snapshot: self.snapshot.as_ref().map(|state| state.edits.clone()),
-            acks: self.snapshot.as_ref().map(|state| state.acks.clone()).unwrap_or_default(),
-            edits: self.edits.iter().map(entry).collect(),
-            refused: self.refused.clone(),
+        let acks = self.snapshot.as_ref().map(|state| &state.acks);
+        let frame = Written {
+            snapshot: self.snapshot.as_ref().map(|state| &state.edits[..]),
+            acks: acks.filter(|acks| !acks.is_empty()),
+            edits: self.edits.iter().map(Entry::of).collect(),
+            refused: &self.refused,
             tick: self.tick,
             time: self.time,
             clock: self.clock,
@@ -115,37 +137,64 @@ impl StateFrame {
         serde_json::to_vec(&frame).expect("numbers, text and lists have a JSON form")
     }
 
-    /// Reads a frame of the `state` track. Edits that this program does not know are left out, the
-    /// others kept.
+    /// Reads a frame of the `state` track. Edits that this program does not know are left out, and so are
+    /// acknowledgements, refusals and senders that are none; the rest is kept.
     ///
     /// # Errors
-    /// [`DecodeError`] when the bytes are no state frame or exceed a limit.
+    /// [`DecodeError`] when the bytes are no state frame or exceed a limit, or when there is no number of
+    /// the tick, time, clock or version that can be used.
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         DecodeError::limit("bytes of a frame", bytes.len(), limits::FRAME_BYTES)?;
-        let frame: Frame<Value> = json(serde_json::from_slice(bytes))?;
+        let frame: Read = json(serde_json::from_slice(bytes))?;
         DecodeError::limit("edits in a frame", frame.edits.len(), limits::DELTA_EDITS)?;
         DecodeError::limit("refusals in a frame", frame.refused.len(), limits::DELTA_EDITS)?;
         if let Some(edits) = &frame.snapshot {
             DecodeError::limit("edits in a snapshot", edits.len(), limits::SNAPSHOT_EDITS)?;
         }
-        let edits = frame.edits.into_iter().filter_map(|entry| {
-            Some(AcceptedEdit { source: entry.client.zip(entry.seq), edit: known(entry.edit)? })
+        let measure = |value: &Value| value.as_f64().filter(|v| *v >= 0.0).unwrap_or(0.0);
+        let snapshot = frame.snapshot.map(|edits| SceneState {
+            edits: edits.into_iter().filter_map(known).collect(),
+            acks: acks(&frame.acks),
         });
         Ok(Self {
-            tick: frame.tick,
+            tick: whole(&frame.tick).ok_or(DecodeError::Malformed("tick"))?,
             time: frame.time,
             clock: frame.clock,
-            version: frame.version,
-            tick_ms: frame.tick_ms,
-            samples: frame.samples,
-            snapshot: frame.snapshot.map(|edits| SceneState {
-                edits: edits.into_iter().filter_map(known).collect(),
-                acks: frame.acks,
-            }),
-            edits: edits.collect(),
-            refused: frame.refused,
+            version: whole(&frame.version).ok_or(DecodeError::Malformed("version"))?,
+            tick_ms: measure(&frame.tick_ms),
+            samples: measure(&frame.samples),
+            snapshot,
+            edits: frame.edits.into_iter().filter_map(accepted).collect(),
+            refused: frame.refused.iter().filter_map(refused).collect(),
         })
     }
+}
+
+/// A number that counts or names something.
+fn whole(value: &Value) -> Option<u64> {
+    let with_point = || value.as_f64().filter(|v| *v >= 0.0 && v.fract() == 0.0).map(|v| v as u64);
+    value.as_u64().or_else(with_point).filter(|number| *number <= limits::LARGEST_NUMBER)
+}
+
+fn acks(acks: &Value) -> BTreeMap<String, u64> {
+    let entries = acks.as_object().into_iter().flatten();
+    entries.filter_map(|(client, seq)| Some((client.clone(), whole(seq)?))).collect()
+}
+
+fn accepted(mut entry: Value) -> Option<AcceptedEdit> {
+    let edit = known(entry.get_mut("edit")?.take())?;
+    let (client, seq) = (entry.get("client").and_then(Value::as_str), entry.get("seq"));
+    let source = client.map(str::to_owned).zip(seq.and_then(whole));
+    Some(AcceptedEdit { source, edit })
+}
+
+fn refused(entry: &Value) -> Option<RefusedEdit> {
+    let text = |name: &str| entry.get(name)?.as_str().map(str::to_owned);
+    Some(RefusedEdit {
+        client: text("client")?,
+        seq: whole(entry.get("seq")?)?,
+        reason: text("reason")?,
+    })
 }
 
 /// The edit, if this program knows it.

@@ -1,6 +1,18 @@
 import type { Vec3, Vec4 } from '../edit.js';
 import { WireError } from '../wire-error.js';
-import { type Json, list, number, object, parseObject, text, vec3, vec4, whole } from './json.js';
+import {
+  isObject,
+  type Json,
+  list,
+  number,
+  object,
+  parseObject,
+  text,
+  usable,
+  vec3,
+  vec4,
+  whole,
+} from './json.js';
 import { LIMITS } from './limits.js';
 
 /** Version of the wire format that this client speaks; see docs/wire.md. */
@@ -100,7 +112,8 @@ export function cellCount(size: Vec3): number {
 }
 
 /**
- * Reads a catalog. Fields of kinds that this client does not know are left out.
+ * Reads a catalog. Fields of kinds that this client does not know, and those that contradict themselves
+ * or exceed a limit, are left out; so are members of fields that may be absent and are none.
  * @throws WireError of kind `version` when the server speaks another version.
  */
 export function parseCatalog(bytes: Uint8Array): Catalog {
@@ -114,9 +127,10 @@ export function parseCatalog(bytes: Uint8Array): Catalog {
   const epoch = parseEpoch(json.epoch);
   const scene = object(json.scene, 'scene');
   const fields = list(json.fields, 'fields', LIMITS.fields)
-    .map((field) => object(field, 'a field'))
+    .filter(isObject)
     .filter((field) => field.kind === 'volume' && field.basis === 'sh')
-    .map(parseField);
+    .map((field) => usable(() => parseField(field)))
+    .filter((field) => field !== undefined);
   if (new Set(fields.map((field) => field.id)).size !== fields.length) {
     throw new WireError('malformed', 'two fields have the same id');
   }
@@ -137,6 +151,8 @@ function parseField(json: Json): Field {
   const grid = parseGrid(object(json.grid, 'grid'));
   const use = USES.find((use) => use === json.use);
   if (!use) throw new WireError('malformed', `use of field ${id} is ${JSON.stringify(json.use)}`);
+  const scale = usable(() => 2 ** whole(json.scale_log2, 'scale_log2', 127, -128));
+  const source = usable(() => parseSource(json.source));
   return {
     id,
     kind: 'volume',
@@ -148,16 +164,16 @@ function parseField(json: Json): Field {
     cellsMin: json.cells_min === undefined ? [0, 0, 0] : vec3(json.cells_min, 'cells_min', anyWhole),
     regions: parseRegions(json.regions, grid.resolution),
     layers: whole(json.layers, 'layers', LIMITS.layers, 1),
-    ...(json.scale_log2 === undefined ? {} : { scale: 2 ** whole(json.scale_log2, 'scale_log2', 127, -128) }),
-    ...(json.source === undefined ? {} : { source: parseSource(json.source) }),
+    ...(scale === undefined ? {} : { scale }),
+    ...(source === undefined ? {} : { source }),
     ...(json.epoch === undefined ? {} : { epoch: parseEpoch(json.epoch) }),
   };
 }
 
 function parseOffset(json: Json): Offset {
   return json.cells === undefined
-    ? { metres: number(json.metres, 'offset.metres') }
-    : { cells: number(json.cells, 'offset.cells') };
+    ? { metres: single(json.metres, 'offset.metres') }
+    : { cells: single(json.cells, 'offset.cells') };
 }
 
 function parseEpoch(json: unknown): string {
@@ -185,9 +201,9 @@ function parseGrid(json: Json): Grid {
     throw new WireError('limit', `a field of ${cellCount(resolution)} probes`);
   }
   return {
-    center: vec3(json.center, 'center', number),
+    center: vec3(json.center, 'center', single),
     rotation: rotation.map((c) => c / length) as Vec4,
-    size: vec3(json.size, 'size', (value, what) => number(value, what, Number.MIN_VALUE)),
+    size: vec3(json.size, 'size', (value, what) => single(value, what, Number.MIN_VALUE)),
     resolution,
   };
 }
@@ -224,6 +240,14 @@ function parseRegions(json: unknown, resolution: Vec3): Region[] {
     throw new WireError('malformed', 'the regions do not cover the grid');
   }
   return regions;
+}
+
+/** The largest number of 32 bits. */
+const LARGEST_SINGLE = 3.4028234663852886e38;
+
+/** A number that 32 bits can hold. */
+function single(value: unknown, what: string, min = -LARGEST_SINGLE): number {
+  return number(value, what, min, LARGEST_SINGLE);
 }
 
 function anyWhole(value: unknown, what: string): number {

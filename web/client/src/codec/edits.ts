@@ -9,7 +9,7 @@ import type {
   Vec3,
 } from '../edit.js';
 import { WireError } from '../wire-error.js';
-import { isObject, type Json, number, object, text, vec3, vec4, whole } from './json.js';
+import { isObject, type Json, number, object, text, usable, vec3, vec4, whole } from './json.js';
 
 /** Reads one member, or throws a {@link WireError}. */
 type Read<T> = (value: unknown, what: string) => T;
@@ -146,10 +146,6 @@ const EDITS: { readonly [name: string]: (json: Json) => Edit } = {
 export function parseEdit(value: unknown): Edit | undefined {
   if (!isObject(value) || typeof value.edit !== 'string' || !Object.hasOwn(EDITS, value.edit))
     return undefined;
-  try {
-    return EDITS[value.edit](value);
-  } catch (error) {
-    if (error instanceof WireError) return undefined;
-    throw error;
-  }
+  const read = EDITS[value.edit];
+  return usable(() => read(value));
 }

@@ -1,7 +1,7 @@
 import type { Edit } from '../edit.js';
 import { WireError } from '../wire-error.js';
 import { parseEdit } from './edits.js';
-import { isObject, list, number, object, parseObject, text, whole } from './json.js';
+import { isObject, list, number, object, parseObject, text, usable, whole } from './json.js';
 import { LIMITS } from './limits.js';
 
 /** What every frame of the state track tells. */
@@ -49,7 +49,10 @@ export interface Refusal {
   readonly reason: string;
 }
 
-/** Reads a frame of the state track. Edits that this client does not know are skipped. */
+/**
+ * Reads a frame of the state track. Edits that this client does not know are left out, and so are
+ * acknowledgements, refusals and senders that are none.
+ */
 export function parseState(bytes: Uint8Array): StateFrame {
   const json = parseObject(bytes, 'a state frame');
   const tick: TickState = {
@@ -57,8 +60,8 @@ export function parseState(bytes: Uint8Array): StateFrame {
     time: number(json.time, 'time'),
     clock: number(json.clock, 'clock'),
     version: whole(json.version, 'version'),
-    tickMs: number(json.tick_ms, 'tick_ms', 0),
-    samples: number(json.samples, 'samples', 0),
+    tickMs: usable(() => number(json.tick_ms, 'tick_ms', 0)) ?? 0,
+    samples: usable(() => number(json.samples, 'samples', 0)) ?? 0,
   };
   const happened = { ...tick, accepted: parseAccepted(json.edits), refused: parseRefused(json.refused) };
   if (absent(json.snapshot)) return { ...happened, kind: 'delta' };
@@ -72,31 +75,31 @@ function parseSnapshot(json: unknown): Edit[] {
 }
 
 function parseAcks(json: unknown): Map<string, number> {
-  return new Map(
-    Object.entries(object(json ?? {}, 'acks')).map(([client, seq]) => [client, whole(seq, 'acks')]),
-  );
+  const acks = new Map<string, number>();
+  for (const [client, value] of isObject(json) ? Object.entries(json) : []) {
+    const seq = usable(() => whole(value, 'acks'));
+    if (seq !== undefined) acks.set(client, seq);
+  }
+  return acks;
 }
 
 function parseAccepted(json: unknown): StateEdit[] {
-  return list(json ?? [], 'edits', LIMITS.deltaEdits).map((value) => {
-    const entry = object(value, 'an entry of edits');
-    return {
-      client: absent(entry.client) ? undefined : text(entry.client, 'client'),
-      seq: absent(entry.seq) ? undefined : whole(entry.seq, 'seq'),
-      edit: parseEdit(entry.edit),
-    };
-  });
+  return list(json ?? [], 'edits', LIMITS.deltaEdits)
+    .filter(isObject)
+    .map((entry) => {
+      const source = usable(() => ({ client: text(entry.client, 'client'), seq: whole(entry.seq, 'seq') }));
+      return { client: source?.client, seq: source?.seq, edit: parseEdit(entry.edit) };
+    });
 }
 
 function parseRefused(json: unknown): Refusal[] {
-  return list(json ?? [], 'refused', LIMITS.deltaEdits).map((value) => {
-    const entry = object(value, 'an entry of refused');
-    return {
-      client: text(entry.client, 'client'),
-      seq: whole(entry.seq, 'seq'),
-      reason: text(entry.reason, 'reason'),
-    };
-  });
+  const read = (value: unknown): Refusal => {
+    const { client, seq, reason } = object(value, 'an entry of refused');
+    return { client: text(client, 'client'), seq: whole(seq, 'seq'), reason: text(reason, 'reason') };
+  };
+  return list(json ?? [], 'refused', LIMITS.deltaEdits)
+    .map((value) => usable(() => read(value)))
+    .filter((refusal) => refusal !== undefined);
 }
 
 function absent(value: unknown): boolean {
