@@ -27,6 +27,8 @@ impl Test {
         step("web: page", npm(&["run", "build"]))?;
         let clippy = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
         step("lints", cargo(&clippy))?;
+        let fuzz = ["check", "-p", "lumencast-fuzz", "--features", "libfuzzer", "--bins"];
+        step("fuzz targets", cargo(&fuzz))?;
         let mut tests = cargo(&["nextest", "run", "--workspace"]);
         match oracles::embree() {
             Ok(library) => drop(tests.env("LUMENCAST_EMBREE", library)),

@@ -199,7 +199,20 @@ fn refused(entry: &Value) -> Option<RefusedEdit> {
 
 /// The edit, if this program knows it.
 fn known(edit: Value) -> Option<Edit> {
+    if holds_more_than_32_bits(&edit) {
+        return None;
+    }
     serde_json::from_value(edit).ok()
+}
+
+/// Whether a number of an edit is none that 32 bits can hold.
+fn holds_more_than_32_bits(value: &Value) -> bool {
+    match value {
+        Value::Number(number) => !number.as_f64().is_some_and(|v| (v as f32).is_finite()),
+        Value::Array(values) => values.iter().any(holds_more_than_32_bits),
+        Value::Object(members) => members.values().any(holds_more_than_32_bits),
+        Value::Null | Value::Bool(_) | Value::String(_) => false,
+    }
 }
 
 /// An edit on its way from a client to the server.
@@ -230,6 +243,9 @@ impl ClientEdit {
         if let Some(seq) = seq.filter(|seq| *seq > limits::LARGEST_NUMBER) {
             let (what, limit) = ("sequence number", limits::LARGEST_NUMBER);
             return Err((None, DecodeError::Limit { what, value: seq, limit }));
+        }
+        if holds_more_than_32_bits(&value) {
+            return Err((seq, DecodeError::Malformed("a number beyond 32 bits")));
         }
         json(serde_json::from_value(value)).map_err(|error| (seq, error))
     }

@@ -7,6 +7,7 @@ import {
   number,
   object,
   parseObject,
+  single,
   text,
   usable,
   vec3,
@@ -240,14 +241,6 @@ function parseRegions(json: unknown, resolution: Vec3): Region[] {
     throw new WireError('malformed', 'the regions do not cover the grid');
   }
   return regions;
-}
-
-/** The largest number of 32 bits. */
-const LARGEST_SINGLE = 3.4028234663852886e38;
-
-/** A number that 32 bits can hold. */
-function single(value: unknown, what: string, min = -LARGEST_SINGLE): number {
-  return number(value, what, min, LARGEST_SINGLE);
 }
 
 function anyWhole(value: unknown, what: string): number {

@@ -9,13 +9,13 @@ import type {
   Vec3,
 } from '../edit.js';
 import { WireError } from '../wire-error.js';
-import { isObject, type Json, number, object, text, usable, vec3, vec4, whole } from './json.js';
+import { isObject, type Json, object, single, text, usable, vec3, vec4, whole } from './json.js';
 
 /** Reads one member, or throws a {@link WireError}. */
 type Read<T> = (value: unknown, what: string) => T;
 type Readers<T> = { readonly [K in keyof T]-?: Read<NonNullable<T[K]>> };
 
-const real: Read<number> = (value, what) => number(value, what);
+const real: Read<number> = (value, what) => single(value, what);
 const id: Read<number> = (value, what) => whole(value, what, 0xffff_ffff);
 const vector: Read<Vec3> = (value, what) => vec3(value, what, real);
 const flag: Read<boolean> = (value, what) => {

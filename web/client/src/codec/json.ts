@@ -43,6 +43,14 @@ export function number(value: unknown, what: string, min = -Infinity, max = Infi
   return value;
 }
 
+/** The largest number of 32 bits. */
+const LARGEST_SINGLE = 3.4028234663852886e38;
+
+/** A number that 32 bits can hold. */
+export function single(value: unknown, what: string, min = -LARGEST_SINGLE): number {
+  return number(value, what, min, LARGEST_SINGLE);
+}
+
 /** A whole number from 0 to `max`. */
 export function whole(value: unknown, what: string, max = Number.MAX_SAFE_INTEGER, min = 0): number {
   const n = number(value, what, min, max);
@@ -73,9 +81,9 @@ export function vec3(value: unknown, what: string, check: (value: unknown, what:
   return [check(v[0], what), check(v[1], what), check(v[2], what)];
 }
 
-/** Four finite numbers. */
+/** Four numbers that 32 bits can hold. */
 export function vec4(value: unknown, what: string): Vec4 {
   const v = list(value, what, 4);
   if (v.length !== 4) throw new WireError('malformed', `${what} has ${v.length} entries`);
-  return [number(v[0], what), number(v[1], what), number(v[2], what), number(v[3], what)];
+  return [single(v[0], what), single(v[1], what), single(v[2], what), single(v[3], what)];
 }

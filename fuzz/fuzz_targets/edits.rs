@@ -1,0 +1,5 @@
+//! Clients' edits.
+
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| lumencast_fuzz::edits(data));

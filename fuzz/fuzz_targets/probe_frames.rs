@@ -1,0 +1,5 @@
+//! Probe frames.
+
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| lumencast_fuzz::probe_frames(data));
