@@ -35,7 +35,7 @@ export function reportLosses(session: Pick<Session, 'on'>, warn: (message: strin
       const { problem = 'unreachable', reason } = status;
       if (said.has(problem)) return;
       said.add(problem);
-      warn(`${reason}; trying again`);
+      warn(`not connected, trying again: ${reason}`);
     } else if (status.state === 'closed' && status.problem) warn(status.reason);
   });
 }

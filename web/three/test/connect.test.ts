@@ -145,17 +145,17 @@ describe('connect', () => {
       ...{ scene, gltf, onWarning, session },
     });
     await vi.waitFor(() => expect(attempts.mock.calls.length).toBeGreaterThan(2), { timeout: 10_000 });
-    expect(onWarning.mock.calls).toEqual([['nobody answers; trying again']]);
+    expect(onWarning.mock.calls).toEqual([['not connected, trying again: nobody answers']]);
     net.refuse = new ConnectError('origin', 'not from there');
     await vi.waitFor(() => expect(onWarning).toHaveBeenCalledTimes(2), { timeout: 10_000 });
-    expect(onWarning).toHaveBeenLastCalledWith('not from there; trying again');
+    expect(onWarning).toHaveBeenLastCalledWith('not connected, trying again: not from there');
     net.refuse = undefined;
     await vi.waitFor(() => net.link, { timeout: 10_000 });
     net.link.deliver('catalog', new FakeServer().catalog);
     expect(onWarning).toHaveBeenLastCalledWith('connected to the server');
     net.link.break('the server has gone');
     await vi.waitFor(() => expect(onWarning).toHaveBeenCalledTimes(4));
-    expect(onWarning).toHaveBeenLastCalledWith('the server has gone; trying again');
+    expect(onWarning).toHaveBeenLastCalledWith('not connected, trying again: the server has gone');
     light.dispose();
     expect(onWarning).toHaveBeenCalledTimes(4);
   }, 60_000);
