@@ -33,6 +33,12 @@ it('nobody answers', async () => {
   expect(message).toContain('lumencast serve');
 });
 
+it('a proxy answers for a server that does not run', async () => {
+  const { problem, message } = await found(await serve(502, '<h1>Bad Gateway</h1>'));
+  expect(problem).toBe('unreachable');
+  expect(message).toContain('(502)');
+});
+
 it.each([
   [200, '<!doctype html>'],
   [404, '{}'],

@@ -20,6 +20,10 @@ export async function diagnose(target: Target, base: URL, error: unknown): Promi
       : new ConnectError('unreachable', nobodyThere(base), options);
   }
   const { status, casts } = answer;
+  if (casts === undefined && status >= 500) {
+    const reason = `${base} answers with an error (${status}): does the server behind it run?`;
+    return new ConnectError('unreachable', reason, options);
+  }
   if (casts === undefined) {
     const reason = `what answers at ${base} is no Lumencast server (${status}): is the port right?`;
     return new ConnectError('stranger', reason, options);
