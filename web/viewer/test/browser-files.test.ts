@@ -9,7 +9,7 @@ import { crc32, deflateSync } from 'node:zlib';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { buildPage, draw, look, onScreen, openPage, type Pixel, shoot } from './browser.js';
+import { buildPage, cutOff, draw, look, onScreen, openPage, type Pixel, shoot } from './browser.js';
 import { freePort, lumencastProgram, Server } from './server.js';
 
 const VIEWPORT = { width: 800, height: 600 };
@@ -57,12 +57,16 @@ function writeScene(uri: string, parts: object = {}): string {
   return scene;
 }
 
-async function visit(scene: string, see: (page: Page) => Promise<void>): Promise<void> {
+async function visit(
+  scene: string,
+  see: (page: Page) => Promise<void>,
+  viewport: Parameters<typeof openPage>[2] = VIEWPORT,
+): Promise<void> {
   const options = ['--page', page, '--samples', '4..16', '--volume', '2x2x2@0,0.5,0:3,1.5,3'];
   const server = await Server.start(program, scene, await freePort(), options);
   const errors: string[] = [];
   try {
-    const opened = await openPage(browser, server.address, VIEWPORT, SCALE, errors);
+    const opened = await openPage(browser, server.address, viewport, SCALE, errors);
     await see(opened);
     expect(errors).toEqual([]);
     await opened.close();
@@ -74,21 +78,35 @@ async function visit(scene: string, see: (page: Page) => Promise<void>): Promise
 const brightness = (picture: readonly Pixel[]) =>
   picture.reduce((total, [r, g, b]) => total + r + g + b, 0) / picture.length;
 
-it('offers a sky to a scene without light, by one click', async () => {
-  await visit(writeScene('the%20data\\caf%C3%A9%2050%25.bin'), async (page) => {
+it.each([
+  { on: 'a desk', viewport: VIEWPORT },
+  { on: 'a phone', viewport: { width: 360, height: 640, touch: true } },
+])('offers a sky to a scene without light, by one click, on $on', async ({ on, viewport }) => {
+  const see = async (page: Page) => {
     await draw(page);
     expect(await page.textContent('.notice.offer')).toContain('Nothing in this scene gives light');
     const dark = brightness(await look(page, 'both'));
-    await shoot(page, 'dark.png');
-    await page.click('.notice.offer button');
+    await shoot(page, `dark on ${on}.png`);
+    expect(await cutOff(page)).toEqual([]);
+    await (on === 'a phone' ? page.tap('.notice.offer button') : page.click('.notice.offer button'));
     await page.waitForFunction(() => window.lumencast!.light.environment?.type === 'sky');
     await expect.poll(() => draw(page).then(() => page.isVisible('.notice.offer'))).toBe(false);
     await page.evaluate(() => window.lumencast!.viewer.meter());
     expect(dark).toBeLessThan(3);
     expect(brightness(await look(page, 'both'))).toBeGreaterThan(60);
-    await shoot(page, 'sky.png');
-  });
-}, 120_000);
+    await shoot(page, `sky on ${on}.png`);
+    // The floor is seen whole, and not as a speck.
+    const corners: [number, number][] = [];
+    for (const x of [-1, 1]) for (const z of [-1, 1]) corners.push(await onScreen(page, [x, 0, z]));
+    const across = corners.map(([x]) => x);
+    const width = Math.max(...across) - Math.min(...across);
+    const room = Math.min(viewport.width, viewport.height);
+    expect(Math.min(...across)).toBeGreaterThan(0);
+    expect(Math.max(...across)).toBeLessThan(viewport.width);
+    expect(width / room).toBeGreaterThan(0.6);
+  };
+  await visit(writeScene('the%20data\\caf%C3%A9%2050%25.bin'), see, viewport);
+});
 
 it('offers none where there is light', async () => {
   const lit = { pbrMetallicRoughness: { metallicFactor: 0 }, emissiveFactor: [1, 1, 1] };

@@ -14,6 +14,8 @@ export type CameraMode = 'orbit' | 'fly';
 
 /** Seconds that the way to another view takes. */
 const FLIGHT = 0.9;
+/** What of the scene is in sight as a whole: a ball about it. */
+const OVERVIEW = { fov: 50, aspect: 1 } as const;
 const FLY_KEYS = new Set(['KeyW', 'KeyA', 'KeyS', 'KeyD', 'KeyQ', 'KeyE', 'ShiftLeft', 'ShiftRight']);
 
 /** The camera and how one moves it: around a point, or freely with W A S D and the mouse. */
@@ -24,7 +26,7 @@ export class CameraRig {
   readonly #pressed = new Set<string>();
   /** Metres a second. */
   #speed: number;
-  #view: { fov: number; aspect: number } = { fov: 50, aspect: 16 / 9 };
+  #view: { readonly fov: number; readonly aspect: number } = OVERVIEW;
   #flight: { from: Pose; to: Pose; seconds: number } | undefined;
   #look: { id: number; x: number; y: number } | undefined;
   /** Pointers that are down on the canvas while flying. */
@@ -73,9 +75,10 @@ export class CameraRig {
   /** A view of the whole scene. */
   overview(): void {
     this.#flight = undefined;
+    this.#view = OVERVIEW;
     const size = this.bounds.getSize(new Vector3());
     const target = this.bounds.getCenter(new Vector3());
-    const distance = (0.6 * size.length()) / Math.tan(MathUtils.degToRad(25));
+    const distance = (0.6 * size.length()) / Math.tan(MathUtils.degToRad(OVERVIEW.fov / 2));
     this.camera.position.copy(target).addScaledVector(new Vector3(0.35, 0.25, 1).normalize(), distance);
     this.camera.lookAt(target);
     this.#orbit.target.copy(target);
