@@ -88,7 +88,7 @@ impl Edits {
         if self.pending.len() >= PENDING {
             return Err(CacheError::TooManyPending(PENDING));
         }
-        let edit = ClientEdit { seq: self.last_seq + 1, edit };
+        let edit = ClientEdit { seq: self.last_seq + 1, edit, temporary: false };
         let bytes = edit.encode();
         self.last_seq = edit.seq;
         self.pending.push_back(edit);

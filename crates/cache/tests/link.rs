@@ -556,7 +556,7 @@ fn edits_are_seen_by_everyone_and_refusals_only_by_their_sender() {
     tick(&mut server, &mut caches);
     for node in [3, 999] {
         let bytes = caches[0].edit(Edit::RemoveNode { node: NodeId(node) }).unwrap();
-        let ClientEdit { seq, edit } = ClientEdit::decode(&bytes).unwrap();
+        let ClientEdit { seq, edit, .. } = ClientEdit::decode(&bytes).unwrap();
         if node == 3 {
             server.scene.edits.push(edit.clone());
             server.accepted.push(AcceptedEdit { source: Some(("me".into(), seq)), edit });

@@ -131,7 +131,7 @@ impl Follower {
         let broadcast = self.client.publish(&path).expect("a broadcast");
         let track = broadcast.track("edits", 0).expect("a track");
         broadcast.announce().expect("announced");
-        Editor { _broadcast: broadcast, track, seq: 0 }
+        Editor { _broadcast: broadcast, track, seq: 0, temporary: false }
     }
 }
 
@@ -140,12 +140,13 @@ struct Editor {
     _broadcast: Broadcast,
     track: TrackWriter,
     seq: u64,
+    temporary: bool,
 }
 
 impl Editor {
     fn send(&mut self, edit: Edit) -> u64 {
         self.seq += 1;
-        let frame = ClientEdit { seq: self.seq, edit }.encode();
+        let frame = ClientEdit { seq: self.seq, edit, temporary: self.temporary }.encode();
         self.track.write(frame.into(), false).expect("written");
         self.seq
     }
@@ -244,6 +245,7 @@ fn another_gltf_is_served_once_it_is_in_the_scene() {
         for (name, accepted) in [("../outside.glb", false), ("model.glb", true)] {
             let seq = editor.send(Edit::AddInstance {
                 node: None,
+                name: None,
                 source: InstanceSource::File(name.into()),
                 parent: None,
                 transform: Transform::default(),
@@ -409,7 +411,7 @@ fn a_token_is_needed_where_one_is_asked_for() {
         let broadcast = client.publish("cornell/edits/bearer").expect("a broadcast");
         let mut track = broadcast.track("edits", 0).expect("a track");
         broadcast.announce().expect("announced");
-        let frame = ClientEdit { seq: 1, edit: dim(lamp(), 2.0) }.encode();
+        let frame = ClientEdit { seq: 1, edit: dim(lamp(), 2.0), temporary: false }.encode();
         track.write(frame.into(), true).expect("written");
         let first = stranger
             .until(|state| Some(state.edits.first()?.source.clone()))
@@ -470,6 +472,7 @@ fn files_that_edits_name_hold_nobody_up() {
             let file = format!("{}broken.glb", "./".repeat(number));
             slow.send(Edit::AddInstance {
                 node: None,
+                name: None,
                 source: lumencast_scene::InstanceSource::File(file),
                 parent: None,
                 transform: lumencast_scene::Transform::default(),
@@ -483,5 +486,39 @@ fn files_that_edits_name_hold_nobody_up() {
             accepted += state.edits.len();
             assert!(state.refused.iter().all(|r| r.client == "slow" && r.reason.contains("glTF")));
         }
+    });
+}
+
+/// A name and a lamp of a client that has gone, which go in their time.
+#[test]
+fn what_a_client_adds_for_its_time_goes_with_it() {
+    let server = Serving::start("cornell", &SMALL);
+    limited(async {
+        let mut watcher = Follower::connect(&server).await;
+        let guest = Follower::connect(&server).await;
+        let lamp = |name: &str| Edit::AddLight {
+            node: None,
+            name: lumencast_scene::NodeName::new(name),
+            light: Scene::builtin("cornell").expect("built in").lights()[0].light,
+            parent: None,
+            transform: lumencast_scene::Transform::default(),
+        };
+        let mut edits = guest.editor("guest");
+        edits.send(lamp("it stays"));
+        edits.temporary = true;
+        edits.send(lamp("it goes"));
+        let named = |state: &StateFrame, wanted: &str| {
+            state.edits.iter().find_map(|accepted| match &accepted.edit {
+                Edit::AddLight { node, name: Some(name), .. } if name.as_str() == wanted => *node,
+                _ => None,
+            })
+        };
+        let added = watcher.until(|state| named(state, "it goes")).await;
+        drop((edits, guest));
+        let removed = watcher.until(|state| {
+            let edit = state.edits.first()?;
+            Some((edit.source.clone(), edit.edit.clone()))
+        });
+        assert_eq!(removed.await, (None, Edit::RemoveNode { node: added }));
     });
 }

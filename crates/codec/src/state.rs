@@ -222,6 +222,13 @@ pub struct ClientEdit {
     pub seq: u64,
     /// The edit.
     pub edit: Edit,
+    /// Whether the node that it adds goes once all clients have gone that have edited it.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub temporary: bool,
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 impl ClientEdit {
@@ -330,7 +337,7 @@ mod tests {
 
     #[test]
     fn client_edits_round_trip_and_tell_their_number_when_refused() {
-        let edit = ClientEdit { seq: 17, edit: remove(3) };
+        let edit = ClientEdit { seq: 17, edit: remove(3), temporary: true };
         assert_eq!(ClientEdit::decode(&edit.encode()), Ok(edit));
         let unknown = br#"{ "seq": 4, "edit": { "edit": "turn_to_gold" } }"#;
         assert_eq!(
@@ -342,7 +349,7 @@ mod tests {
             Err((None, "json"))
         );
         // Numbers that web clients cannot read, and frames that are too long, are no edits.
-        let last = ClientEdit { seq: limits::LARGEST_NUMBER, edit: remove(3) };
+        let last = ClientEdit { seq: limits::LARGEST_NUMBER, edit: remove(3), temporary: false };
         assert_eq!(ClientEdit::decode(&last.encode()), Ok(last.clone()));
         let beyond = ClientEdit { seq: limits::LARGEST_NUMBER + 1, ..last };
         let long = [beyond.encode(), vec![b' '; limits::EDIT_BYTES]].concat();

@@ -26,6 +26,9 @@ pub enum Edit {
         /// Filled in by the server: the first node added (a file's nodes take consecutive numbers).
         #[serde(default, skip_serializing_if = "Option::is_none")]
         node: Option<NodeId>,
+        /// Its name, by which programs find it again.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<NodeName>,
         /// What to show.
         source: InstanceSource,
         /// Under which node; the scene's root when absent.
@@ -45,6 +48,9 @@ pub enum Edit {
         /// Filled in by the server.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         node: Option<NodeId>,
+        /// Its name, by which programs find it again.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<NodeName>,
         /// The light.
         light: Light,
         /// Under which node; the scene's root when absent.
@@ -88,6 +94,39 @@ pub enum Edit {
         /// The new one.
         environment: Environment,
     },
+}
+
+/// The name of a node that an edit adds: 1 to 64 bytes of text without control characters.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct NodeName(String);
+
+impl NodeName {
+    /// A name, if the text can be one.
+    pub fn new(text: impl Into<String>) -> Option<Self> {
+        let text = text.into();
+        let is_sound = (1..=64).contains(&text.len()) && !text.chars().any(char::is_control);
+        is_sound.then_some(Self(text))
+    }
+
+    /// As text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl TryFrom<String> for NodeName {
+    type Error = &'static str;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        Self::new(text).ok_or("a name has 1 to 64 bytes and no control characters")
+    }
+}
+
+impl From<NodeName> for String {
+    fn from(name: NodeName) -> Self {
+        name.0
+    }
 }
 
 /// Parts of a local transform: parent_from_node = translation · rotation · scale.

@@ -53,7 +53,7 @@ pub use aabb::Aabb;
 pub use asset::{Camera, FileContents, Projection, SceneFile};
 pub use builtin::NAMES as BUILTINS;
 pub use deform::{Deformation, Pose};
-pub use edit::{Edit, InstanceSource, LightSpec, MaterialChange, Playback, Transform};
+pub use edit::{Edit, InstanceSource, LightSpec, MaterialChange, NodeName, Playback, Transform};
 pub use environment::{Environment, HdrImage};
 pub use error::{Fault, SceneError};
 pub use gltf::source::file_name;

@@ -50,6 +50,9 @@ pub(crate) async fn collect(
         while let Some(claim) = collector.names.next(collector.now()) {
             collector.read(claim);
         }
+        for name in collector.names.gone(collector.now()) {
+            collector.inbox.lock().unwrap_or_else(PoisonError::into_inner).leave(name);
+        }
     }
 }
 

@@ -58,6 +58,8 @@ pub struct Received {
     pub seq: u64,
     /// The edit.
     pub edit: Edit,
+    /// Whether what it adds goes with those who edit it.
+    pub temporary: bool,
 }
 
 /// What a tick takes from the inbox.
@@ -69,6 +71,8 @@ pub struct Mail {
     pub refused: Vec<RefusedEdit>,
     /// The last number dealt with once these edits are, for each client heard in the last minute.
     pub acks: BTreeMap<String, u64>,
+    /// Clients that have gone.
+    pub gone: Vec<String>,
 }
 
 /// What became of a frame from a client.
@@ -93,6 +97,7 @@ pub struct Inbox {
     /// With the bytes that each has as JSON.
     pending: Vec<(Received, usize)>,
     refused: VecDeque<RefusedEdit>,
+    gone: Vec<String>,
 }
 
 #[derive(Debug)]
@@ -159,11 +164,11 @@ impl Inbox {
         };
         mailbox.allowance = (mailbox.allowance - 1.0).max(0.0);
         match edit {
-            Ok(edit) => {
+            Ok(ClientEdit { edit, temporary, .. }) => {
                 mailbox.pending += 1;
                 // As it will be passed on: numbers may be written otherwise than they came.
                 let length = serde_json::to_vec(&edit).map_or(bytes.len(), |json| json.len());
-                let received = Received { client: client.to_owned(), seq, edit };
+                let received = Received { client: client.to_owned(), seq, edit, temporary };
                 self.pending.push((received, length));
                 Verdict::Taken
             }
@@ -172,6 +177,11 @@ impl Inbox {
                 Verdict::Refused
             }
         }
+    }
+
+    /// A client has gone for good, as far as one can know: what it has added for its time goes, too.
+    pub fn leave(&mut self, client: String) {
+        self.gone.push(client);
     }
 
     /// Whether one more client can be remembered: the one that has been silent for longest is
@@ -222,7 +232,12 @@ impl Inbox {
         self.clients.retain(|_, m| m.pending > 0 || now - m.heard < FORGET_AFTER);
         let reported = self.refused.len().min(MAX_REFUSED_A_TICK);
         let refused = self.refused.drain(..reported).collect();
-        Mail { edits, refused, acks: self.acks() }
+        // Who has gone may have left edits, which come first.
+        let (gone, remaining) = std::mem::take(&mut self.gone)
+            .into_iter()
+            .partition(|name| self.clients.get(name).is_none_or(|m| m.pending == 0));
+        self.gone = remaining;
+        Mail { edits, refused, acks: self.acks(), gone }
     }
 
     /// The last number that is not waiting, for each client.
@@ -249,9 +264,9 @@ pub(crate) fn refusal(client: String, seq: u64, reason: &str) -> RefusedEdit {
 
 /// The number of a frame and its edit, or why the edit cannot be read; `None` where there is not
 /// even a number.
-fn parse(bytes: &[u8]) -> Option<(u64, Result<Edit, String>)> {
+fn parse(bytes: &[u8]) -> Option<(u64, Result<ClientEdit, String>)> {
     match ClientEdit::decode(bytes) {
-        Ok(ClientEdit { seq, edit }) => Some((seq, Ok(edit))),
+        Ok(edit) => Some((edit.seq, Ok(edit))),
         Err((seq, error)) => Some((seq?, Err(format!("not an edit: {error}")))),
     }
 }

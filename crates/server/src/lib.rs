@@ -26,6 +26,7 @@ mod publish;
 mod report;
 mod server;
 mod surfaces;
+mod temporary;
 mod tick;
 mod walls;
 

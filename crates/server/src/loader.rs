@@ -81,7 +81,13 @@ mod tests {
 
     fn add(file: &str) -> Edit {
         let (node, parent, transform) = (None, None, Transform::default());
-        Edit::AddInstance { node, source: InstanceSource::File(file.into()), parent, transform }
+        Edit::AddInstance {
+            node,
+            name: None,
+            source: InstanceSource::File(file.into()),
+            parent,
+            transform,
+        }
     }
 
     /// A tick of a scene in a folder of its own, with another model and a broken one beside it.

@@ -11,6 +11,8 @@ use std::collections::{BTreeMap, VecDeque};
 pub(crate) const MAX_CLIENTS: usize = 1024;
 /// Seconds for which a name waits for the session that shows its key.
 const KEPT_FOR: f64 = 60.0;
+/// Seconds after which a client counts as gone.
+const GONE_AFTER: f64 = 10.0;
 /// Most characters of a name or a key.
 const LONGEST: usize = 64;
 
@@ -58,6 +60,7 @@ pub(crate) struct Claim<B> {
 pub(crate) struct Names<B> {
     holders: BTreeMap<String, Holder>,
     waiting: VecDeque<Claim<B>>,
+    gone: Vec<String>,
 }
 
 #[derive(Debug)]
@@ -66,11 +69,13 @@ struct Holder {
     key: String,
     /// When its session went.
     left: Option<f64>,
+    /// Whether it has been told that it is gone.
+    told: bool,
 }
 
 impl<B> Default for Names<B> {
     fn default() -> Self {
-        Self { holders: BTreeMap::new(), waiting: VecDeque::new() }
+        Self { holders: BTreeMap::new(), waiting: VecDeque::new(), gone: Vec::new() }
     }
 }
 
@@ -80,7 +85,8 @@ impl<B> Names<B> {
     pub(crate) fn claim(&mut self, claim: Claim<B>, now: f64) -> Option<Claim<B>> {
         if self.is_free(&claim, now) {
             let ClientName { name, key } = claim.client.clone();
-            self.holders.insert(name, Holder { session: claim.session, key, left: None });
+            let holder = Holder { session: claim.session, key, left: None, told: false };
+            self.holders.insert(name, holder);
             return Some(claim);
         }
         self.waiting.push_back(claim);
@@ -104,8 +110,21 @@ impl<B> Names<B> {
             holder.left = Some(now);
             if holder.key.is_empty() {
                 self.holders.remove(name);
+                self.gone.push(name.to_owned());
             }
         }
+    }
+
+    /// The clients that have been away for ten seconds, or that cannot come back, each once.
+    pub(crate) fn gone(&mut self, now: f64) -> Vec<String> {
+        let mut gone = std::mem::take(&mut self.gone);
+        for (name, holder) in &mut self.holders {
+            let is_gone = holder.left.is_some_and(|left| now - left >= GONE_AFTER);
+            if is_gone && !std::mem::replace(&mut holder.told, true) {
+                gone.push(name.clone());
+            }
+        }
+        gone
     }
 
     /// The session waits for the name no longer.
@@ -169,9 +188,11 @@ mod tests {
         names.ended("alice", 2, 1000.0);
         assert!(names.next(1000.0).is_none(), "that was another session");
         names.withdraw(&client("alice"), 2);
+        assert_eq!(names.gone(1000.0), [""; 0]);
         names.ended("alice", 1, 1000.0);
         let next = names.next(1000.0).expect("free at once, since it had no key");
         assert_eq!(next.session, 3);
+        assert_eq!((names.gone(1000.0), names.gone(1000.0)), (vec!["alice".to_owned()], vec![]));
     }
 
     #[test]
@@ -188,6 +209,8 @@ mod tests {
         assert!(names.next(130.0).is_none(), "kept for it");
         assert!(names.claim(claim(client("alice.key"), 5), 140.0).is_some());
         names.ended("alice", 5, 150.0);
+        let gone = [100.0, 159.0, 160.0, 161.0].map(|now| names.gone(now).len());
+        assert_eq!(gone, [0, 0, 1, 0]);
         assert_eq!(names.next(211.0).expect("given up").session, 2);
     }
 

@@ -22,6 +22,7 @@ use crate::pace::{Budget, SampleRange};
 use crate::placement;
 use crate::publish::Outlet;
 use crate::report::{Report, Stage, Stopwatch};
+use crate::temporary::Temporary;
 
 /// How a server computes light.
 #[derive(Clone, Debug)]
@@ -135,6 +136,7 @@ pub struct Tick {
     /// Of each field, how many of its jobs have failed.
     failures: Vec<u64>,
     last_now: Option<f64>,
+    temporary: Temporary,
     last: Report,
 }
 
@@ -178,6 +180,7 @@ impl Tick {
             shown,
             failures,
             last_now: None,
+            temporary: Temporary::default(),
             last,
         })
     }
@@ -275,8 +278,15 @@ impl Tick {
 
     /// Applies the script's edits that are due and then the clients', each whole or not at all.
     fn apply_edits(&mut self, elapsed: f64, mail: Mail) -> Edits {
-        let Mail { edits, refused, acks } = mail;
+        let Mail { edits, refused, acks, gone } = mail;
         let mut outcome = Edits { accepted: Vec::new(), refused, acks };
+        let left: Vec<_> = gone.iter().flat_map(|name| self.temporary.left_by(name)).collect();
+        for node in left {
+            // It may have gone already, with the node that it hung on.
+            if let Ok(edit) = self.apply(&Edit::RemoveNode { node }) {
+                outcome.accepted.push(AcceptedEdit { source: None, edit });
+            }
+        }
         let from = self.scene.time();
         let scripted: Vec<Edit> = match &self.options.script {
             Some(script) => script.due(from, from + elapsed).cloned().collect(),
@@ -289,9 +299,10 @@ impl Tick {
             }
         }
         for received in edits {
-            let Received { client, seq, edit } = received;
+            let Received { client, seq, edit, temporary } = received;
             match self.apply(&edit) {
                 Ok(edit) => {
+                    self.temporary.edited(&client, &edit, temporary);
                     outcome.accepted.push(AcceptedEdit { source: Some((client, seq)), edit });
                 }
                 Err(reason) => outcome.refused.push(refusal(client, seq, &reason)),

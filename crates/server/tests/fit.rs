@@ -96,7 +96,7 @@ impl Stepped {
 
     fn steps(&mut self, count: u32, mut edits: Vec<Edit>) {
         for _ in 0..count {
-            let received = |edit| Received { client: "a".into(), seq: 1, edit };
+            let received = |edit| Received { client: "a".into(), seq: 1, edit, temporary: false };
             let edits = edits.drain(..).map(received).collect();
             let mail = Mail { edits, ..Mail::default() };
             // Time stands still, so that there is one truth to come to.

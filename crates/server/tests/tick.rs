@@ -107,7 +107,7 @@ fn options() -> TickOptions {
 }
 
 fn mail(seq: u64, edit: Edit) -> Mail {
-    let received = Received { client: "a".into(), seq, edit };
+    let received = Received { client: "a".into(), seq, edit, temporary: false };
     Mail { edits: vec![received], acks: BTreeMap::from([("a".into(), seq)]), ..Mail::default() }
 }
 
@@ -533,7 +533,8 @@ fn edits_of_an_inbox_reach_the_scene_in_order() {
     let lamp = stepped.node("lamp");
     let mut inbox = Inbox::new(Limits::default());
     for (seq, intensity) in [(1, 5.0), (2, 7.0), (3, -1.0)] {
-        let edit = lumencast_codec::ClientEdit { seq, edit: dim(lamp, intensity) };
+        let edit =
+            lumencast_codec::ClientEdit { seq, edit: dim(lamp, intensity), temporary: false };
         inbox.receive("a", &edit.encode(), 0.0);
     }
     let report = stepped.step(inbox.take(0.0));
@@ -552,6 +553,7 @@ fn additions_end_before_a_snapshot_grows_too_long() {
         InstanceSource::Mesh(stepped.tick.scene().nodes().find_map(|n| n.mesh).expect("one"));
     let add = Edit::AddInstance {
         node: None,
+        name: None,
         source,
         parent: None,
         transform: Transform {
@@ -561,7 +563,7 @@ fn additions_end_before_a_snapshot_grows_too_long() {
     };
     let many = |first: u64| Mail {
         edits: (first..first + 2000)
-            .map(|seq| Received { client: "a".into(), seq, edit: add.clone() })
+            .map(|seq| Received { client: "a".into(), seq, edit: add.clone(), temporary: false })
             .collect(),
         ..Mail::default()
     };

@@ -16,7 +16,7 @@ use crate::limits;
 use crate::trs::{Trs, is_in_world, is_invertible};
 use crate::{
     AlphaMode, AnimationId, Edit, Environment, InstanceSource, Light, LightKind, LightSpec,
-    Material, MaterialChange, MaterialId, MeshId, NodeId, Playback, Transform,
+    Material, MaterialChange, MaterialId, MeshId, NodeId, NodeName, Playback, Transform,
 };
 
 /// Why an edit is refused. The text is meant for the one who sent it.
@@ -95,14 +95,16 @@ impl Scene {
         let mut edit = edit.clone();
         match &mut edit {
             Edit::MoveNode { node, transform } => self.move_node(*node, transform)?,
-            Edit::AddInstance { node, source, parent, transform } => {
+            Edit::AddInstance { node, name, source, parent, transform } => {
                 let id = self.number(*node, numbers)?;
                 self.add_instance(id, source, *parent, transform)?;
+                self.name_node(id, name.as_ref());
                 *node = Some(id);
             }
-            Edit::AddLight { node, light, parent, transform } => {
+            Edit::AddLight { node, name, light, parent, transform } => {
                 let id = self.number(*node, numbers)?;
                 self.add_light(id, *light, *parent, transform)?;
+                self.name_node(id, name.as_ref());
                 *node = Some(id);
             }
             Edit::RemoveNode { node } => self.remove_node(*node)?,
@@ -128,6 +130,12 @@ impl Scene {
                 what: "an added node".into(),
                 why: "it has no number".into(),
             }),
+        }
+    }
+
+    fn name_node(&mut self, id: NodeId, name: Option<&NodeName>) {
+        if let (Some(node), Some(name)) = (self.nodes.get_mut(id), name) {
+            node.name = name.as_str().to_owned();
         }
     }
 

@@ -5,7 +5,7 @@ use super::{Model, Scene};
 use crate::trs::Trs;
 use crate::{
     AlphaMode, AnimationId, Edit, InstanceSource, Light, LightKind, LightSpec, Material,
-    MaterialChange, MaterialId, NodeId, Playback, Transform,
+    MaterialChange, MaterialId, NodeId, NodeName, Playback, Transform,
 };
 
 impl Scene {
@@ -35,12 +35,13 @@ impl Scene {
         }
         // A file whose first copy has gone still has to come first in the numbering of materials.
         for model in &self.models[1..] {
-            if let Some(node) = model.added_as.filter(|id| !self.nodes.contains(*id)) {
+            if let Some(id) = model.added_as.filter(|id| !self.nodes.contains(*id)) {
                 let source = source_of(model);
                 let (parent, transform) = (None, Transform::default());
-                let add = Edit::AddInstance { node: Some(node), source, parent, transform };
-                edits.push((node, add));
-                edits.push((node, Edit::RemoveNode { node }));
+                let (node, name) = (Some(id), None);
+                let add = Edit::AddInstance { node, name, source, parent, transform };
+                edits.push((id, add));
+                edits.push((id, Edit::RemoveNode { node: id }));
             }
         }
         edits.sort_by_key(|(id, _)| *id);
@@ -51,22 +52,24 @@ impl Scene {
     /// The edit that adds a node; `None` for nodes that come with another one.
     fn addition(&self, id: NodeId, node: &Node) -> Option<Edit> {
         let (parent, transform) = (node.parent, whole(node.parent_from_node));
+        let name = NodeName::new(node.name.as_str());
         let copy_of =
             self.models[1..].iter().find(|m| m.copies.iter().any(|first| first - 1 == id.0));
         if let Some(model) = copy_of {
             let source = source_of(model);
-            return Some(Edit::AddInstance { node: Some(id), source, parent, transform });
+            let name = name.filter(|name| name.as_str() != model.name);
+            return Some(Edit::AddInstance { node: Some(id), name, source, parent, transform });
         }
         if self.is_of_a_file(id) {
             return None;
         }
         if let Some(mesh) = node.mesh {
             let source = InstanceSource::Mesh(mesh);
-            return Some(Edit::AddInstance { node: Some(id), source, parent, transform });
+            return Some(Edit::AddInstance { node: Some(id), name, source, parent, transform });
         }
         // A light that was added; where it was removed since, the node that carried it is left.
         let light = node.light.unwrap_or(NO_LIGHT);
-        Some(Edit::AddLight { node: Some(id), light, parent, transform })
+        Some(Edit::AddLight { node: Some(id), name, light, parent, transform })
     }
 
     fn is_of_a_file(&self, id: NodeId) -> bool {

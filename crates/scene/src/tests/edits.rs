@@ -56,6 +56,7 @@ fn added_nodes_get_the_next_numbers_whatever_the_edit_says() {
     let mut scene = scene();
     let add = |node| Edit::AddInstance {
         node,
+        name: None,
         source: InstanceSource::Mesh(MeshId(0)),
         parent: Some(NodeId(3)),
         transform: at(Vec3::Y),
@@ -65,6 +66,7 @@ fn added_nodes_get_the_next_numbers_whatever_the_edit_says() {
     scene.apply(&Edit::RemoveNode { node: NodeId(6) }).expect("removed");
     let lamp = Edit::AddLight {
         node: None,
+        name: None,
         light: light(LightKind::Point { radius: 0.0 }, 3.0),
         parent: Some(NodeId(5)),
         transform: at(Vec3::Y),
@@ -206,12 +208,14 @@ fn senseless() -> Vec<(Edit, &'static str)> {
     let turn = |q: [f32; 4]| Transform { rotation: Some(Quat::from_array(q)), ..none };
     let set = |node: u32, light| Edit::SetLight { node: NodeId(node), light };
     let spec = LightSpec::default();
-    let add = |light| Edit::AddLight { node: None, light, parent: None, transform: none };
+    let add =
+        |light| Edit::AddLight { node: None, name: None, light, parent: None, transform: none };
     let paint = |change| Edit::SetMaterial { material: MaterialId(0), change };
     let paint_opaque = |change| Edit::SetMaterial { material: MaterialId(1), change };
     let plain = MaterialChange::default();
     let instance = |source, parent: Option<u32>| Edit::AddInstance {
         node: None,
+        name: None,
         source,
         parent: parent.map(NodeId),
         transform: none,
@@ -328,6 +332,7 @@ fn a_move_that_puts_a_child_out_of_the_world_is_refused() {
 fn a_replica_takes_numbers_as_they_are_and_none_twice() {
     let mut scene = scene();
     let add = |node: Option<u32>| Edit::AddInstance {
+        name: None,
         node: node.map(NodeId),
         source: InstanceSource::Mesh(MeshId(0)),
         parent: None,

@@ -170,6 +170,7 @@ fn instances_are_counted() {
     let mut scene = Scene::load(&path).expect("within the limits");
     let add = Edit::AddInstance {
         node: None,
+        name: None,
         source: crate::InstanceSource::File("more.glb".into()),
         parent: None,
         transform: Transform::default(),
@@ -210,6 +211,7 @@ fn hidden_nodes_hide_what_is_below_them() {
     // What edits hang below it is hidden as well.
     let add = Edit::AddInstance {
         node: None,
+        name: None,
         source: crate::InstanceSource::Mesh(crate::MeshId(0)),
         parent: Some(NodeId(2)),
         transform: Transform::default(),

@@ -140,6 +140,7 @@ fn added_files_have_names_of_their_own_folder() {
     let mut scene = Scene::load(&path).expect("the scene");
     let add = |file: &str| Edit::AddInstance {
         node: None,
+        name: None,
         source: InstanceSource::File(file.into()),
         parent: None,
         transform: Transform::default(),

@@ -7,7 +7,7 @@ use super::{Folder, assert_same, load, triangle};
 use crate::builtin::writer::Writer;
 use crate::{
     AnimationId, Edit, Environment, InstanceSource, Light, LightKind, LightSpec, MaterialChange,
-    MaterialId, MeshId, NodeId, Playback, Scene, Transform,
+    MaterialId, MeshId, NodeId, NodeName, Playback, Scene, Transform,
 };
 
 /// What a late joiner makes of the file and the edits; they go through JSON, as on the wire.
@@ -57,17 +57,18 @@ impl Random {
         let node = NodeId(self.below(60));
         let (transform, above) = (self.transform(), NodeId(self.below(60)));
         let parent = self.maybe(above);
+        let name = NodeName::new(["", "lamp", "Lämpchen", "sub/c.gltf"][self.below(4) as usize]);
         let (vector, unit) = (self.vector(), self.unit());
         match self.below(12) {
             0..3 => Edit::MoveNode { node, transform },
             3 => {
                 let file = ["a.glb", "b.glb", "sub/c.gltf"][self.below(3) as usize];
                 let source = InstanceSource::File(file.into());
-                Edit::AddInstance { node: None, source, parent, transform }
+                Edit::AddInstance { node: None, name, source, parent, transform }
             }
             4 => {
                 let source = InstanceSource::Mesh(MeshId(self.below(3)));
-                Edit::AddInstance { node: None, source, parent, transform }
+                Edit::AddInstance { node: None, name, source, parent, transform }
             }
             5 => {
                 let kind = match self.below(3) {
@@ -76,7 +77,7 @@ impl Random {
                     _ => LightKind::Directional { angle: unit },
                 };
                 let light = Light { kind, color: vector, intensity: unit, range: Some(3.0) };
-                Edit::AddLight { node: None, light, parent, transform }
+                Edit::AddLight { node: None, name, light, parent, transform }
             }
             6 => Edit::RemoveNode { node },
             7 => {
@@ -183,7 +184,7 @@ fn the_list_is_short_when_little_is_different() {
         let transform = Transform { translation, ..Transform::default() };
         scene.apply(&Edit::MoveNode { node: NodeId(0), transform }).expect("moved");
         let source = InstanceSource::Mesh(MeshId(0));
-        let add = Edit::AddInstance { node: None, source, parent: None, transform };
+        let add = Edit::AddInstance { node: None, name: None, source, parent: None, transform };
         let Edit::AddInstance { node: Some(node), .. } = scene.apply(&add).expect("added") else {
             unreachable!()
         };
@@ -203,7 +204,13 @@ fn numbers_hold_when_an_added_file_has_gone() {
     let mut add = |file: &str| {
         let source = InstanceSource::File(file.into());
         let transform = Transform::default();
-        match scene.apply(&Edit::AddInstance { node: None, source, parent: None, transform }) {
+        match scene.apply(&Edit::AddInstance {
+            node: None,
+            name: None,
+            source,
+            parent: None,
+            transform,
+        }) {
             Ok(Edit::AddInstance { node: Some(node), .. }) => node,
             other => panic!("{other:?}"),
         }

@@ -13,6 +13,7 @@ fn scene(folder: &Folder) -> Scene {
 fn add(file: &str) -> Edit {
     Edit::AddInstance {
         node: None,
+        name: None,
         source: InstanceSource::File(file.into()),
         parent: None,
         transform: Transform::default(),
@@ -86,9 +87,11 @@ fn senseless_edits_read_nothing() {
     let folder = Folder::new("senseless");
     let scene = scene(&folder);
     folder.write("more.glb", triangle().finish(Value::Null));
-    let Edit::AddInstance { node, source, parent, .. } = add("more.glb") else { unreachable!() };
+    let Edit::AddInstance { node, name: None, source, parent, .. } = add("more.glb") else {
+        unreachable!()
+    };
     let transform = Transform { scale: Some(Vec3::ZERO), ..Transform::default() };
-    let flat = Edit::AddInstance { node, source, parent, transform };
+    let flat = Edit::AddInstance { node, name: None, source, parent, transform };
     for edit in [flat, add("../more.glb"), add("none.glb"), picture("../sky.hdr")] {
         assert!(scene.file_to_read(&edit).is_none(), "{edit:?}");
     }
