@@ -5,6 +5,6 @@ export default mergeConfig(
   page,
   defineConfig({
     // Tests judge what they see, however late a busy machine shows it.
-    test: { testTimeout: 180_000, hookTimeout: 180_000 },
+    test: { testTimeout: 180_000, hookTimeout: 180_000, expect: { poll: { timeout: 60_000 } } },
   }),
 );

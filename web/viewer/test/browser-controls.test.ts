@@ -22,7 +22,9 @@ import {
   looks,
   onScreen,
   openPage,
+  PATIENCE,
   type Pixel,
+  settle,
   shoot,
 } from './browser.js';
 import { freePort, lumencastProgram, Server } from './server.js';
@@ -42,12 +44,12 @@ beforeAll(async () => {
   folder = mkdtempSync(join(tmpdir(), 'lumencast-controls-'));
   await buildPage(folder);
   browser = await launchBrowser();
-}, 180_000);
+});
 
 afterAll(async () => {
   await browser?.close();
   rmSync(folder, { recursive: true, force: true });
-}, 30_000);
+});
 
 describe('a person at the page', () => {
   let server: Server;
@@ -66,8 +68,8 @@ describe('a person at the page', () => {
       await light.edit({ edit: 'move_node', node: node('sphere'), translation: [0.5, 0.9, 0.5] });
       await light.edit({ edit: 'move_node', node: node('tall_box'), translation: [-0.4, 0.4, -0.4] });
     });
-    await page.waitForTimeout(1500);
-  }, 120_000);
+    await settle(page, 40);
+  });
 
   afterAll(() => server?.kill());
 
@@ -135,7 +137,7 @@ describe('a person at the page', () => {
     // Next to no pixel has less of both than of one; the tone mapping trades colour for brightness a little.
     const less = both.filter((pixel, i) => sum(pixel) < Math.max(sum(direct[i]), sum(indirect[i])) - 40);
     expect(less.length).toBeLessThan(both.length / 20);
-  }, 60_000);
+  });
 
   it('sets the exposure, or leaves it to the page', async () => {
     const stops = () => page.evaluate(() => Math.log2(window.lumencast!.viewer.exposure));
@@ -147,9 +149,9 @@ describe('a person at the page', () => {
     await expose(home - 3);
     expect(brightness(await picture())).toBeLessThan(0.5 * before);
     await click('Exposure by the picture');
-    await expect.poll(stops, { timeout: 10_000 }).toBeGreaterThan(home - 0.5);
+    await expect.poll(stops).toBeGreaterThan(home - 0.5);
     expect(Math.abs((await stops()) - home)).toBeLessThan(0.5);
-  }, 60_000);
+  });
 
   it('chooses the tone mapping', async () => {
     const before = await picture();
@@ -157,7 +159,7 @@ describe('a person at the page', () => {
     expect(difference(before, await picture())).toBeGreaterThan(0.05);
     await choose('Tone mapping', 'AgX');
     expect(difference(before, await picture())).toBeLessThan(0.05);
-  }, 60_000);
+  });
 
   it('sees the probes, each in the colour of its light', async () => {
     const before = await picture();
@@ -196,7 +198,7 @@ describe('a person at the page', () => {
     await shoot(page, 'probes.png');
     await click('Show the light probes');
     expect(difference(before, await picture())).toBeLessThan(0.1);
-  }, 60_000);
+  });
 
   it('orbits, flies, and goes back to the file’s view', async () => {
     const distance = (a: number[], b: number[]) => Math.hypot(...a.map((value, i) => value - b[i]));
@@ -228,7 +230,7 @@ describe('a person at the page', () => {
     await choose('View', { index: 1 });
     for (let i = 0; i < 5; i++) await draw(page, 0.3);
     expect(distance((await camera()).position, home.position)).toBeLessThan(1e-3);
-  }, 60_000);
+  });
 
   it('turns a box by its gizmo', async () => {
     await shoot(page, 'cornell-controls.png');
@@ -251,20 +253,15 @@ describe('a person at the page', () => {
     // The hand has the box, not the camera.
     expect(await camera()).toEqual(view);
     await expect
-      .poll(
-        async () => {
-          const turned = (await accepted('move_node')).filter(
-            ({ node, rotation }) => node === box && rotation,
-          );
-          return Math.abs(turned.at(-1)?.rotation?.[1] ?? 0);
-        },
-        { timeout: 5000 },
-      )
+      .poll(async () => {
+        const turned = (await accepted('move_node')).filter(({ node, rotation }) => node === box && rotation);
+        return Math.abs(turned.at(-1)?.rotation?.[1] ?? 0);
+      })
       .toBeGreaterThan(0.1);
     await page.click('.inspector [title^="Close"]');
     expect(await page.isVisible('.inspector')).toBe(false);
     expect(difference(before, await picture())).toBeGreaterThan(0.02);
-  }, 60_000);
+  });
 
   it('changes a lamp in the inspector, and its light follows', async () => {
     const light = () =>
@@ -296,12 +293,12 @@ describe('a person at the page', () => {
     expect(intensity / home.intensity).toBeLessThan(5.3);
     expect(brightness(await picture())).toBeGreaterThan(1.1 * brightness(before));
     await expect.poll(async () => (await accepted('set_light')).at(-1)?.intensity).toBeCloseTo(intensity, 4);
-    await expect.poll(async () => (await light()).red, { timeout: 10_000 }).toBeGreaterThan(1.5 * lit.red);
+    await expect.poll(async () => (await light()).red).toBeGreaterThan(1.5 * lit.red);
 
     await page.fill('.inspector input[type="color"]', '#2040ff');
     await draw(page);
     await expect
-      .poll(async () => ((l) => l.blue / l.red)(await light()), { timeout: 10_000 })
+      .poll(async () => ((l) => l.blue / l.red)(await light()))
       .toBeGreaterThan((2 * lit.blue) / lit.red);
     const blue = await picture();
     expect(total(blue, 2) / total(blue, 0)).toBeGreaterThan((1.5 * total(before, 2)) / total(before, 0));
@@ -311,7 +308,7 @@ describe('a person at the page', () => {
     expect(brightness(await picture())).toBeLessThan(brightness(blue));
     await page.click('.inspector [title^="Close"]');
     await click('Both light');
-  }, 90_000);
+  });
 
   it('finds a faint lamp as faint as it is, and does not change it by a touch', async () => {
     const lamp = () => page.evaluate(() => window.lumencast!.viewer.lights[0].intensity);
@@ -340,7 +337,7 @@ describe('a person at the page', () => {
     expect(Math.log10(await lamp())).toBeCloseTo(5, 0);
     await set(home);
     await page.click('.inspector [title^="Close"]');
-  }, 60_000);
+  });
 
   it('drags a lamp by its glyph', async () => {
     const where = () =>
@@ -366,13 +363,13 @@ describe('a person at the page', () => {
     expect(Math.hypot(nowX - (x + 60), nowY - y)).toBeLessThan(6);
     const sent = async () =>
       (await accepted('move_node')).filter(({ node }) => node === home.node).at(-1)?.translation;
-    await expect.poll(async () => (await sent())?.[0], { timeout: 5000 }).toBeCloseTo(moved.at[0], 2);
+    await expect.poll(async () => (await sent())?.[0]).toBeCloseTo(moved.at[0], 2);
     await page.click('.inspector [title^="Close"]');
     await page.evaluate(
       ({ node, at }) => window.lumencast!.light.edit({ edit: 'move_node', node, translation: at }),
       home,
     );
-  }, 60_000);
+  });
 
   it('reads the figures and the keys, and pauses the animation for everyone', async () => {
     const figures = page.locator('.stats');
@@ -381,7 +378,7 @@ describe('a person at the page', () => {
     expect(await figures.isVisible()).toBe(false);
     await click('Figures');
     await expect
-      .poll(async () => (await draw(page), figures.innerText()), { timeout: 10_000 })
+      .poll(async () => (await draw(page), figures.innerText()))
       .toMatch(/ticks\s+\d+\.\d Hz[^]*tick\s+\d+\.\d ms[^]*samples\s+\d+[^]*age\s+\d+ ms[^]*network\s+\d/);
     await click('Keys and');
     expect(await page.isVisible('.guide .keys')).toBe(true);
@@ -404,7 +401,7 @@ describe('a person at the page', () => {
     await expect.poll(height).not.toEqual(before);
     await click('Pause or play');
     await expect.poll(async () => (await accepted('set_animation')).at(-1)?.playing).toBe(false);
-  }, 60_000);
+  });
 });
 
 describe('a page drawn by WebGPU', () => {
@@ -414,7 +411,7 @@ describe('a page drawn by WebGPU', () => {
     try {
       const query = { ...SCALE, renderer: 'webgpu' };
       const page = await openPage(browser, server.address, VIEWPORT, query, errors);
-      await page.waitForTimeout(1500);
+      await settle(page, 40);
       expect(await page.evaluate(() => 'isWebGPURenderer' in window.lumencast!.renderer)).toBe(true);
       const [direct, both] = await looks(page, ['direct', 'both']);
       expect(both.filter((pixel) => sum(pixel) > 60).length).toBeGreaterThan(both.length / 4);
@@ -445,7 +442,7 @@ describe('a page drawn by WebGPU', () => {
     } finally {
       await server.kill();
     }
-  }, 120_000);
+  });
 });
 
 describe('a scene of two volumes', () => {
@@ -454,7 +451,7 @@ describe('a scene of two volumes', () => {
     const errors: string[] = [];
     try {
       const page = await openPage(browser, server.address, VIEWPORT, SCALE, errors);
-      await page.waitForTimeout(4000);
+      await settle(page, 100);
       const fields = await page.evaluate(() => {
         const { session, light } = window.lumencast!;
         const mean = ({ coefficients }: { coefficients: Float32Array }) =>
@@ -478,7 +475,7 @@ describe('a scene of two volumes', () => {
     } finally {
       await server.kill();
     }
-  }, 120_000);
+  });
 });
 
 describe('the tomb', () => {
@@ -486,7 +483,7 @@ describe('the tomb', () => {
     const server = await start('tomb');
     try {
       const page = await openPage(browser, server.address, VIEWPORT, SCALE);
-      await page.waitForTimeout(1000);
+      await settle(page, 25);
       await page.evaluate(() => window.lumencast!.viewer.meter());
       const picture = await look(page, 'both');
       await shoot(page, 'tomb.png');
@@ -547,6 +544,7 @@ describe('a page without a server', () => {
         ['cornell.light', 'rooms/other.glb', 'rooms/other.glb'],
       ]) {
         const lost = await browser.newPage();
+        lost.setDefaultTimeout(PATIENCE);
         await lost.route(`**/${missing}`, (route) => route.fulfill({ status: 404 }));
         await lost.goto(`${address}/?${new URLSearchParams({ light, gltf })}`);
         const said = await lost.textContent('.curtain.failed');
@@ -558,7 +556,7 @@ describe('a page without a server', () => {
     } finally {
       await files.close();
     }
-  }, 120_000);
+  });
 });
 
 declare global {

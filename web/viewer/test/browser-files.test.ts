@@ -25,12 +25,12 @@ beforeAll(async () => {
   page = join(folder, 'page');
   await buildPage(page);
   browser = await launchBrowser();
-}, 180_000);
+});
 
 afterAll(async () => {
   await browser?.close();
   rmSync(folder, { recursive: true, force: true });
-}, 30_000);
+});
 
 /** A floor, white unless said otherwise, whose buffer stands at a URI, with other parts. */
 function writeScene(uri: string, parts: object = {}): string {
@@ -114,7 +114,7 @@ it('offers none where there is light', async () => {
     await draw(page);
     expect(await page.isVisible('.notice.offer')).toBe(false);
   });
-}, 120_000);
+});
 
 /** A PNG of a row of texels: red, green, blue, alpha. */
 function png(...texels: readonly (readonly number[])[]): string {
@@ -165,7 +165,7 @@ it('shows the roughness of specular-glossiness', async () => {
     expect(found.specular.slice(4)).toEqual([10, 20, 30, 255]);
     expect([found.offset, found.roughness]).toEqual([0.5, 1]);
   });
-}, 120_000);
+});
 
 /** Three small floors in a row, and one in front of the camera that is hidden. */
 it('shows instances and no hidden nodes', async () => {
@@ -215,4 +215,4 @@ it('shows instances and no hidden nodes', async () => {
     expect(found.height).toBeLessThan(20);
     await shoot(page, 'instances.png');
   });
-}, 120_000);
+});

@@ -5,7 +5,7 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { buildPage, cutOff, draw, look, onScreen, openPage, shoot } from './browser.js';
+import { buildPage, cutOff, draw, look, onScreen, openPage, PATIENCE, shoot } from './browser.js';
 import { freePort, lumencastProgram, Server } from './server.js';
 
 const SIZES = [
@@ -74,6 +74,7 @@ it('finds all that it is made of beside itself, wherever a proxy has it', async 
   const { origin } = new URL(server.address);
   const base = `${origin}/light/`;
   const proxied = await browser.newPage();
+  proxied.setDefaultTimeout(PATIENCE);
   try {
     const root: string[] = [];
     const asked: string[] = [];
@@ -88,7 +89,7 @@ it('finds all that it is made of beside itself, wherever a proxy has it', async 
       route.continue({ url: route.request().url().replace(base, `${origin}/`) }),
     );
     await proxied.goto(`${base}?scale=0.25&transport=websocket`);
-    await proxied.waitForFunction(() => window.lumencast, undefined, { timeout: 120_000 });
+    await proxied.waitForFunction(() => window.lumencast, undefined);
     expect(asked).toContain('lumencast.json');
     expect(asked).toContain('scene/cornell.glb');
     expect(asked.some((path) => path.startsWith('assets/'))).toBe(true);

@@ -53,7 +53,7 @@ describe.skipIf(!link)('a link that is too slow', () => {
     const [scene, ...options] = SCENE;
     const where = { host: SLOW_ADDRESS, inside: link!.inside };
     server = await Server.start(program, scene, PORT, [...options, '--page', join(folder, 'page')], where);
-  }, 120_000);
+  });
 
   // A page that stays open takes its share of the link.
   afterEach(() => page?.close());
@@ -63,10 +63,10 @@ describe.skipIf(!link)('a link that is too slow', () => {
     await server?.kill();
     link?.close();
     rmSync(folder, { recursive: true, force: true });
-  }, 30_000);
+  });
 
   const allLayers = (page: Page) =>
-    page.waitForFunction(() => window.lumencast!.session.stats.layers === 3, undefined, { timeout: 60_000 });
+    page.waitForFunction(() => window.lumencast!.session.stats.layers === 3, undefined);
 
   it.each(['webtransport', 'websocket'])(
     'over %s',

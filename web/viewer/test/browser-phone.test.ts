@@ -112,7 +112,8 @@ it('aims the flashlight by one finger, and moves the camera by two', async () =>
       return viewer.flashlight.spot?.getWorldDirection(camera.position.clone()).toArray() ?? [];
     });
   await page.tap('[title^="Take the flashlight"]');
-  await expect.poll(() => page.innerText('.notices'), { timeout: 30_000 }).toContain('Point with one finger');
+  await expect.poll(() => page.innerText('.notices')).toContain('Point with one finger');
+  await draw(page);
   await shoot(page, 'phone-flashlight.png');
   const home = await camera();
   const [x, y] = await onScreen(page, [0, 1, 0]);

@@ -6,6 +6,9 @@ import { build } from 'vite';
 /** Where pictures of the page go; none are made unless it is set. */
 export const SHOTS = process.env.LUMENCAST_SHOTS;
 
+/** Milliseconds that the page may take for anything: machines may be busy. */
+export const PATIENCE = 120_000;
+
 /** Builds the page into a folder, for `lumencast serve --page`. */
 export async function buildPage(folder: string): Promise<void> {
   await build({
@@ -28,13 +31,14 @@ export async function openPage(
   errors: string[] = [],
 ): Promise<Page> {
   const page = await browser.newPage({ viewport, hasTouch: touch, isMobile: touch });
+  page.setDefaultTimeout(PATIENCE);
   page.on('pageerror', (error) => errors.push(String(error)));
   page.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
   try {
     await page.goto(`${address}/?${new URLSearchParams({ scale: '1', ...query })}`);
-    await page.waitForFunction(() => window.lumencast, undefined, { timeout: 60_000 });
+    await page.waitForFunction(() => window.lumencast);
     await page.evaluate(() => window.lumencast!.ready);
-    await page.waitForSelector('.curtain', { state: 'detached', timeout: 20_000 });
+    await page.waitForSelector('.curtain', { state: 'detached' });
     await page.evaluate(() => {
       const { viewer } = window.lumencast!;
       viewer.autoExposure = false;
@@ -101,6 +105,19 @@ export async function shoot(page: Page, name: string): Promise<void> {
     timeout: 60_000,
     animations: 'disabled',
   });
+}
+
+/** Waits until so much more light has come, in ticks of the server: it settles however slow the machine is. */
+export async function settle(page: Page, ticks: number): Promise<void> {
+  const newest = () => page.evaluate(() => window.lumencast!.session.light().fields[0].tick ?? 0);
+  const from = await newest();
+  await page.waitForFunction(
+    (until) => (window.lumencast!.session.light().fields[0].tick ?? 0) >= until,
+    from + ticks,
+    {
+      polling: 50,
+    },
+  );
 }
 
 /** Where a point of the scene is on the page, whose canvas begins at the page's corner. */
