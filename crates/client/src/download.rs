@@ -47,11 +47,10 @@ struct Start {
 impl Start {
     async fn of(url: &str, fetch: &Fetch) -> Result<Self, ClientError> {
         let failed = |reason: String| ClientError::Download { url: url.to_owned(), reason };
-        let address = Url::parse(url).and_then(|base| base.join("/lumencast.json"));
-        let address = address.map_err(|error| failed(error.to_string()))?;
+        let address = beside(url, "lumencast.json").map_err(|error| failed(error.to_string()))?;
         let start = fetch.get(&address).await?.all(START_BYTES).await?;
         serde_json::from_slice(&start)
-            .map_err(|error| failed(format!("its /lumencast.json is no scene's: {error}")))
+            .map_err(|error| failed(format!("its lumencast.json is no scene's: {error}")))
     }
 }
 
@@ -75,8 +74,6 @@ pub async fn download(
     mut progress: impl FnMut(usize, usize),
 ) -> Result<SceneFiles, ClientError> {
     let failed = |reason: String| ClientError::Download { url: url.to_owned(), reason };
-    let base = Url::parse(url).map_err(|error| failed(error.to_string()))?;
-    let address = |path: &str| base.join(path).map_err(|error| failed(error.to_string()));
     let fetch = Fetch::new()?;
     let Start { root, files, .. } = Start::of(url, &fetch).await?;
     if files.len() > MOST_FILES {
@@ -93,7 +90,7 @@ pub async fn download(
     for (done, name) in files.iter().enumerate() {
         progress(done, files.len());
         let path = place(name)?;
-        let mut address = address("/scene/")?;
+        let mut address = beside(url, "scene/").map_err(|error| failed(error.to_string()))?;
         if let Ok(mut segments) = address.path_segments_mut() {
             segments.pop_if_empty().extend(name.split('/'));
         }
@@ -113,6 +110,15 @@ pub async fn download(
     Ok(SceneFiles { folder, root })
 }
 
+/// What a server has beside a scene: `https://host/base/scene` is the address of a scene, and a reverse
+/// proxy has the server under `base`.
+fn beside(scene: &str, path: &str) -> Result<Url, url::ParseError> {
+    let mut base = Url::parse(scene)?;
+    let trimmed = base.path().trim_end_matches('/').to_owned();
+    base.set_path(&trimmed);
+    base.join(path)
+}
+
 /// A file of this name in a folder or below; nothing where the name leads elsewhere.
 fn below(folder: &Path, name: &str) -> Option<PathBuf> {
     let is_plain = |part: Component<'_>| matches!(part, Component::Normal(_));
@@ -125,6 +131,18 @@ fn below(folder: &Path, name: &str) -> Option<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn files_lie_beside_the_scene() {
+        for (scene, file) in [
+            ("http://[::1]:4443/sponza", "http://[::1]:4443/scene/"),
+            ("http://localhost:4443", "http://localhost:4443/scene/"),
+            ("https://host/light/sponza?jwt=a", "https://host/light/scene/"),
+            ("https://host/light/sponza/", "https://host/light/scene/"),
+        ] {
+            assert_eq!(beside(scene, "scene/").map(String::from).as_deref(), Ok(file), "{scene}");
+        }
+    }
 
     #[test]
     fn names_stay_in_their_folder() {

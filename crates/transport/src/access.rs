@@ -3,9 +3,10 @@
 //! Names are slash-separated paths. The server's broadcasts have one part (`sponza`); a client's
 //! own are called `<one part>/edits/<one part>`, and nothing else, whatever its token says.
 
+use std::collections::BTreeSet;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use moq_auth::{Algorithm, Claims, Grant, Pattern, Patterns, Request, lease};
@@ -91,11 +92,13 @@ pub(crate) struct Sessions {
     open: Arc<AtomicUsize>,
     limit: usize,
     pub(crate) refusals: Refusals,
+    /// Names of the server's own broadcasts.
+    pub(crate) scenes: Arc<Mutex<BTreeSet<String>>>,
 }
 
 impl Sessions {
     pub(crate) fn new(limit: usize) -> Self {
-        Self { open: Arc::default(), limit, refusals: Refusals::default() }
+        Self { open: Arc::default(), limit, refusals: Refusals::default(), scenes: Arc::default() }
     }
 
     pub(crate) fn count(&self) -> usize {
@@ -104,6 +107,13 @@ impl Sessions {
 
     pub(crate) fn full(&self) -> bool {
         self.count() >= self.limit
+    }
+
+    /// What the names of a session are relative to that dialled this path: a broadcast of this server's,
+    /// or nothing, where the path is that of a proxy.
+    fn root_of(&self, path: &str) -> String {
+        let scenes = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
+        scenes.get(path.trim_matches('/')).cloned().unwrap_or_default()
     }
 
     /// Counts one more session until the ticket is dropped; `None` if that would be too many.
@@ -131,7 +141,8 @@ pub(crate) async fn decide(mut admissions: Admissions, access: Access, sessions:
 }
 
 fn answer(admission: Admission, access: &Access, sessions: &Sessions) {
-    let grant = match grant(access, &admission.request) {
+    let root = sessions.root_of(&admission.request.path);
+    let grant = match grant(access, &root, &admission.request) {
         Ok(grant) => grant,
         Err(reason) => {
             tracing::info!(remote = ?admission.request.remote, %reason, "session refused");
@@ -152,8 +163,8 @@ fn answer(admission: Admission, access: &Access, sessions: &Sessions) {
     });
 }
 
-/// What a session that dialled `request.path` with the token in its query may do.
-fn grant(access: &Access, request: &Request) -> Result<Grant, String> {
+/// What a session with the token in the query of its request may do, its names relative to `root`.
+fn grant(access: &Access, root: &str, request: &Request) -> Result<Grant, String> {
     let reader = Claims::default().with_subscribe([pattern(READABLE)]);
     let claims = match (access, token(request.query.as_deref())) {
         (Access::Loopback | Access::Open, _) => reader.with_publish([pattern(EDITABLE)]),
@@ -163,8 +174,9 @@ fn grant(access: &Access, request: &Request) -> Result<Grant, String> {
             limited(key.0.verify(token).map_err(|err| err.to_string())?)?
         }
     };
-    let permissions = claims.authorize(&request.path).map_err(|err| err.to_string())?;
+    let permissions = claims.authorize(root).map_err(|err| err.to_string())?;
     let mut grant = Grant::new(permissions.publish, permissions.subscribe);
+    grant.root = Some(root.to_owned());
     grant.expires = claims.expires;
     Ok(grant)
 }
@@ -197,7 +209,9 @@ mod tests {
     fn ask(access: &Access, path: &str, query: Option<&str>) -> Result<Grant, String> {
         let mut request = Request::new("test", moq_auth::Transport::Quic, path);
         request.query = query.map(str::to_owned);
-        grant(access, &request)
+        let sessions = Sessions::new(1);
+        sessions.scenes.lock().expect("unpoisoned").insert("sponza".into());
+        grant(access, &sessions.root_of(path), &request)
     }
 
     fn token_access(to_read: bool) -> (Key, Access) {
@@ -228,7 +242,10 @@ mod tests {
         assert!(grant.publish.matches("edits/a"));
         assert!(!grant.publish.matches(""));
         assert!(grant.subscribe.matches(""));
-        assert!(ask(&Access::Loopback, "/elsewhere/deep", None).is_err());
+        // Where a proxy has the server.
+        let grant = ask(&Access::Loopback, "/light/of/ours/", None).expect("granted");
+        assert!(grant.publish.matches("sponza/edits/a") && grant.subscribe.matches("sponza"));
+        assert_eq!(grant.root.as_deref(), Some(""));
     }
 
     #[test]

@@ -83,7 +83,7 @@ type Bandwidth = Arc<Mutex<Option<bandwidth::Consumer>>>;
 
 impl Client {
     /// Connects to `https://host[:port]/scene`, or with `http` to a server with a development
-    /// certificate.
+    /// certificate. A reverse proxy may have the server under a path: `https://host/base/scene`.
     ///
     /// # Errors
     /// An unusable address, a refusal, or no connection within the options' time.
@@ -168,7 +168,7 @@ impl Drop for Client {
 
 /// A server's address, taken apart.
 struct Address {
-    /// What is dialled: always the root, so that names mean the same through any relay.
+    /// What is dialled: the root, or where a proxy has it.
     dialled: Url,
     scene: String,
 }
@@ -183,8 +183,7 @@ impl Address {
         if url.host_str().is_none_or(str::is_empty) {
             return Err(refuse("it names no host"));
         }
-        let scene = url.path().trim_matches('/').to_owned();
-        url.set_path("/");
+        let scene = take_scene(&mut url);
         url.set_fragment(None);
         if let Some(token) = &options.token {
             url.query_pairs_mut().append_pair("jwt", token);
@@ -200,9 +199,20 @@ impl Address {
     fn shown(&self) -> String {
         let mut url = self.dialled.clone();
         url.set_query(None);
-        url.set_path(&self.scene);
+        if let Ok(mut parts) = url.path_segments_mut() {
+            parts.pop_if_empty().push(&self.scene);
+        }
         url.to_string()
     }
+}
+
+/// Takes the scene off an address `…/base/scene`, so that `…/base/` is left; names of scenes have one
+/// part. It may be empty.
+fn take_scene(url: &mut Url) -> String {
+    let path = url.path().trim_end_matches('/').to_owned();
+    let (base, scene) = path.rsplit_once('/').unwrap_or_default();
+    url.set_path(&format!("{base}/"));
+    scene.to_owned()
 }
 
 /// How long one attempt may take.
@@ -287,6 +297,17 @@ mod tests {
         assert_eq!(address.dialled.as_str(), "https://light.example:4443/?jwt=a.b");
         assert_eq!(address.scene, "sponza");
         assert_eq!(address.shown(), "https://light.example:4443/sponza");
+    }
+
+    #[test]
+    fn a_proxy_may_have_it_under_a_path() {
+        for text in ["https://light.example/a/b/sponza?x=1#y", "https://light.example/a/b/sponza//"]
+        {
+            let address = Address::parse(text, &ConnectOptions::default()).expect("valid");
+            assert_eq!(address.dialled.path(), "/a/b/");
+            assert_eq!(address.scene, "sponza");
+            assert_eq!(address.shown(), "https://light.example/a/b/sponza");
+        }
     }
 
     #[test]

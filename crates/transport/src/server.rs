@@ -1,7 +1,7 @@
 //! The server: an embedded relay on one port, QUIC on UDP and HTTP with WebSocket on TCP.
 
 use std::net::{SocketAddr, UdpSocket};
-use std::sync::{Arc, RwLock};
+use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
 use axum::Router;
@@ -186,6 +186,8 @@ impl Server {
     /// Makes a broadcast under this path, the name of a scene. It is known to readers once it is
     /// [announced](Broadcast::announce).
     pub fn publish(&self, path: &str) -> Result<Broadcast> {
+        let mut scenes = self.sessions.scenes.lock().unwrap_or_else(PoisonError::into_inner);
+        scenes.insert(path.to_owned());
         Broadcast::new(&self.origin, path)
     }
 

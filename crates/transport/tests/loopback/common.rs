@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use axum::Router;
 use axum::routing::get;
+use base64::Engine as _;
 use bytes::Bytes;
 use lumencast_transport::{
     Client, ConnectOptions, Frame, Server, ServerConfig, TrackReader, Transport,
@@ -71,4 +72,9 @@ pub(crate) async fn status(server: &Server, request: &str) -> String {
         answer.lines().next().unwrap_or_default().to_owned()
     };
     step("HTTP", exchange).await
+}
+
+pub(crate) fn pem(label: &str, der: &[u8]) -> String {
+    let base64 = base64::engine::general_purpose::STANDARD.encode(der);
+    format!("-----BEGIN {label}-----\n{base64}\n-----END {label}-----\n")
 }

@@ -2,6 +2,7 @@
 
 mod common;
 mod hostile;
+mod relay;
 mod restart;
 mod security;
 mod stream;

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use base64::Engine as _;
 use lumencast_transport::{
     Access, Announcement, Client, Error, Key, ReadOptions, RefusalKind, Server, ServerConfig, Tls,
     Transport,
@@ -14,7 +13,7 @@ use web_transport_moq::proto::ConnectRequest;
 use web_transport_moq::{http, noq};
 
 use crate::common::{
-    address, connect, loopback, over, read, serve, status, step, text, with_token,
+    address, connect, loopback, over, pem, read, serve, status, step, text, with_token,
 };
 
 const UPGRADE: &str = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
@@ -257,11 +256,6 @@ async fn open_access_beyond_loopback_has_to_be_said() {
     let refused = Server::bind(config, axum::Router::new()).await;
     let Err(err) = refused else { panic!("a server for everyone, unasked") };
     assert!(err.to_string().contains("loopback"), "{err}");
-}
-
-fn pem(label: &str, der: &[u8]) -> String {
-    let base64 = base64::engine::general_purpose::STANDARD.encode(der);
-    format!("-----BEGIN {label}-----\n{base64}\n-----END {label}-----\n")
 }
 
 #[tokio::test]
