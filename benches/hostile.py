@@ -1,6 +1,7 @@
 """What hostile clients cost a server: its memory, and whether it still answers.
 
-    python3 benches/hostile.py path/to/lumencast [lazy_readers|long_messages|silent ...]
+    cargo build --release --example hostile -p lumencast-server
+    python3 benches/hostile.py path/to/lumencast path/to/examples/hostile [ATTACK ...]
 
 Starts servers on loopback and ends them. Linux: memory is read from /proc. The scene has 200 MB, most
 of it a buffer that nothing uses.
@@ -121,17 +122,73 @@ def silent(server):
     return sockets
 
 
+def streams(server):
+    """5,000 HTTP/2 requests on 20 connections, none of whose answers is read."""
+    # A client's preface, its settings with a window of nothing, and requests by indexed headers.
+    frame = lambda kind, flags, stream, body: (
+        len(body).to_bytes(3, "big") + bytes([kind, flags]) + stream.to_bytes(4, "big") + body)
+    authority = f"127.0.0.1:{server.port}".encode()
+    literal = lambda name, value: bytes([name, len(value)]) + value
+    head = bytes([0x82, 0x86]) + literal(0x04, b"/scene/large.gltf") + literal(0x01, authority)
+    sockets = []
+    for _ in range(20):
+        s = server.connect()
+        try:
+            s.sendall(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+                      + frame(4, 0, 0, bytes([0, 4, 0, 0, 0, 0])))
+            for stream in range(250):
+                s.sendall(frame(1, 5, 2 * stream + 1, head))
+        except OSError:
+            pass
+        sockets.append(s)
+    return sockets
+
+
+def by_client(name, what):
+    """An attack over Media over QUIC, by the example `hostile`."""
+    def attack(server):
+        address = f"http://127.0.0.1:{server.port}/large"
+        done = subprocess.run([sys.argv[2], address, name], capture_output=True, text=True)
+        attack.seen = done.stdout.strip() or done.stderr.strip()
+        return []
+    attack.__name__, attack.__doc__ = name, what
+    return attack
+
+
+def picture(folder, name):
+    """An HDR picture of 4096 × 2048 white texels, 100 MB in memory."""
+    row = bytes([2, 2, 16, 0]) + b"".join(bytes([255, value] * 32 + [160, value]) for value in
+                                          (128, 128, 128, 129))
+    with open(os.path.join(folder, name), "wb") as file:
+        file.write(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2048 +X 4096\n" + row * 2048)
+
+
+BY_CLIENT = [
+    by_client("files", "200 edits that name a file of 200 MB which is no glTF."),
+    by_client("spellings", "A picture of the environment under 30 spellings, then another."),
+    by_client("names", "A session under 1,024 names."),
+    by_client("impostor", "Another's name, also with a path before it, and numbers far ahead."),
+    by_client("numbers", "A number beyond 2^53."),
+    by_client("long_edit", "An edit of 5 KB before another."),
+]
+
+
 def main():
     program = sys.argv[1]
     with tempfile.TemporaryDirectory() as folder:
         path = scene(folder)
-        attacks = [lazy_readers, long_messages, silent]
-        for attack in [a for a in attacks if a.__name__ in sys.argv[2:] or not sys.argv[2:]]:
+        for name in ["sky.hdr", "other.hdr"]:
+            picture(folder, name)
+        attacks = [lazy_readers, streams, long_messages, silent, *BY_CLIENT]
+        for attack in [a for a in attacks if a.__name__ in sys.argv[3:] or not sys.argv[3:]]:
             server = Server(program, path)
             try:
                 sockets = attack(server)
                 time.sleep(3)
                 held, answers = server.memory() - server.first, server.answers()
+                if attack in BY_CLIENT:
+                    print(f"{attack.__doc__} Memory: +{held:.0f} MB. {attack.seen}", flush=True)
+                    continue
                 time.sleep(40)
                 later, recovers = server.memory() - server.first, server.answers()
                 print(f"{attack.__doc__} Memory: +{held:.0f} MB, after 43 s +{later:.0f} MB. "
