@@ -3,7 +3,7 @@
 use anyhow::Result;
 use clap::Args;
 
-use crate::run::{build_release, command, hand_over};
+use crate::run::{build_demo, command, hand_over};
 use crate::setup::{self, Purpose};
 
 /// Options of `cargo xtask demo`.
@@ -20,7 +20,7 @@ pub(crate) struct Demo {
 impl Demo {
     pub(crate) fn run(&self) -> Result<()> {
         setup::install(Purpose::Demo)?;
-        let program = build_release()?;
+        let program = build_demo()?;
         let mut serve = command(&program.to_string_lossy(), &["serve", &self.scene]);
         serve.args(&self.serve);
         // Relative paths are meant from where the user stands.

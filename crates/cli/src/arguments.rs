@@ -14,6 +14,7 @@ use lumencast_gather::path_trace::{CpuPathTracer, Levels, MaterialModel, Options
 use lumencast_light::{Grid, Offset, Order};
 use lumencast_scene::{Edit, FileContents, Scene, Script, VolumeSpec};
 use lumencast_server::{Effort, FitOptions, GatherOptions, SampleRange, Survey, TickOptions};
+#[cfg(feature = "gpu")]
 use lumencast_shade::Occlusion;
 
 use crate::environment::EnvironmentArgument;
@@ -321,6 +322,7 @@ impl Materials {
     }
 
     /// The same for what an adapter draws.
+    #[cfg(feature = "gpu")]
     pub(crate) fn drawn(self) -> lumencast_shade::Materials {
         match self {
             Self::Full => lumencast_shade::Materials::Full,
@@ -449,6 +451,7 @@ pub(crate) fn parse_occlusion(text: &str) -> Result<f32> {
 }
 
 /// Ambient occlusion that reaches so far.
+#[cfg(feature = "gpu")]
 pub(crate) fn occlusion(radius: f32) -> Option<Occlusion> {
     (radius > 0.0).then(|| Occlusion { radius, ..Occlusion::default() })
 }

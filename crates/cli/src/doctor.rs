@@ -86,6 +86,7 @@ fn print_report(report: &Value) {
         say!("driver      {}", driver.as_str().unwrap_or_default());
     }
     match report["adapters"].as_array().map(Vec::as_slice) {
+        None if !cfg!(feature = "gpu") => say!("adapter     not looked for by this build"),
         None => say!("adapter     unknown: a driver crashed or did not answer"),
         Some([]) => say!("adapter     none; light is computed on the processor without one"),
         Some(adapters) => adapters.iter().for_each(print_adapter),
@@ -170,7 +171,13 @@ fn adapters() -> Value {
         .unwrap_or(Value::Null)
 }
 
+#[cfg(not(feature = "gpu"))]
+fn enumerate_adapters() -> Result<Vec<Value>> {
+    anyhow::bail!("{}", crate::absent::GPU)
+}
+
 /// Every adapter of the platform's own interfaces (Vulkan, Metal, Direct3D 12).
+#[cfg(feature = "gpu")]
 fn enumerate_adapters() -> Result<Vec<Value>> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let adapters = tokio::runtime::Builder::new_current_thread()
@@ -179,6 +186,7 @@ fn enumerate_adapters() -> Result<Vec<Value>> {
     Ok(adapters.iter().map(describe_adapter).collect())
 }
 
+#[cfg(feature = "gpu")]
 fn describe_adapter(adapter: &wgpu::Adapter) -> Value {
     let info = adapter.get_info();
     let kind = match info.device_type {

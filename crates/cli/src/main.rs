@@ -1,8 +1,14 @@
 //! The `lumencast` program.
 
+#![cfg_attr(
+    not(all(feature = "gpu", feature = "window")),
+    expect(dead_code, reason = "what drawing needs stands beside what others need too")
+)]
 // All that is printed goes through `output`: it bears a full disk, and names from anywhere.
 #![warn(clippy::print_stderr)]
 
+#[cfg(not(all(feature = "gpu", feature = "window")))]
+mod absent;
 mod arguments;
 mod bake;
 mod bench;
@@ -24,6 +30,7 @@ mod remote;
 mod render;
 mod serve;
 mod token;
+#[cfg(feature = "window")]
 mod view;
 mod warnings;
 mod words;
@@ -65,7 +72,10 @@ const LOGGED: &str = "warn,moq_sock=error,moq_tokio=error,moq_net=error,moq_rela
 #[derive(Debug, Subcommand)]
 enum Command {
     Serve(serve::Serve),
+    #[cfg(feature = "window")]
     View(Box<view::View>),
+    #[cfg(not(feature = "window"))]
+    View(absent::View),
     Bake(bake::Bake),
     Inspect(inspect::Inspect),
     Probe(probe::Probe),

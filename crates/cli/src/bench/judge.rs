@@ -12,7 +12,7 @@ use lumencast_scene::{Environment, Material, Snapshot, View};
 use lumencast_shade::{Lighting, Renderer, Settings};
 use serde::Serialize;
 
-use super::draw;
+use super::drawing::draw;
 
 /// Side of the filter that takes the reference's noise away, pixels.
 const FILTER: u32 = 4;

@@ -1,20 +1,25 @@
 //! `lumencast bench`: figures of this machine.
 
+#[cfg(feature = "gpu")]
 mod bmfr;
+#[cfg(feature = "gpu")]
+mod drawing;
+#[cfg(feature = "gpu")]
 mod judge;
 mod paths;
+#[cfg(feature = "gpu")]
 mod peers;
+#[cfg(feature = "gpu")]
 mod quality;
 mod rays;
+#[cfg(feature = "gpu")]
 mod scenes;
+#[cfg(feature = "gpu")]
 mod section;
 mod tick;
 
 use anyhow::Result;
 use clap::Subcommand;
-use lumencast_picture::Picture;
-use lumencast_scene::{View, VolumeSpec};
-use lumencast_shade::{Lighting, Renderer, Settings};
 
 /// Measures what this machine does.
 #[derive(Debug, Subcommand)]
@@ -22,9 +27,15 @@ pub(crate) enum Bench {
     Tick(tick::BenchTick),
     Rays(rays::BenchRays),
     Paths(paths::BenchPaths),
+    #[cfg(feature = "gpu")]
     Quality(Box<quality::BenchQuality>),
+    #[cfg(feature = "gpu")]
     Peers(peers::BenchPeers),
+    #[cfg(feature = "gpu")]
     Scenes(scenes::BenchScenes),
+    #[cfg(not(feature = "gpu"))]
+    #[command(aliases = ["peers", "scenes"])]
+    Quality(crate::absent::Drawing),
 }
 
 impl Bench {
@@ -34,35 +45,12 @@ impl Bench {
             Self::Rays(command) => command.run(),
             Self::Paths(command) => command.run(),
             Self::Quality(command) => command.run(),
+            #[cfg(feature = "gpu")]
             Self::Peers(command) => command.run(),
+            #[cfg(feature = "gpu")]
             Self::Scenes(command) => command.run(),
         }
     }
-}
-
-/// The light of two parts of a picture together.
-fn sum(a: &Picture, b: &Picture) -> Picture {
-    let mut sum = a.clone();
-    sum.pixels_mut().iter_mut().zip(b.pixels()).for_each(|(a, b)| *a += *b);
-    sum
-}
-
-/// What an adapter draws of a part of the light.
-fn draw(
-    renderer: &mut Renderer,
-    view: View,
-    settings: &Settings,
-    lighting: Lighting,
-) -> Result<Picture> {
-    let settings = Settings { lighting, ..*settings };
-    let pixels = renderer.pictures(&[view], &settings)?.remove(0);
-    Ok(Picture::new(settings.size.x, settings.size.y, pixels)?)
-}
-
-/// A volume's cells as they are given on the command line.
-fn cells(spec: &VolumeSpec) -> String {
-    let [x, y, z] = spec.grid.resolution.to_array();
-    format!("{x}x{y}x{z}")
 }
 
 /// The value below which the share `q` of sorted values lies.

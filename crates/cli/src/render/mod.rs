@@ -1,6 +1,8 @@
 //! `lumencast render`: a picture of a scene.
 
+#[cfg(feature = "gpu")]
 mod raster;
+mod raster_arguments;
 mod reference;
 
 use std::path::PathBuf;
@@ -52,7 +54,7 @@ pub(crate) struct Render {
     #[command(flatten)]
     picture: PictureArguments,
     #[command(flatten)]
-    raster: raster::RasterArguments,
+    raster: raster_arguments::RasterArguments,
     /// Which light of the reference: direct is what clients draw themselves, indirect what light
     /// fields hold.
     #[arg(long, value_enum, default_value_t = PartsArgument::All)]
@@ -138,7 +140,10 @@ impl Render {
         let view = camera::view(&scene, self.picture.camera.as_ref())?;
         match self.lighting() {
             Lighting::Reference => self.trace_picture(&mut scene, view),
+            #[cfg(feature = "gpu")]
             _ => self.draw_picture(&mut scene, view),
+            #[cfg(not(feature = "gpu"))]
+            _ => bail!("{}", crate::absent::GPU),
         }
     }
 

@@ -1,10 +1,8 @@
 //! Pictures as a client draws them: by a graphics adapter, under a light field.
 
-use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
-use clap::{Args, ValueEnum};
 use glam::{Affine3A, UVec2, Vec3};
 use lumencast_light::{LightField, ProbeVolume};
 use lumencast_picture::{Picture, exposure};
@@ -12,10 +10,9 @@ use lumencast_scene::{Scene, View};
 use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadows, Transparency};
 use serde_json::json;
 
+use super::raster_arguments::{RasterArguments, ShadingArgument, TransparencyArgument};
 use super::{Lighting, PartsArgument, Render};
-use crate::arguments::{
-    EffortArguments, MOST_SAMPLES, ReadingArguments, occlusion, parse_occlusion, parse_positive,
-};
+use crate::arguments::occlusion;
 use crate::light_source::{self, Computed};
 use crate::output::{self, say, tell};
 
@@ -25,82 +22,6 @@ const SAMPLES: u32 = 8;
 const GLANCE: u32 = 4;
 /// Pre-exposure of that picture: halves then hold 0.1 to 60 million cd/m² with all their digits.
 const GLANCE_PRE_EXPOSURE: f32 = 1.0 / 1024.0;
-
-/// How an adapter draws.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Pictures drawn by an adapter")]
-pub(crate) struct RasterArguments {
-    /// The light field: a file of `lumencast bake`, or the address of a server's scene. Computed where
-    /// it is not given.
-    #[arg(long, value_name = "FILE|URL")]
-    light: Option<String>,
-    /// Samples a probe where the field is computed, at most.
-    #[arg(long, value_name = "N", default_value_t = MOST_SAMPLES,
-          value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
-    probe_samples: u32,
-    #[command(flatten)]
-    effort: EffortArguments,
-    #[command(flatten)]
-    reading: ReadingArguments,
-    /// Takes ringing out of the field by a Hann window that ends at this band; 3 leaves order 2 a
-    /// quarter of its band 2. None unless given.
-    #[arg(long, value_name = "BAND", value_parser = parse_positive)]
-    window: Option<f32>,
-    /// How often surfaces are shaded: once a sample, or once a pixel, which is faster.
-    #[arg(long, value_enum, default_value_t = ShadingArgument::Samples)]
-    shading: ShadingArgument,
-    /// Texels along the side of a shadow map; 0 draws no shadows.
-    #[arg(long, value_name = "N", default_value_t = 4096,
-          value_parser = clap::value_parser!(u32).range(0..=16_384))]
-    shadow_resolution: u32,
-    /// Samples of a shadow's edge.
-    #[arg(long, value_name = "N", default_value_t = 16,
-          value_parser = clap::value_parser!(u32).range(1..=256))]
-    pcf: u32,
-    /// Samples of the search for what casts a shadow, which makes shadows of lights with a size
-    /// soft; 0 leaves them sharp.
-    #[arg(long, value_name = "N", default_value_t = 16,
-          value_parser = clap::value_parser!(u32).range(0..=256))]
-    pcss: u32,
-    /// Takes away indirect light that is hidden within so many metres (ambient occlusion in screen
-    /// space), which probes are too sparse for; 0 takes none.
-    #[arg(long, value_name = "METRES", default_value_t = 0.0, value_parser = parse_occlusion)]
-    occlusion: f32,
-    /// How blended surfaces are drawn: by the samples that they cover, or sorted and mixed.
-    #[arg(long, value_enum, default_value_t = TransparencyArgument::Coverage)]
-    transparency: TransparencyArgument,
-    /// Several views in one picture: a stereo pair, or a grid of cameras, the first at the upper left.
-    #[arg(long, value_name = "stereo|COLSxROWS", value_parser = parse_views)]
-    views: Option<UVec2>,
-    /// Metres from one of several views to the next.
-    #[arg(long, value_name = "METRES", default_value_t = 0.064)]
-    view_spacing: f32,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ShadingArgument {
-    Pixels,
-    Samples,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum TransparencyArgument {
-    Coverage,
-    Sorted,
-}
-
-impl RasterArguments {
-    /// What only an adapter's pictures have, where it is asked for.
-    pub(super) fn asked_for(&self) -> Option<&'static str> {
-        let light = self.light.is_some().then_some("--light");
-        light.or_else(|| self.views.is_some().then_some("--views"))
-    }
-
-    /// The light's file, where that is what it comes from.
-    pub(super) fn light_file(&self) -> Option<PathBuf> {
-        self.light.as_deref().filter(|light| !light_source::is_address(light)).map(PathBuf::from)
-    }
-}
 
 impl Render {
     pub(super) fn draw_picture(&self, scene: &mut Scene, view: View) -> Result<()> {
@@ -309,32 +230,12 @@ fn side_by_side(pictures: &[Vec<Vec3>], size: UVec2, grid: UVec2) -> Result<Pict
     Ok(Picture::from_fn(size.x * grid.x, size.y * grid.y, pixel))
 }
 
-fn parse_views(text: &str) -> Result<UVec2, String> {
-    const MOST: u32 = 256;
-    if text == "stereo" {
-        return Ok(UVec2::new(2, 1));
-    }
-    let wrong =
-        || format!("{text:?}: give stereo, or columns and rows as 8x4, at most {MOST} views");
-    let (columns, rows) = text.split_once('x').ok_or_else(wrong)?;
-    let side = |text: &str| text.parse::<u32>().ok().filter(|n| (1..=MOST).contains(n));
-    match (side(columns), side(rows)) {
-        (Some(x), Some(y)) if x * y <= MOST => Ok(UVec2::new(x, y)),
-        _ => Err(wrong()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn several_views() {
-        assert_eq!(parse_views("stereo"), Ok(UVec2::new(2, 1)));
-        assert_eq!(parse_views("8x4"), Ok(UVec2::new(8, 4)));
-        for wrong in ["", "3", "0x2", "20x20", "-1x2"] {
-            assert!(parse_views(wrong).is_err(), "{wrong}");
-        }
         let middle = View::look_at(Vec3::ZERO, Vec3::NEG_Z, 1.0).expect("two points");
         let eye = |view: &View| Vec3::from(view.world_from_camera.translation);
         let pair = views(&middle, UVec2::new(2, 1), 0.1);

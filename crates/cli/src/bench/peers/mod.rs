@@ -17,8 +17,8 @@ use lumencast_scene::{Scene, Snapshot, VolumeSpec};
 use lumencast_server::Effort;
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading};
 
+use super::drawing::{cells, draw};
 use super::judge::{Judge, covered};
-use super::{cells, draw};
 use crate::arguments::{Reading, ReadingArguments, VolumeArgument};
 use crate::light_source::Computed;
 use crate::{camera, out_file, output, warnings};

@@ -12,8 +12,7 @@ use super::reference::Judge;
 use super::report::{Errors, Row};
 use super::{BenchQuality, Subject};
 use crate::arguments::Reading;
-use crate::bench::sum;
-use crate::bench::{cells, draw};
+use crate::bench::drawing::{cells, draw, sum};
 use crate::light_source::Computed;
 
 /// Samples a probe of one of the second paper's updates.

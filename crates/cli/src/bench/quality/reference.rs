@@ -9,7 +9,7 @@ use lumencast_picture::{Comparison, Loaded, PIXELS_PER_DEGREE, Picture, compare}
 use serde::Serialize;
 
 use super::{BenchQuality, Subject};
-use crate::bench::sum;
+use crate::bench::drawing::sum;
 use crate::{film_file, fingerprint, output};
 
 /// The two parts of a path-traced picture.

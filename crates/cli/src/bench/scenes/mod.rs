@@ -19,10 +19,10 @@ use lumencast_scene::{Edit, Environment, Scene, Snapshot, View};
 use lumencast_server::Effort;
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading, Shadows};
 
+use super::drawing::{cells, draw, sum};
 use super::judge::{Judge, covered};
 use super::peers::{SIZE, SUBJECTS};
 use super::section::Section;
-use super::{cells, draw, sum};
 use crate::arguments::{EffortArguments, MOST_SAMPLES, Reading, ReadingArguments};
 use crate::light_source::Computed;
 use crate::output::{self, tell};
