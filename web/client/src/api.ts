@@ -135,6 +135,15 @@ export interface SessionEvents {
   status: Status;
 }
 
+/** How an edit is meant. */
+export interface EditOptions {
+  /**
+   * The node that the edit adds goes by itself once every client that has sent edits of it has been
+   * gone for ten seconds. Else it stays for as long as the server runs.
+   */
+  temporary?: boolean;
+}
+
 /** Figures for a panel or a log. */
 export interface SessionStats {
   /** Server ticks a second, measured over the last seconds; `undefined` before two have come. */
@@ -201,7 +210,7 @@ export interface Session {
    * it refuses, gives no answer, has restarted, or the session is closed before. Without a connection
    * the edit waits for one.
    */
-  edit(edit: Edit): Promise<void>;
+  edit(edit: Edit, options?: EditOptions): Promise<void>;
   /** Edits that the server has not dealt with yet, oldest first. */
   readonly pending: readonly Edit[];
   /** The newest light, blended to this moment. `now` is `performance.now()` in milliseconds. */

@@ -263,11 +263,12 @@ export class Cache {
   }
 
   /**
-   * Puts an edit on the list of those that wait for the server.
+   * Puts an edit on the list of those that wait for the server. What a `temporary` one adds goes when
+   * those who edit it have gone.
    * @throws EditError when too many wait, WireError when it is too long to be sent.
    */
-  edit(edit: Edit): PendingEdit {
-    return this.edits.add(edit);
+  edit(edit: Edit, temporary = false): PendingEdit {
+    return this.edits.add(edit, temporary);
   }
 
   /** Takes an edit off that list to which no answer came. */

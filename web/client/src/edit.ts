@@ -109,12 +109,23 @@ export type Environment =
 /** What an added instance shows: a mesh of the scene, or a glTF file that the server may read. */
 export type InstanceSource = { mesh: number } | { file: string };
 
+/** The node that an edit adds. */
+export interface AddedNode {
+  /** Its number, which the server fills in. */
+  node?: number;
+  /** 1 to 64 bytes of UTF-8 without control characters. */
+  name?: string;
+  /** The scene's root when absent. */
+  parent?: number;
+  transform?: Transform;
+}
+
 /** A change of the scene, applied whole or refused with a reason, in the server's order. */
 export type Edit =
   | ({ edit: 'move_node'; node: number } & Transform)
-  | { edit: 'add_instance'; node?: number; source: InstanceSource; parent?: number; transform?: Transform }
+  | ({ edit: 'add_instance'; source: InstanceSource } & AddedNode)
   | { edit: 'remove_node'; node: number }
-  | { edit: 'add_light'; node?: number; light: Light; parent?: number; transform?: Transform }
+  | ({ edit: 'add_light'; light: Light } & AddedNode)
   | ({ edit: 'set_light'; node: number } & LightSpec)
   | { edit: 'remove_light'; node: number }
   | ({ edit: 'set_material'; material: number } & MaterialChange)

@@ -1,6 +1,7 @@
 import {
   ConnectError,
   EditError,
+  type EditOptions,
   type LightState,
   type Problem,
   type Session,
@@ -348,10 +349,10 @@ class LiveSession implements Session, Sink {
     return this.emitter.on(event, listener);
   }
 
-  async edit(edit: Edit): Promise<void> {
-    checkEdit(edit);
+  async edit(edit: Edit, { temporary = false }: EditOptions = {}): Promise<void> {
+    checkEdit(edit, temporary);
     if (this.current.state === 'closed') throw new EditError('closed', this.current.reason);
-    return this.outbox.edit(edit, seconds());
+    return this.outbox.edit(edit, temporary, seconds());
   }
 
   light(now: number = performance.now()): LightState {

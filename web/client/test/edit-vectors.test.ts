@@ -30,6 +30,21 @@ describe('vectors/edits.json', () => {
     });
   }
 
+  it.each(['a named light', 'x', 'ä'.repeat(32)])('reads the name %s of what is added', (name) => {
+    const light: Edit = { edit: 'add_light', name, light: { type: 'point' } };
+    expect(parseEdit({ ...light, node: 7 })).toEqual({ ...light, node: 7 });
+    const instance: Edit = { edit: 'add_instance', name, source: { mesh: 0 } };
+    expect(parseEdit(instance)).toEqual(instance);
+    expect(() => checkEdit(light)).not.toThrow();
+  });
+
+  it.each([
+    ...['', 'x'.repeat(65), `${'ä'.repeat(32)}x`, 'a\nb', 'a\u007f', 'a\u0085', '\ud800', 7, ['lamp']],
+  ])('refuses to add what is named %j', (name) => {
+    expect(parseEdit({ edit: 'add_light', name, light: { type: 'point' } })).toBeUndefined();
+    expect(parseEdit({ edit: 'add_instance', name, source: { mesh: 0 } })).toBeUndefined();
+  });
+
   it('leaves out members that it does not know', () => {
     const edit = { edit: 'remove_node', node: 3, later: true };
     expect(parseEdit(edit)).toEqual({ edit: 'remove_node', node: 3 });

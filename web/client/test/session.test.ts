@@ -387,6 +387,23 @@ describe('edits', () => {
     expect(session.status.state).toBe('closed');
   });
 
+  it('are temporary where a program says so, also when they are sent again', async () => {
+    const { net, server, session } = await joined();
+    const lamp: Edit = { edit: 'add_light', name: 'lamp', light: { type: 'point' } };
+    const edits = [session.edit(lamp, { temporary: true }), session.edit(lamp, { temporary: false })];
+    await pass(0.01);
+    const first = { seq: 1, edit: lamp, temporary: true };
+    expect(net.link.edits).toEqual([first, { seq: 2, edit: lamp }]);
+    net.link.break('gone');
+    await pass(0.3);
+    net.link.deliver('catalog', server.catalog);
+    expect(net.link.edits).toEqual([first, { seq: 2, edit: lamp }]);
+    for (const seq of [1, 2]) server.accept({ ...lamp, node: 8 + seq }, session.client, seq);
+    net.link.tick(server);
+    await Promise.all(edits);
+    await expect(session.edit(MOVE, { temporary: true })).rejects.toThrow('move_node adds nothing');
+  });
+
   it('that are none fail where they were made', async () => {
     const { session, net } = await joined();
     await expect(session.edit({ edit: 'move_node', node: 1, translation: [NaN, 0, 0] })).rejects.toThrow(

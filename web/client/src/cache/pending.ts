@@ -23,9 +23,9 @@ export class PendingEdits {
   }
 
   /** @throws EditError when too many wait already. */
-  add(edit: Edit): PendingEdit {
+  add(edit: Edit, temporary: boolean): PendingEdit {
     if (this.edits.length >= MOST) throw new EditError('full', `${MOST} edits wait for the server already`);
-    const pending = { seq: this.next, edit, bytes: encodeClientEdit(this.next, edit) };
+    const pending = { seq: this.next, edit, bytes: encodeClientEdit(this.next, edit, temporary) };
     this.next++;
     this.edits.push(pending);
     return pending;

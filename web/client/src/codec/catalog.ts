@@ -3,6 +3,7 @@ import { WireError } from '../wire-error.js';
 import {
   isObject,
   type Json,
+  label,
   list,
   number,
   object,
@@ -153,7 +154,7 @@ function parseField(json: Json): Field {
   const use = USES.find((use) => use === json.use);
   if (!use) throw new WireError('malformed', `use of field ${id} is ${JSON.stringify(json.use)}`);
   const scale = usable(() => 2 ** whole(json.scale_log2, 'scale_log2', 127, -128));
-  const source = usable(() => parseSource(json.source));
+  const source = usable(() => label(json.source, 'source', LIMITS.sourceBytes));
   return {
     id,
     kind: 'volume',
@@ -181,14 +182,6 @@ function parseEpoch(json: unknown): string {
   const epoch = text(json, 'epoch');
   if (!/^[0-9a-f]{16}$/i.test(epoch)) throw new WireError('malformed', 'epoch is not 16 hexadecimal digits');
   return epoch;
-}
-
-function parseSource(json: unknown): string {
-  const source = text(json, 'source');
-  const bytes = new TextEncoder().encode(source).length;
-  if (bytes > LIMITS.sourceBytes) throw new WireError('limit', `a source of ${bytes} bytes`);
-  if (/\p{Cc}/u.test(source)) throw new WireError('malformed', 'control characters in a source');
-  return source;
 }
 
 function parseGrid(json: Json): Grid {

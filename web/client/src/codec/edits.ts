@@ -9,7 +9,8 @@ import type {
   Vec3,
 } from '../edit.js';
 import { WireError } from '../wire-error.js';
-import { isObject, type Json, object, single, text, usable, vec3, vec4, whole } from './json.js';
+import { isObject, type Json, label, object, single, text, usable, vec3, vec4, whole } from './json.js';
+import { LIMITS } from './limits.js';
 
 /** Reads one member, or throws a {@link WireError}. */
 type Read<T> = (value: unknown, what: string) => T;
@@ -107,7 +108,12 @@ const materialParts: Readers<MaterialChange> = {
   alpha_cutoff: real,
 };
 
-const created = { node: id, parent: id, transform };
+const name: Read<string> = (value, what) => {
+  if (value === '') throw new WireError('malformed', `${what} is empty`);
+  return label(value, what, LIMITS.nameBytes);
+};
+
+const created = { node: id, name, parent: id, transform };
 const node = (json: Json) => id(json.node, 'node');
 
 /** How each edit is read. */

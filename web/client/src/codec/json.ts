@@ -63,6 +63,16 @@ export function text(value: unknown, what: string): string {
   return value;
 }
 
+/** Text for people: at most `limit` bytes of UTF-8, without control characters. */
+export function label(value: unknown, what: string, limit: number): string {
+  const label = text(value, what);
+  const bytes = new TextEncoder().encode(label).length;
+  if (bytes > limit) throw new WireError('limit', `${what} has ${bytes} bytes`);
+  // Halves of surrogate pairs are no UTF-8.
+  if (/[\p{Cc}\p{Cs}]/u.test(label)) throw new WireError('malformed', `control characters in ${what}`);
+  return label;
+}
+
 export function object(value: unknown, what: string): Json {
   if (!isObject(value)) throw new WireError('malformed', `${what} is not an object`);
   return value;

@@ -8,6 +8,7 @@ export const LIMITS = {
   probesPerCatalog: 524_288,
   regionCells: 16,
   sourceBytes: 128,
+  nameBytes: 64,
   snapshotEdits: 65_536,
   deltaEdits: 4096,
   layers: 3,

@@ -108,16 +108,18 @@ function absent(value: unknown): boolean {
 
 const utf8 = new TextEncoder();
 
-/** The frame by which a client sends an edit. */
-export function encodeClientEdit(seq: number, edit: Edit): Uint8Array {
-  const bytes = utf8.encode(JSON.stringify({ seq, edit }));
+/** The frame by which a client sends an edit; what a `temporary` one adds goes when its editors have gone. */
+export function encodeClientEdit(seq: number, edit: Edit, temporary = false): Uint8Array {
+  const bytes = utf8.encode(JSON.stringify({ seq, edit, ...(temporary && { temporary }) }));
   if (bytes.length > LIMITS.editBytes) throw new WireError('limit', `an edit of ${bytes.length} bytes`);
   return bytes;
 }
 
 /** Whether a value could be an edit at all, so that a slip in a program fails where it was made. */
-export function checkEdit(edit: Edit): void {
-  if (!isObject(edit) || parseEdit(JSON.parse(JSON.stringify(edit))) === undefined) {
+export function checkEdit(edit: Edit, temporary = false): void {
+  if (!isObject(edit as unknown) || parseEdit(JSON.parse(JSON.stringify(edit))) === undefined) {
     throw new TypeError(`not an edit: ${JSON.stringify(edit)}`);
   }
+  const adds = edit.edit === 'add_light' || edit.edit === 'add_instance';
+  if (temporary && !adds) throw new TypeError(`${edit.edit} adds nothing that could be temporary`);
 }

@@ -24,9 +24,9 @@ export class Outbox {
 
   constructor(private readonly cache: Cache) {}
 
-  edit(edit: Edit, now: number): Promise<void> {
+  edit(edit: Edit, temporary: boolean, now: number): Promise<void> {
     return new Promise((resolve, reject) => {
-      const { seq, bytes } = this.cache.edit(edit);
+      const { seq, bytes } = this.cache.edit(edit, temporary);
       const waiting: Waiting = { resolve, reject, sent: undefined };
       this.waiting.set(seq, waiting);
       if (!this.send) return;

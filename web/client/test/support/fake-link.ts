@@ -10,7 +10,7 @@ export interface FakeReader extends ReadOptions {
 export class FakeLink implements Link {
   readonly kind = 'webtransport';
   readonly readers = new Map<string, FakeReader>();
-  readonly edits: { seq: number; edit: unknown }[] = [];
+  readonly edits: { seq: number; edit: unknown; temporary?: boolean }[] = [];
   readonly ended: Promise<string>;
   private end: (reason: string) => void = () => {};
   closed = false;
