@@ -1,5 +1,5 @@
 /** What both entry points export. */
-export { ConnectError, type Edit, type Problem } from '@lumencast/client';
+export { ConnectError, type Edit, type EditOptions, type Problem } from '@lumencast/client';
 export type { ConnectOptions, ShowOptions } from './connect.js';
 export { Content, loadGltf } from './content.js';
 export { isHidden } from './exported.js';

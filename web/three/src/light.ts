@@ -1,4 +1,4 @@
-import type { AcceptedEdit, Edit, Environment, Field, Session } from '@lumencast/client';
+import type { AcceptedEdit, Catalog, Edit, EditOptions, Environment, Session } from '@lumencast/client';
 import { type Camera, type Light, type Object3D, type Scene, Vector3 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import type { Content } from './content.js';
@@ -52,6 +52,9 @@ export function warnInConsole(message: string): void {
   console.warn(`Lumencast: ${message}`);
 }
 
+/** How long the server may take to hear of what was followed, milliseconds. */
+const FAREWELL = 1000;
+
 /** What a session tells of the scene. */
 export type SceneEvent = { readonly snapshot: readonly Edit[] } | { readonly accepted: AcceptedEdit };
 
@@ -79,6 +82,7 @@ export class LumencastLight {
   #fittedRevision = -1;
   #fittedAt = 0;
   #lightRevision = 0;
+  #epoch: string | undefined;
 
   constructor(
     readonly session: LightSession,
@@ -100,12 +104,12 @@ export class LumencastLight {
     this.#added(scene);
     this.#restoreHooks = whileDrawn(scene, (set) => this.#changeWhileDrawn(set));
     this.#unsubscribe = [
-      session.on('catalog', ({ fields }) => this.#setFields(fields)),
+      session.on('catalog', (catalog) => this.#offered(catalog)),
       session.on('snapshot', (snapshot) => this.#receive({ snapshot })),
       session.on('edit', (accepted) => this.#receive({ accepted })),
     ];
     for (const event of missed) this.#receive(event);
-    if (session.catalog) this.#setFields(session.catalog.fields);
+    if (session.catalog) this.#offered(session.catalog);
     if (names) void this.#following.match(names, scene);
   }
 
@@ -123,8 +127,13 @@ export class LumencastLight {
   /**
    * This page moves the object, and changes it when it is a light; the server and every other page
    * follow, up to 30 times a second. Until the returned function is called, others' edits of it do
-   * not show here. A light that is not in the server's scene is added to it, with a warning. With saved
-   * light, nobody is told.
+   * not show here. With saved light, nobody is told.
+   *
+   * A light that is not in the server's scene stands for one of its name and kind that a page has added,
+   * or is added to it, with a warning, for as long as somebody edits it. The returned function and
+   * {@link dispose} remove it from the server's scene, unless other clients have sent edits of it: then it
+   * goes ten seconds after the last of those. Whoever removes it, while it is followed it is added anew.
+   * It stays in the page's scene.
    * @throws Error when the server cannot know the object.
    */
   follow(object: Object3D): () => void {
@@ -141,9 +150,12 @@ export class LumencastLight {
     this.#replica.setNodes([[object, node]]);
   }
 
-  /** Shows an edit at once and sends it. Rejects, with the scene as before, when it is refused. */
-  edit(edit: Edit): Promise<void> {
-    return this.#replica.edit(edit);
+  /**
+   * Shows an edit at once and sends it. Rejects, with the scene as before, when it is refused. What a
+   * `temporary` one adds goes ten seconds after all who have sent edits of it.
+   */
+  edit(edit: Edit, options?: EditOptions): Promise<void> {
+    return this.#replica.edit(edit, options);
   }
 
   /** Which part of the light is drawn. */
@@ -190,14 +202,19 @@ export class LumencastLight {
     return sceneFile(this.session, nameOf(uri));
   }
 
-  /** Ends the session and gives the scene back without its indirect light. */
+  /**
+   * Gives the scene back without its indirect light, and ends the session: at once, or a second later
+   * where the server is still to hear of what was followed.
+   */
   dispose(): void {
-    this.#following.clear();
+    const ends = this.#following.clear();
     for (const unsubscribe of this.#unsubscribe) unsubscribe();
     this.#restoreHooks();
     this.#grids.dispose();
     this.platform.unpatch(this.options.scene);
-    this.session.close();
+    const close = () => this.session.close();
+    if (ends === undefined || this.session.status.state !== 'connected') close();
+    else void Promise.race([ends, new Promise((resolve) => setTimeout(resolve, FAREWELL))]).then(close);
   }
 
   #added(object: Object3D): void {
@@ -205,7 +222,9 @@ export class LumencastLight {
     this.platform.patch(object);
   }
 
-  #setFields(fields: readonly Field[]): void {
+  #offered({ epoch, fields }: Catalog): void {
+    if (epoch !== this.#epoch) this.#replica.forgetAdopted();
+    this.#epoch = epoch;
     this.#warned.clear();
     this.#warnOnce(this.#grids.setFields(fields));
   }
@@ -221,7 +240,12 @@ export class LumencastLight {
 
   #receive(event: SceneEvent): void {
     if ('snapshot' in event) this.#joined(event.snapshot);
-    else this.#replica.applyAccepted(event.accepted.edit, event.accepted.own);
+    else this.#accepted(event.accepted);
+  }
+
+  #accepted({ edit, own, client }: AcceptedEdit): void {
+    this.#replica.applyAccepted(edit, own);
+    if (!own && client !== undefined) this.#following.heard(edit);
   }
 
   /** The file's state and a snapshot on it; what this page follows stays as it is and is sent anew. */

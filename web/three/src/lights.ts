@@ -59,6 +59,12 @@ export function lightSpec(light: PunctualLight): LightSpec {
   return spec;
 }
 
+/** Whether edits can make of one light what another is: they change neither its kind nor an end to its reach. */
+export function canBecome(from: PunctualLight, to: PunctualLight): boolean {
+  const [before, after] = [describeLight(from), describeLight(to)];
+  return before.type === after.type && (before.range === undefined || after.range !== undefined);
+}
+
 /** Sets those parts of a light that are given. */
 export function setLight(light: PunctualLight, spec: LightSpec): void {
   if (spec.color) setColor(light.color, spec.color);

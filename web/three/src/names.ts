@@ -24,6 +24,17 @@ export async function readNames(url: string): Promise<readonly NamedNode[]> {
   return namesOf((await readGltfJson(url)) as Tree);
 }
 
+/** Most that a node's name may have in edits, bytes of UTF-8. */
+const NAME_BYTES = 64;
+
+/** What of an object's name may be the name of a node that an edit adds. */
+export function nodeName({ name }: Object3D): string | undefined {
+  // Control characters, and halves of surrogate pairs.
+  const kept = name.replace(/[\p{Cc}\p{Cs}]/gu, '');
+  const { read } = new TextEncoder().encodeInto(kept, new Uint8Array(NAME_BYTES));
+  return kept.slice(0, read) || undefined;
+}
+
 export function namesOf({ scene = 0, scenes = [], nodes = [] }: Tree): readonly NamedNode[] {
   const named: NamedNode[] = [];
   const seen = new Set<number>();
@@ -42,11 +53,16 @@ export function namesOf({ scene = 0, scenes = [], nodes = [] }: Tree): readonly 
  * Finds the objects that stand for a file's nodes. Programs give them the nodes' names, as GLTFExporter
  * keeps them. GLTFLoader changes names to fit its animations and to be unique, and keeps the file's in
  * `userData.name`. Several of one name are told apart by their order, where there are as many objects as
- * nodes.
+ * nodes. Objects that `isOther` tells are passed over.
  */
-export function matchNames(nodes: readonly NamedNode[], scene: Object3D): Matches {
+export function matchNames(
+  nodes: readonly NamedNode[],
+  scene: Object3D,
+  isOther: (object: Object3D) => boolean = () => false,
+): Matches {
   const [own, original] = [new Map<string, Object3D[]>(), new Map<string, Object3D[]>()];
   scene.traverse((object) => {
+    if (isOther(object)) return;
     const { name } = object.userData as { name?: unknown };
     if (typeof name === 'string') add(original, name, object);
     if (object.name) add(own, object.name, object);

@@ -1,7 +1,8 @@
 import type {
+  AddedNode,
   Edit,
+  EditOptions,
   Environment,
-  Light,
   MaterialChange,
   Playback,
   Session,
@@ -9,12 +10,22 @@ import type {
 } from '@lumencast/client';
 import { Group, type Object3D, type Scene } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
+import { Additions } from './additions.js';
 import { Animations } from './animations.js';
 import { Content } from './content.js';
 import { showEnvironment } from './environment.js';
-import { createLight, lightSpec, setLight } from './lights.js';
+import {
+  canBecome,
+  createLight,
+  describeLight,
+  isPunctualLight,
+  lightSpec,
+  type PunctualLight,
+  setLight,
+} from './lights.js';
 import { lacksPhysical, materialPart, setMaterialPart } from './materials.js';
 import { Models } from './models.js';
+import { nodeName } from './names.js';
 import { LIGHT_PARTS, Reconciler, type Values } from './reconcile.js';
 
 /** What a replica tells those who draw the scene. */
@@ -44,8 +55,7 @@ export class Replica implements Values {
   readonly #removed = new Map<Object3D, Object3D>();
   /** The program's own objects that became nodes; they stay in its scene whatever the server says. */
   readonly #adopted = new Map<number, Object3D>();
-  /** Own objects that wait for the number of their node, in the order of their edits. */
-  readonly #adopting: { object: Object3D; resolve: (node: number) => void }[] = [];
+  readonly #additions: Additions;
   /** Materials of which it was said that they cannot show what edits set. */
   readonly #notPhysical = new Set<number>();
   #environment: Environment | undefined;
@@ -59,6 +69,7 @@ export class Replica implements Values {
     private readonly events: ReplicaEvents,
   ) {
     this.#root = gltf?.scene ?? scene;
+    this.#additions = new Additions(session);
     this.#models = new Models(this.content, urlOf, gltf);
     this.#animations = new Animations(this.content);
     const environment = (gltf?.scene.userData as Extras | undefined)?.lumencast?.environment;
@@ -75,10 +86,8 @@ export class Replica implements Values {
     this.#removed.clear();
     for (const object of this.#added.values()) this.#take(object);
     this.#added.clear();
-    for (const node of this.#adopted.keys()) {
-      if (edits.some((edit) => edit.edit === 'add_light' && edit.node === node)) continue;
-      this.#adopted.delete(node);
-      this.content.deleteNode(node);
+    for (const node of [...this.#adopted.keys()]) {
+      if (!edits.some((edit) => edit.edit === 'add_light' && edit.node === node)) this.disown(node);
     }
     for (const thing of this.#models.restart()) this.#reconciler.forget(`${thing}/`);
     this.#animations.restart();
@@ -90,35 +99,82 @@ export class Replica implements Values {
 
   /** Applies an edit that the server has accepted. */
   applyAccepted(edit: Edit, own: boolean): void {
-    const adopted = own && edit.edit === 'add_light' ? this.#adopting.shift() : undefined;
-    this.#applyStructure(edit, adopted?.object);
-    if (adopted && edit.edit === 'add_light' && edit.node !== undefined) adopted.resolve(edit.node);
+    const isOwnLight = own && edit.edit === 'add_light';
+    this.#applyStructure(edit, isOwnLight ? this.#additions.accepted(edit.node) : undefined);
     this.#reconciler.accept(edit);
     this.revision++;
   }
 
   /** Shows an edit at once and sends it; rejects, with the scene as before, when it is refused. */
-  async edit(edit: Edit): Promise<void> {
+  async edit(edit: Edit, options?: EditOptions): Promise<void> {
     const pending = this.#reconciler.begin(edit);
     this.revision++;
     try {
-      await this.session.edit(edit);
+      if (edit.edit === 'add_light') await this.#additions.send(edit, options);
+      else await this.session.edit(edit, options);
     } finally {
       pending.done();
       this.revision++;
     }
   }
 
-  /** Makes an object that the server does not know a light of its scene; resolves with its node. */
-  adoptLight(object: Object3D, light: Light, transform: Transform): Promise<number> {
-    return new Promise((resolve, reject) => {
-      const entry = { object, resolve };
-      this.#adopting.push(entry);
-      this.session.edit({ edit: 'add_light', light, transform }).catch((error: unknown) => {
-        this.#adopting.splice(this.#adopting.indexOf(entry), 1);
-        reject(error as Error);
-      });
-    });
+  /**
+   * Makes an object that the server does not know a light of its scene, for as long as somebody edits it.
+   * Resolves with its node; with `undefined` where that came as part of a snapshot.
+   */
+  adoptLight(object: PunctualLight, transform: Transform): Promise<number | undefined> {
+    const name = nodeName(object);
+    const light = describeLight(object);
+    const edit = { edit: 'add_light', ...(name && { name }), light, transform } as const;
+    return this.#additions.send(edit, { temporary: true }, object);
+  }
+
+  /** A node that an edit has added for a light like this one of the program's, by its name. */
+  findAdded(light: PunctualLight): number | undefined {
+    const name = nodeName(light);
+    const isFor = (object: Object3D) =>
+      object.name === name &&
+      object.parent === this.#root &&
+      isPunctualLight(object) &&
+      canBecome(object, light);
+    return [...this.#added].find(([, object]) => name !== undefined && isFor(object))?.[0];
+  }
+
+  /** Lets a light of the program's own stand for an added node, in the place of the one that does. */
+  takeOver(node: number, light: PunctualLight): void {
+    const former = this.#added.get(node);
+    if (!former) return;
+    const below = former.children.filter((child) => this.content.nodeOf(child) !== node);
+    if (below.length > 0) light.add(...below);
+    this.#added.delete(node);
+    this.content.deleteNode(node);
+    former.removeFromParent();
+    this.events.removed(former);
+    this.#adopt(node, light);
+    this.revision++;
+  }
+
+  /** Leaves a light that was the program's own to it: it stays where it is and stands for no node. */
+  disown(node: number): void {
+    const object = this.#adopted.get(node);
+    if (!this.#adopted.delete(node)) return;
+    for (const below of this.#added.values()) if (below.parent === object) this.#take(below);
+    this.#forget(node);
+  }
+
+  /** Another run of the server numbers nodes anew. */
+  forgetAdopted(): void {
+    for (const node of [...this.#adopted.keys()]) this.disown(node);
+  }
+
+  /** Whether an object is there, or below one that is, because of an edit. */
+  isAdded(object: Object3D): boolean {
+    for (let node = this.content.nodeOf(object); node !== undefined;) {
+      if (this.#added.has(node)) return true;
+      const above = this.content.object(node)?.parent;
+      node = above ? this.content.nodeOf(above) : undefined;
+    }
+    return false;
   }
 
   /** Lets objects of the program's own scene stand for nodes, as they now are on the server. */
@@ -224,13 +280,13 @@ export class Replica implements Values {
     switch (edit.edit) {
       case 'add_instance': {
         const group = new Group();
-        this.#insert(group, edit.node, edit.parent, edit.transform);
+        this.#insert(group, edit);
         void this.#fillInstance(group, edit);
         return;
       }
       case 'add_light': {
         const own = adopted ?? (edit.node === undefined ? undefined : this.#adopted.get(edit.node));
-        if (own === undefined) this.#insert(createLight(edit.light), edit.node, edit.parent, edit.transform);
+        if (own === undefined) this.#insert(createLight(edit.light), edit);
         else if (edit.node !== undefined) this.#adopt(edit.node, own);
         return;
       }
@@ -245,12 +301,8 @@ export class Replica implements Values {
     this.events.added(object);
   }
 
-  #insert(
-    object: Object3D,
-    node: number | undefined,
-    parent: number | undefined,
-    transform: Transform = {},
-  ): void {
+  #insert(object: Object3D, { node, name = '', parent, transform = {} }: AddedNode): void {
+    object.name = name;
     for (const [part, value] of Object.entries(transform)) setNodePart(object, part, value as number[]);
     const above = parent === undefined ? this.#root : this.content.object(parent);
     if (node === undefined || above === undefined) return;
@@ -275,6 +327,7 @@ export class Replica implements Values {
   }
 
   #removeNode(node: number): void {
+    if (this.#adopted.has(node)) return this.disown(node);
     const object = this.content.object(node);
     const parent = object?.parent;
     if (!object || !parent) return;
@@ -294,11 +347,17 @@ export class Replica implements Values {
   /** Forgets the nodes that an object and all below it stand for. */
   #forgetBelow(object: Object3D): void {
     for (const node of this.content.nodesBelow(object)) {
-      this.content.deleteNode(node);
+      // The program may have its own light below it, which is nobody's child for the server.
+      if (this.#adopted.has(node)) continue;
       this.#added.delete(node);
-      this.#reconciler.forget(`node/${node}/`);
-      this.#reconciler.forget(`light/${node}/`);
+      this.#forget(node);
     }
+  }
+
+  #forget(node: number): void {
+    this.content.deleteNode(node);
+    this.#reconciler.forget(`node/${node}/`);
+    this.#reconciler.forget(`light/${node}/`);
   }
 }
 

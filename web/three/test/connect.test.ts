@@ -96,7 +96,9 @@ describe('connect', () => {
     for (const object of [wall, stray, plant]) light.follow(object);
     light.update(camera, 100);
     expect(onWarning).not.toHaveBeenCalled();
-    net.link.deliver('catalog', new FakeServer().catalog);
+    const server = new FakeServer();
+    net.link.deliver('catalog', server.catalog);
+    net.link.tick(server);
     await vi.waitFor(() => expect(light.content.object(0)).toBe(wall));
     expect(asked).toEqual(['http://localhost:4443/scene/test.glb']);
     await vi.waitFor(() => expect(onWarning).toHaveBeenCalledTimes(1));
@@ -105,7 +107,7 @@ describe('connect', () => {
     expect(onWarning.mock.lastCall![0]).toContain('stray is no light of the server');
     expect(net.link.edits.map(({ edit }) => edit)).toMatchObject([
       { edit: 'move_node', node: 0 },
-      { edit: 'add_light', light: { type: 'point' } },
+      { edit: 'add_light', name: 'stray', light: { type: 'point' } },
     ]);
     light.dispose();
   });

@@ -183,6 +183,7 @@ describe('follow', () => {
     lamp.position.set(0, 2, 0);
     lamp.target.position.set(0, 2, 5);
     scene.add(lamp, lamp.target);
+    session.tell('snapshot', []);
     light.follow(lamp);
     light.update(camera, 100);
     light.update(camera, 200);
@@ -228,6 +229,7 @@ describe('follow', () => {
     lamp.name = 'torch';
     mesh.add(lamp);
     light.setNode(new Group().add(mesh), 3);
+    session.tell('snapshot', []);
     light.follow(lamp);
     light.update(camera, 100);
     expect(edits()).toMatchObject([{ edit: 'add_light' }]);

@@ -139,10 +139,18 @@ describe('Replica', () => {
     const { gltf } = file();
     const replica = replicaOf(gltf);
     const own = new PointLight();
-    const node = replica.adoptLight(own, { type: 'point' }, {});
-    replica.applyAccepted({ edit: 'add_light', node: 5, light: { type: 'point' } }, false);
-    replica.applyAccepted({ edit: 'add_light', node: 6, light: { type: 'point' } }, true);
-    expect(await node).toBe(6);
+    const edited = replica.edit({ edit: 'add_light', light: { type: 'point' } });
+    const adopted = replica.adoptLight(own, {});
+    for (const [node, isOwn] of [
+      [4, true],
+      [5, false],
+      [6, true],
+    ] as const)
+      replica.applyAccepted({ edit: 'add_light', node, light: { type: 'point' } }, isOwn);
+    for (const { accept } of sent) accept();
+    await edited;
+    expect(await adopted).toBe(6);
+    expect(replica.content.object(4)).not.toBe(own);
     expect(replica.content.object(6)).toBe(own);
     expect(replica.content.object(5)).not.toBe(own);
     // It outlives a snapshot that knows it, and is forgotten by one that does not.

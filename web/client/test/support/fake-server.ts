@@ -111,11 +111,11 @@ export class FakeServer {
     return this.clock + tick * TICK;
   }
 
-  /** One tick: its state frame and the probe frames of every region. */
-  step(): { state: Uint8Array; probes: SentFrame[] } {
+  /** One tick: its state frame, every 64th a snapshot, and the probe frames of every region. */
+  step(isSnapshot = (this.tick + 1) % 64 === 0): { state: Uint8Array; probes: SentFrame[] } {
     this.tick++;
     const state = {
-      ...(this.tick % 64 === 0 ? { snapshot: [...this.scene.values()], acks: this.acks } : {}),
+      ...(isSnapshot ? { snapshot: [...this.scene.values()], acks: this.acks } : {}),
       ...(this.accepted.length ? { edits: this.accepted } : {}),
       ...(this.refused.length ? { refused: this.refused } : {}),
       tick: this.tick,
