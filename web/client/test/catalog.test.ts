@@ -107,6 +107,15 @@ describe('a catalog', () => {
       expect(parseCatalog(catalog(change)).fields).toEqual(parseCatalog(catalog()).fields));
   }
 
+  it('is read where a member is nested deeper than a stack', () => {
+    const text = new TextDecoder().decode(catalog());
+    const deep = '['.repeat(1e5) + ']'.repeat(1e5);
+    const read = (from: string, to: string) => parseCatalog(new TextEncoder().encode(text.replace(from, to)));
+    const version = expect.objectContaining({ kind: 'version' });
+    expect(() => read('"lumencast":1', `"lumencast":${deep}`)).toThrow(version);
+    expect(read('"use":"all"', `"use":${deep}`).fields).toEqual([]);
+  });
+
   it('of too many probes over all fields is refused', () => {
     const regions: unknown[] = [];
     for (let x = 0; x < 4; x++) {

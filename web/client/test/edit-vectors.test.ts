@@ -45,6 +45,12 @@ describe('vectors/edits.json', () => {
     expect(parseEdit({ edit: 'add_instance', name, source: { mesh: 0 } })).toBeUndefined();
   });
 
+  it('passes over what is nested deeper than a stack', () => {
+    const deep: unknown = JSON.parse('['.repeat(1e5) + ']'.repeat(1e5));
+    expect(parseEdit({ edit: 'add_light', light: { type: deep } })).toBeUndefined();
+    expect(parseEdit({ edit: 'set_environment', environment: { type: deep } })).toBeUndefined();
+  });
+
   it('leaves out members that it does not know', () => {
     const edit = { edit: 'remove_node', node: 3, later: true };
     expect(parseEdit(edit)).toEqual({ edit: 'remove_node', node: 3 });

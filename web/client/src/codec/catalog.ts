@@ -8,6 +8,7 @@ import {
   number,
   object,
   parseObject,
+  shown,
   single,
   text,
   usable,
@@ -123,7 +124,7 @@ export function parseCatalog(bytes: Uint8Array): Catalog {
   if (json.lumencast !== WIRE_VERSION) {
     throw new WireError(
       'version',
-      `the server speaks version ${JSON.stringify(json.lumencast)} of the wire format, this client version ${WIRE_VERSION}`,
+      `the server speaks version ${shown(json.lumencast)} of the wire format, this client version ${WIRE_VERSION}`,
     );
   }
   const epoch = parseEpoch(json.epoch);
@@ -152,7 +153,7 @@ function parseField(json: Json): Field {
   const id = whole(json.id, 'field.id', 0xffff_ffff);
   const grid = parseGrid(object(json.grid, 'grid'));
   const use = USES.find((use) => use === json.use);
-  if (!use) throw new WireError('malformed', `use of field ${id} is ${JSON.stringify(json.use)}`);
+  if (!use) throw new WireError('malformed', `use of field ${id} is ${shown(json.use)}`);
   const scale = usable(() => 2 ** whole(json.scale_log2, 'scale_log2', 127, -128));
   const source = usable(() => label(json.source, 'source', LIMITS.sourceBytes));
   return {

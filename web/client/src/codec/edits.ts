@@ -9,7 +9,19 @@ import type {
   Vec3,
 } from '../edit.js';
 import { WireError } from '../wire-error.js';
-import { isObject, type Json, label, object, single, text, usable, vec3, vec4, whole } from './json.js';
+import {
+  isObject,
+  type Json,
+  label,
+  object,
+  shown,
+  single,
+  text,
+  usable,
+  vec3,
+  vec4,
+  whole,
+} from './json.js';
 import { LIMITS } from './limits.js';
 
 /** Reads one member, or throws a {@link WireError}. */
@@ -62,7 +74,7 @@ const light: Read<Light> = (value, what) => {
         ...parts,
       };
     default:
-      throw new WireError('malformed', `a light of type ${JSON.stringify(json.type)}`);
+      throw new WireError('malformed', `a light of type ${shown(json.type)}`);
   }
 };
 
@@ -91,7 +103,7 @@ const environment: Read<Environment> = (value, what) => {
         ...some(json, { intensity: real, rotation: real }),
       };
     default:
-      throw new WireError('malformed', `an environment of type ${JSON.stringify(json.type)}`);
+      throw new WireError('malformed', `an environment of type ${shown(json.type)}`);
   }
 };
 

@@ -20,6 +20,12 @@ export function parseObject(bytes: Uint8Array, what: string): Json {
   return value;
 }
 
+/** How a message shows a value of any kind, which may be long, or deeper than a stack is. */
+export function shown(value: unknown): string {
+  if (typeof value === 'object' && value !== null) return Array.isArray(value) ? 'a list' : 'an object';
+  return typeof value === 'string' ? JSON.stringify(value.slice(0, 64)) : String(value);
+}
+
 export function isObject(value: unknown): value is Json {
   return typeof value === 'object' && value !== null && !Array.isArray(value);
 }

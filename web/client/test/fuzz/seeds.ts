@@ -1,0 +1,71 @@
+/** Sound bytes from which mutations start: the repository's vectors. The twin of `fuzz/src/seeds.rs`. */
+import { layerOf, splitProbeFrame } from '../../src/codec/probe-header.js';
+import type { Vec3 } from '../../src/edit.js';
+import { json } from '../support/fake-server.js';
+import { join, varint } from '../support/probe-encoder.js';
+import { bytesOf, readVectors } from '../support/vectors.js';
+
+/** Probe frames of one region, one after the other. */
+interface Sequence {
+  readonly size: Vec3;
+  readonly order: number;
+  readonly frames: readonly Uint8Array[];
+}
+
+interface CodecVectors {
+  sequences: { size: Vec3; order: number; frames: { bytes: string }[] }[];
+}
+
+const sequences: readonly Sequence[] = readVectors<CodecVectors>('codec').sequences.map(
+  ({ size, order, frames }) => ({ size, order, frames: frames.map(({ bytes }) => bytesOf(bytes)) }),
+);
+const { frames: cases } = readVectors<{ frames: { track: 'catalog' | 'state'; frame: unknown }[] }>('frames');
+const { edits } = readVectors<{ edits: { json: unknown }[] }>('edits');
+
+export const probeFrames: readonly Uint8Array[] = sequences.flatMap(({ frames }) => frames);
+
+export const catalogs = framesOf('catalog');
+export const states = framesOf('state');
+
+/** Edits as clients send them. */
+export const clientEdits: readonly Uint8Array[] = edits.map((edit, number) =>
+  json({ seq: number + 1, edit: edit.json }),
+);
+
+/** All that a client reads of a server: catalog, state and light. */
+export const streams: readonly Uint8Array[] = sequences.map((sequence, number) => {
+  const frames = sequence.frames.flatMap((frame, i) => [
+    packed('s', states[(13 * number + i) % states.length]),
+    packed(layerOf(splitProbeFrame(frame).header.update), frame),
+  ]);
+  return join(packed('c', catalogOf(sequence)), ...frames);
+});
+
+/** Saved light fields. */
+export const lightFiles: readonly Uint8Array[] = sequences.map((sequence) => {
+  const record = (...parts: (Uint8Array | number[])[]) => join(varint(join(...parts).length), ...parts);
+  const keyframe = record(varint(0), varint(0), sequence.frames[0]);
+  return join(Buffer.from('LUMENCST'), [1], record(catalogOf(sequence)), keyframe);
+});
+
+/**
+ * A frame of a stream: its track (`c`atalog, `s`tate, or the number of a layer), its length in two bytes,
+ * and what it holds.
+ */
+function packed(track: 'c' | 's' | number, frame: Uint8Array): Uint8Array {
+  const first = typeof track === 'number' ? track : track.charCodeAt(0);
+  return join([first, frame.length & 0xff, frame.length >> 8], frame);
+}
+
+function framesOf(track: 'catalog' | 'state'): readonly Uint8Array[] {
+  return cases.filter((entry) => entry.track === track).map(({ frame }) => json(frame));
+}
+
+/** What a server says that has one region of light. */
+function catalogOf({ size, order }: Sequence): Uint8Array {
+  const grid = { center: [0, 0, 0], rotation: [0, 0, 0, 1], size, resolution: size };
+  const regions = [{ id: 0, min: [0, 0, 0], size }];
+  const field = { id: 0, kind: 'volume', basis: 'sh', order, use: 'all', grid, regions, layers: 3 };
+  const scene = { name: 'fuzz', root: 'fuzz.glb' };
+  return json({ lumencast: 1, epoch: '0000000000000001', scene, tick_seconds: 0.04, fields: [field] });
+}
