@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::path::{Component, Path, PathBuf};
 
-use lumencast_transport::Fetch;
+use lumencast_transport::{Fetch, take_scene};
 use serde::Deserialize;
 use tempfile::TempDir;
 use url::Url;
@@ -114,8 +114,7 @@ pub async fn download(
 /// proxy has the server under `base`.
 fn beside(scene: &str, path: &str) -> Result<Url, url::ParseError> {
     let mut base = Url::parse(scene)?;
-    let trimmed = base.path().trim_end_matches('/').to_owned();
-    base.set_path(&trimmed);
+    take_scene(&mut base);
     base.join(path)
 }
 

@@ -96,6 +96,17 @@ pub enum Edit {
     },
 }
 
+impl Edit {
+    /// The file that it names, as it writes it.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::AddInstance { source: InstanceSource::File(uri), .. }
+            | Self::SetEnvironment { environment: Environment::Image { uri, .. } } => Some(uri),
+            _ => None,
+        }
+    }
+}
+
 /// The name of a node that an edit adds: 1 to 64 bytes of text without control characters.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]

@@ -58,10 +58,6 @@ impl Taken {
             Some((_, limit, what)) => Err(Fault::TooLarge { what: what.into(), limit }),
         }
     }
-
-    pub(crate) fn is_within_limits(self) -> bool {
-        self.check().is_ok()
-    }
 }
 
 #[cfg(test)]

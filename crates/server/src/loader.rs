@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::{io, thread};
 
-use lumencast_scene::{Edit, Environment, FileRead, FileToRead, InstanceSource};
+use lumencast_scene::{Edit, FileRead, FileToRead};
 
 use crate::tick::Tick;
 
@@ -46,7 +46,7 @@ impl Loader {
 
     /// Whether an edit can be applied without reading anything. If not, its file will be read.
     pub(crate) fn is_ready(&mut self, tick: &Tick, edit: &Edit) -> bool {
-        let Some(uri) = file_of(edit) else { return true };
+        let Some(uri) = edit.file() else { return true };
         if self.awaited.contains_key(uri) {
             return false;
         }
@@ -59,22 +59,13 @@ impl Loader {
     }
 }
 
-/// The file that an edit names.
-fn file_of(edit: &Edit) -> Option<&str> {
-    match edit {
-        Edit::AddInstance { source: InstanceSource::File(uri), .. }
-        | Edit::SetEnvironment { environment: Environment::Image { uri, .. } } => Some(uri),
-        _ => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::time::{Duration, Instant};
 
     use lumencast_codec::Epoch;
     use lumencast_gather::path_trace::{CpuPathTracer, Options};
-    use lumencast_scene::{Scene, Transform};
+    use lumencast_scene::{InstanceSource, Scene, Transform};
 
     use super::*;
     use crate::tick::TickOptions;

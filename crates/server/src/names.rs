@@ -83,7 +83,7 @@ impl<B> Names<B> {
     /// Gives the name to the session, whose edits are to be read then; or lets it wait for the name, and
     /// returns nothing.
     pub(crate) fn claim(&mut self, claim: Claim<B>, now: f64) -> Option<Claim<B>> {
-        if self.is_free(&claim, now) {
+        if self.is_free(&claim, self.has_room(), now) {
             let ClientName { name, key } = claim.client.clone();
             let holder = Holder { session: claim.session, key, left: None, told: false };
             self.holders.insert(name, holder);
@@ -93,14 +93,18 @@ impl<B> Names<B> {
         None
     }
 
-    fn is_free(&self, claim: &Claim<B>, now: f64) -> bool {
+    fn has_room(&self) -> bool {
+        self.holders.values().filter(|holder| holder.left.is_none()).count() < MAX_CLIENTS
+    }
+
+    fn is_free(&self, claim: &Claim<B>, has_room: bool, now: f64) -> bool {
         let ClientName { name, key } = &claim.client;
         match self.holders.get(name) {
             Some(holder) if holder.left.is_some_and(|left| now - left >= KEPT_FOR) => true,
             Some(holder) => {
                 holder.session == claim.session || (!key.is_empty() && holder.key == *key)
             }
-            None => self.holders.values().filter(|h| h.left.is_none()).count() < MAX_CLIENTS,
+            None => has_room,
         }
     }
 
@@ -135,7 +139,8 @@ impl<B> Names<B> {
     /// One of those who wait, if there is a name for it.
     pub(crate) fn next(&mut self, now: f64) -> Option<Claim<B>> {
         self.holders.retain(|_, holder| holder.left.is_none_or(|left| now - left < KEPT_FOR));
-        let place = self.waiting.iter().position(|claim| self.is_free(claim, now))?;
+        let has_room = self.has_room();
+        let place = self.waiting.iter().position(|claim| self.is_free(claim, has_room, now))?;
         let claim = self.waiting.remove(place)?;
         self.claim(claim, now)
     }

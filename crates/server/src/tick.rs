@@ -11,9 +11,7 @@ use lumencast_codec::{
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::{Gather, Ticket};
 use lumencast_light::{LightField, Offset, ProbeVolume};
-use lumencast_scene::{
-    Edit, Environment, FileRead, InstanceSource, Scene, Script, Snapshot, VolumeSpec,
-};
+use lumencast_scene::{Edit, FileRead, Scene, Script, Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
 use crate::field::{Brought, Field, publish};
@@ -445,7 +443,8 @@ impl Tick {
         report.buried = buried as u64;
         report.scene_version = scene.version;
         report.scene_time = scene.time;
-        report.files_changed = edits.accepted.iter().any(|accepted| brings_files(&accepted.edit));
+        // Clients ask for files then that they did not need before.
+        report.files_changed = edits.accepted.iter().any(|accepted| accepted.edit.file().is_some());
         report.late = self.budget.record(report.stage(Stage::Gather), report.total_seconds());
         if report.late {
             tracing::debug!(tick = self.number, seconds = report.total_seconds(), "late");
@@ -511,13 +510,4 @@ struct Edits {
     accepted: Vec<AcceptedEdit>,
     refused: Vec<RefusedEdit>,
     acks: BTreeMap<String, u64>,
-}
-
-/// Whether an edit makes clients ask for files that they did not need before.
-fn brings_files(edit: &Edit) -> bool {
-    matches!(
-        edit,
-        Edit::AddInstance { source: InstanceSource::File(_), .. }
-            | Edit::SetEnvironment { environment: Environment::Image { .. } }
-    )
 }

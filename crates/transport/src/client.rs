@@ -208,7 +208,7 @@ impl Address {
 
 /// Takes the scene off an address `…/base/scene`, so that `…/base/` is left; names of scenes have one
 /// part. It may be empty.
-fn take_scene(url: &mut Url) -> String {
+pub fn take_scene(url: &mut Url) -> String {
     let path = url.path().trim_end_matches('/').to_owned();
     let (base, scene) = path.rsplit_once('/').unwrap_or_default();
     url.set_path(&format!("{base}/"));

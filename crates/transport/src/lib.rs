@@ -61,7 +61,7 @@ use std::time::Duration;
 
 pub use access::{Access, Key};
 pub use broadcast::{Broadcast, TrackWriter};
-pub use client::{Client, ConnectOptions, ConnectionState, Transport};
+pub use client::{Client, ConnectOptions, ConnectionState, Transport, take_scene};
 pub use error::{Error, Result};
 pub use fetch::{Fetch, Fetched};
 pub use progress::Patience;

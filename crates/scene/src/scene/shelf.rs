@@ -124,12 +124,11 @@ struct Failure {
 impl Shelf {
     /// Keeps a file for as long as it fits beside the `used` of the limits, the newest in any case.
     fn keep(&mut self, name: String, contents: Contents, taken: Taken, used: Taken) {
-        let total = |unused: &VecDeque<(_, _, Taken)>| {
-            unused.iter().fold(used + taken, |sum, (_, _, taken)| sum + *taken)
+        let fits = |unused: &VecDeque<(_, _, Taken)>| {
+            let unused: Taken = unused.iter().map(|(.., taken)| *taken).sum();
+            (used + taken + unused).check().is_ok()
         };
-        while self.unused.len() >= UNUSED
-            || (!self.unused.is_empty() && !total(&self.unused).is_within_limits())
-        {
+        while self.unused.len() >= UNUSED || (!self.unused.is_empty() && !fits(&self.unused)) {
             self.unused.pop_front();
         }
         self.unused.push_back((name, contents, taken));
