@@ -39,10 +39,24 @@ pub(crate) struct SceneSource {
 impl SceneSource {
     /// The scene, with what there is to be said of it said.
     pub(crate) fn open(&self) -> Result<Scene> {
+        self.open_edited(&[])
+    }
+
+    /// The scene as edits leave it that came with its light. An environment given here takes the place
+    /// of the light's.
+    pub(crate) fn open_edited(&self, edits: &[Edit]) -> Result<Scene> {
         let spinner = output::spinner(format!("Loading {}", self.scene));
         let scene = self.load();
         spinner.finish_and_clear();
-        let scene = scene?;
+        let mut scene = scene?;
+        for edit in edits {
+            if self.environment.is_some() && matches!(edit, Edit::SetEnvironment { .. }) {
+                continue;
+            }
+            if let Err(error) = scene.replay(edit) {
+                tell!("warning: the scene is not all that its light is of: {error}");
+            }
+        }
         warnings::left_out(&scene);
         warnings::dark(&scene);
         Ok(scene)

@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
-use lumencast_codec::{Epoch, LightFile, SceneInfo, UpdateInfo};
+use lumencast_codec::{Epoch, LightFile, SavedFile, SceneInfo, UpdateInfo};
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::Levels;
+use lumencast_scene::{FileContents, Scene};
 use lumencast_server::Baked;
 use serde_json::json;
 
@@ -23,8 +24,9 @@ Examples:
   lumencast bake cornell -o cornell.light
   lumencast bake sponza.glb -o sponza.light --volume 20x12x14 --noise 0.25
 
-The file holds the same bytes as the keyframes of a server's broadcast (docs/wire.md); a client can
-start from it when there is no server. `lumencast inspect FILE` says what is in it.")]
+The file holds the light, in the same bytes as the keyframes of a server's broadcast (docs/wire.md),
+and the environment with its picture. A client can start from it when there is no server.
+`lumencast inspect FILE` says what is in it.")]
 pub(crate) struct Bake {
     #[command(flatten)]
     scene: SceneArguments,
@@ -69,7 +71,10 @@ impl Bake {
             ..UpdateInfo::default()
         };
         let source = format!("{}, baked, {samples} samples", source(&options));
-        let bytes = LightFile::of_volumes(Epoch(0), info, 1.0, &source, &light, at).write();
+        let mut file = LightFile::of_volumes(Epoch(0), info, 1.0, &source, &light, at);
+        file.edits = scene.edits_since_load();
+        file.files = named_files(&scene)?;
+        let bytes = file.write();
         out_file::write(&self.output, &bytes)?;
         let probes: usize = light.iter().map(|volume| volume.grid.probe_count()).sum();
         if self.json {
@@ -87,4 +92,16 @@ impl Bake {
         );
         Ok(())
     }
+}
+
+/// The environment's picture, which is no part of the scene's own file.
+fn named_files(scene: &Scene) -> Result<Vec<SavedFile>> {
+    let Some(picture) = scene.environment_file() else { return Ok(Vec::new()) };
+    let bytes = match &picture.contents {
+        FileContents::Path(path) => {
+            std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?
+        }
+        FileContents::Bytes(bytes) => bytes.to_vec(),
+    };
+    Ok(vec![SavedFile { name: picture.name, bytes }])
 }

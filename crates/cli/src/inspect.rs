@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use clap::Args;
 use glam::Vec3;
-use lumencast_codec::{Catalog, LightFile};
+use lumencast_codec::{Catalog, LightFile, SavedFile};
 use lumencast_light::ProbeVolume;
 use lumencast_scene::{MeshId, NodeInfo, Scene};
 use serde_json::{Value, json};
@@ -44,7 +44,7 @@ impl Inspect {
                 Ok((file, volumes))
             };
             let (file, volumes) = read().with_context(|| self.what.clone())?;
-            light_report(&file.catalog, &volumes, bytes.len() as u64)
+            saved_report(&file, &volumes, bytes.len() as u64)
         } else {
             scene_report(&mut Scene::open(&self.what)?)
         };
@@ -101,6 +101,15 @@ fn light_report(catalog: &Catalog, volumes: &[ProbeVolume], bytes: u64) -> Value
         "bytes": bytes,
         "fields": fields,
     })
+}
+
+/// A file's light, with what else it holds.
+fn saved_report(file: &LightFile, volumes: &[ProbeVolume], bytes: u64) -> Value {
+    let mut report = light_report(&file.catalog, volumes, bytes);
+    report["edits"] = file.edits.len().into();
+    let kept = |file: &SavedFile| json!({ "name": file.name, "bytes": file.bytes.len() });
+    report["files"] = file.files.iter().map(kept).collect();
+    report
 }
 
 /// A server's light, with its state and the lights of its scene.

@@ -9,31 +9,46 @@ use lumencast_codec::{Catalog, DecodeError, LightFile};
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::ProbeVolume;
-use lumencast_scene::{Scene, Snapshot, VolumeSpec};
+use lumencast_scene::{Edit, Scene, Snapshot, VolumeSpec};
 use lumencast_server::{Baked, Done, Effort};
 
 use crate::arguments::Reading;
-use crate::{
-    output::{self, tell},
-    remote,
-};
+use crate::output::{self, tell};
+use crate::remote::{self, Seen};
 
 /// Whether it is the address of a server's scene.
 pub(crate) fn is_address(what: &str) -> bool {
     what.starts_with("http://") || what.starts_with("https://")
 }
 
-/// The light of a file, or the newest of a server's scene: what it is of, and its volumes.
-pub(crate) fn light(what: &str) -> Result<(Catalog, Vec<ProbeVolume>)> {
+/// Light that was computed elsewhere.
+pub(crate) struct Found {
+    /// The file or address that it is from.
+    what: String,
+    catalog: Catalog,
+    /// Edits that turn the scene's file into the scene that the light is of, where they are known.
+    pub(crate) edits: Vec<Edit>,
+    pub(crate) volumes: Vec<ProbeVolume>,
+}
+
+impl Found {
+    /// Warns where it is another scene's light.
+    pub(crate) fn check_fits(&self, scene: &Scene) {
+        check_fits(&self.what, &self.catalog, scene);
+    }
+}
+
+/// The light of a file, or the newest of a server's scene.
+pub(crate) fn light(what: &str) -> Result<Found> {
     if is_address(what) {
-        let seen = remote::look(what)?;
-        return Ok((seen.catalog, seen.volumes));
+        let Seen { catalog, volumes, .. } = remote::look(what)?;
+        return Ok(Found { what: what.into(), catalog, edits: Vec::new(), volumes });
     }
     let bytes = std::fs::read(Path::new(what)).with_context(|| format!("cannot read {what}"))?;
     let read = || {
         let file = LightFile::read(&bytes)?;
         let volumes = file.volumes()?;
-        Ok((file.catalog, volumes))
+        Ok(Found { what: what.into(), catalog: file.catalog, edits: file.edits, volumes })
     };
     let read: Result<_, DecodeError> = read();
     read.with_context(|| format!("{what} is no light field"))

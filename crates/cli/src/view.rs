@@ -10,7 +10,7 @@ use lumencast_client::{Session, SessionOptions, download};
 use lumencast_gather::path_trace::Levels;
 use lumencast_light::LightField;
 use lumencast_picture::ToneMap;
-use lumencast_scene::Scene;
+use lumencast_scene::{Edit, Scene};
 use lumencast_server::{Server, ServerConfig};
 use lumencast_shade::Settings;
 use lumencast_window::{Controls, Live, Options, Still, World};
@@ -142,7 +142,11 @@ impl View {
 
     /// The scene, which the picture is not to be written over.
     fn scene(&self) -> Result<Scene> {
-        let scene = self.scene.source.open()?;
+        self.edited_scene(&[])
+    }
+
+    fn edited_scene(&self, edits: &[Edit]) -> Result<Scene> {
+        let scene = self.scene.source.open_edited(edits)?;
         let mut inputs = self.scene.source.files(&scene);
         let light = self.light.as_deref().filter(|light| !is_address(light));
         inputs.extend(light.map(PathBuf::from).into_iter().chain(self.tick.edits.clone()));
@@ -152,11 +156,11 @@ impl View {
 
     /// A scene under a saved field.
     fn saved(&self, file: &Path) -> Result<Box<dyn World>> {
-        let scene = self.scene()?;
         let name = file.display().to_string();
-        let (catalog, volumes) = light_source::light(&name)?;
-        light_source::check_fits(&name, &catalog, &scene);
-        Ok(Box::new(Still::new(scene, LightField::new(volumes), name)))
+        let light = light_source::light(&name)?;
+        let scene = self.edited_scene(&light.edits)?;
+        light.check_fits(&scene);
+        Ok(Box::new(Still::new(scene, LightField::new(light.volumes), name)))
     }
 
     /// A scene from here under a server's light.

@@ -103,6 +103,27 @@ fn files_are_served_under_what_the_scene_calls_them() {
     }
 }
 
+/// A `.light` file keeps the environment's picture, so that it is shown where there is no server.
+#[test]
+fn a_picture_of_the_environment_is_kept_with_the_light() {
+    let folder = Folder::new("files-environment");
+    let scene = scene(&folder, |_| {});
+    let picture =
+        b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x81\x40\x40\x40\x81";
+    std::fs::create_dir(folder.0.join("sky")).expect("a folder");
+    std::fs::write(folder.0.join("sky/clear day.hdr"), picture).expect("written");
+    let light = folder.0.join("a.light");
+    let light = light.to_str().expect("a name");
+    let volume = ["--volume", "1x1x1@0,1,0:2,2,2", "--samples", "1"];
+    let sky = ["--environment", "sky/./clear%20day.hdr"];
+    let ran = run(&[&["bake", &scene, "-o", light][..], &volume, &sky].concat());
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let report = run(&["inspect", light, "--json"]).json();
+    assert_eq!(report["files"], json!([{ "name": "sky/clear day.hdr", "bytes": picture.len() }]));
+    let words = run(&["inspect", light]).stdout;
+    assert!(words.contains("name sky/clear day.hdr"), "{words}");
+}
+
 /// Of two scenes that which the file names; of a node with instances each of them.
 #[test]
 fn inspect_counts_what_is_shown() {

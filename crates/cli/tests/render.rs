@@ -285,6 +285,28 @@ fn what_cannot_be_drawn_is_said() {
     assert!(!picture.exists());
 }
 
+/// A saved field brings the environment that it was computed under, unless another is given.
+#[test]
+fn saved_light_brings_its_environment() {
+    let folder = Folder::new("render-environment");
+    let [light, picture] = ["a.light", "a.exr"].map(|name| folder.0.join(name));
+    let volume = ["--volume", "1x1x1@0,1,0:2,2,2", "--samples", "1", "--environment", "3,2,1"];
+    let ran = run(&[&["bake", "cornell", "-o", text(&light)][..], &volume].concat());
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let inspected = run(&["inspect", text(&light), "--json"]).json();
+    assert_eq!((&inspected["edits"], &inspected["files"]), (&1.into(), &json!([])));
+    let sky = |more: &[&str]| {
+        let size = ["--size", "8x8", "--samples", "1", "--shadow-resolution", "64"];
+        let away = ["--exposure", "1", "--camera=0,9,9,0,20,20,0.7"];
+        let files = ["--light", text(&light), "-o", text(&picture)];
+        let ran = run(&[&["render", "cornell"][..], &size, &away, &files, more].concat());
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        linear(&picture).pixel(4, 4).expect("a pixel").to_array()
+    };
+    assert_eq!(sky(&[]), [3.0, 2.0, 1.0]);
+    assert_eq!(sky(&["--environment", "0.5,0.5,4"]), [0.5, 0.5, 4.0]);
+}
+
 /// Light of another scene that lies in the same place is told by its name; that a field is given says how
 /// light is computed.
 #[test]

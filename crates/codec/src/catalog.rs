@@ -183,7 +183,7 @@ impl Catalog {
         // The version comes first: of another version's catalog nothing else can be expected.
         match value.get("lumencast").and_then(Value::as_u64) {
             Some(VERSION) => {}
-            Some(other) => return Err(DecodeError::Version(other)),
+            Some(found) => return Err(DecodeError::Version { found, known: VERSION }),
             None => return Err(DecodeError::Malformed("no number under lumencast")),
         }
         let frame: Frame<Value> = json(serde_json::from_value(value))?;

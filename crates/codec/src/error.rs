@@ -10,8 +10,13 @@ pub enum DecodeError {
     #[error("the bytes end too early")]
     Truncated,
     /// Made by another version of the format.
-    #[error("version {0} of the format, this program reads version {known}", known = crate::VERSION)]
-    Version(u64),
+    #[error("version {found} of the format, this program reads version {known}")]
+    Version {
+        /// That version.
+        found: u64,
+        /// The version that this program reads.
+        known: u64,
+    },
     /// A limit of docs/wire.md is exceeded.
     #[error("{what}: {value} exceeds the limit of {limit}")]
     Limit {
@@ -47,7 +52,7 @@ impl DecodeError {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Truncated => "truncated",
-            Self::Version(_) => "version",
+            Self::Version { .. } => "version",
             Self::Limit { .. } => "limit",
             Self::Malformed(_) => "malformed",
             Self::Json(_) => "json",

@@ -3,22 +3,47 @@
 use std::collections::HashMap;
 
 use lumencast_light::ProbeVolume;
+use lumencast_scene::Edit;
 
 use crate::bytes::{Reader, put_varint};
+use crate::state::{read_edits, write_edits};
 use crate::{
     Catalog, DecodeError, Epoch, Field, ProbeDecoder, ProbeEncoder, ProbeHeader, SceneInfo,
-    UpdateInfo, Use, VERSION, limits,
+    UpdateInfo, Use, limits,
 };
 
 const MAGIC: &[u8; 8] = b"LUMENCST";
+/// Version of the file; that of what is in its records is the wire's.
+const VERSION: u8 = 2;
+
+/// What a record holds; those of other kinds are passed over.
+mod kind {
+    pub(super) const CATALOG: u64 = 0;
+    pub(super) const KEYFRAME: u64 = 1;
+    pub(super) const EDITS: u64 = 2;
+    pub(super) const FILE: u64 = 3;
+}
 
 /// A saved light field: a catalog and keyframes, the same bytes as on the wire.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightFile {
     /// What is in the file.
     pub catalog: Catalog,
+    /// Edits that turn the scene as it stands in its file into the scene that this light is of.
+    pub edits: Vec<Edit>,
+    /// Files that the edits name.
+    pub files: Vec<SavedFile>,
     /// Keyframes of regions; those of fields or regions that the catalog lacks are to be passed over.
     pub frames: Vec<SavedFrame>,
+}
+
+/// A file of the scene's folder, kept with the light.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SavedFile {
+    /// Its name relative to the scene's folder, with forward slashes; no URI.
+    pub name: String,
+    /// What is in it.
+    pub bytes: Vec<u8>,
 }
 
 /// A keyframe of a region.
@@ -67,26 +92,34 @@ impl LightFile {
                 bytes: frame.bytes,
             }));
         }
-        Self { catalog: Catalog { epoch, scene, tick_seconds, fields }, frames }
+        let catalog = Catalog { epoch, scene, tick_seconds, fields };
+        Self { catalog, edits: Vec::new(), files: Vec::new(), frames }
     }
 
     /// The file's bytes.
     pub fn write(&self) -> Vec<u8> {
         let mut out = MAGIC.to_vec();
-        out.push(VERSION as u8);
-        put_record(&mut out, &self.catalog.encode());
-        let mut record = Vec::new();
-        for frame in &self.frames {
-            record.clear();
-            put_varint(&mut record, frame.field.into());
-            put_varint(&mut record, frame.region.into());
-            record.extend_from_slice(&frame.bytes);
-            put_record(&mut out, &record);
+        out.push(VERSION);
+        put_record(&mut out, kind::CATALOG, &[&self.catalog.encode()]);
+        if !self.edits.is_empty() {
+            put_record(&mut out, kind::EDITS, &[&write_edits(&self.edits)]);
+        }
+        for SavedFile { name, bytes } in &self.files {
+            let mut head = Vec::new();
+            put_varint(&mut head, name.len() as u64);
+            put_record(&mut out, kind::FILE, &[&head, name.as_bytes(), bytes]);
+        }
+        for SavedFrame { field, region, bytes } in &self.frames {
+            let mut head = Vec::new();
+            put_varint(&mut head, (*field).into());
+            put_varint(&mut head, (*region).into());
+            put_record(&mut out, kind::KEYFRAME, &[&head, bytes]);
         }
         out
     }
 
-    /// Reads a file. Payloads of its frames are not decoded yet.
+    /// Reads a file. Payloads of its frames are not decoded yet. Records and edits that this program
+    /// does not know are left out.
     ///
     /// # Errors
     /// [`DecodeError`] when the bytes are no light file of this version.
@@ -103,21 +136,30 @@ impl LightFile {
         if reader.take(MAGIC.len())? != MAGIC {
             return Err(DecodeError::Malformed("not a light file"));
         }
-        let version = u64::from(reader.u8()?);
+        let version = reader.u8()?;
         if version != VERSION {
-            return Err(DecodeError::Version(version));
+            return Err(DecodeError::Version { found: version.into(), known: VERSION.into() });
         }
-        let catalog = Catalog::decode(record(&mut reader)?)?;
-        let mut frames = Vec::new();
+        let (kind::CATALOG, catalog) = record(&mut reader)? else {
+            return Err(DecodeError::Malformed("a light file without a catalog"));
+        };
+        let catalog = Catalog::decode(catalog.0)?;
+        let mut read = Self { catalog, edits: Vec::new(), files: Vec::new(), frames: Vec::new() };
         while !reader.0.is_empty() {
-            let mut entry = Reader(record(&mut reader)?);
-            let (field, region) = (number(&mut entry)?, number(&mut entry)?);
-            if ProbeHeader::read(entry.0)?.base.is_some() {
-                return Err(DecodeError::Malformed("a delta in a light file"));
+            let (kind, mut body) = record(&mut reader)?;
+            match kind {
+                kind::KEYFRAME => read.frames.push(SavedFrame::read(body)?),
+                kind::EDITS => read.edits = read_edits(body.0)?,
+                kind::FILE => {
+                    let length = usize::try_from(body.varint()?);
+                    let name = body.take(length.map_err(|_| DecodeError::Truncated)?)?;
+                    let name = str::from_utf8(name).map_err(|_| DecodeError::Malformed("name"))?;
+                    read.files.push(SavedFile { name: name.to_owned(), bytes: body.0.to_vec() });
+                }
+                _ => {}
             }
-            frames.push(SavedFrame { field, region, bytes: entry.0.to_vec() });
         }
-        Ok(Self { catalog, frames })
+        Ok(read)
     }
 
     /// Decodes the volumes; probes of regions that the file lacks are dark.
@@ -142,14 +184,32 @@ impl LightFile {
     }
 }
 
-fn put_record(out: &mut Vec<u8>, record: &[u8]) {
-    put_varint(out, record.len() as u64);
-    out.extend_from_slice(record);
+impl SavedFrame {
+    fn read(mut body: Reader<'_>) -> Result<Self, DecodeError> {
+        let (field, region) = (number(&mut body)?, number(&mut body)?);
+        if ProbeHeader::read(body.0)?.base.is_some() {
+            return Err(DecodeError::Malformed("a delta in a light file"));
+        }
+        Ok(Self { field, region, bytes: body.0.to_vec() })
+    }
 }
 
-fn record<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], DecodeError> {
+fn put_record(out: &mut Vec<u8>, kind: u64, parts: &[&[u8]]) {
+    let mut head = Vec::new();
+    put_varint(&mut head, kind);
+    let length = head.len() + parts.iter().map(|part| part.len()).sum::<usize>();
+    put_varint(out, length as u64);
+    out.extend_from_slice(&head);
+    for part in parts {
+        out.extend_from_slice(part);
+    }
+}
+
+/// The next record's kind and what is in it.
+fn record<'a>(reader: &mut Reader<'a>) -> Result<(u64, Reader<'a>), DecodeError> {
     let length = usize::try_from(reader.varint()?).map_err(|_| DecodeError::Truncated)?;
-    reader.take(length)
+    let mut body = Reader(reader.take(length)?);
+    Ok((body.varint()?, body))
 }
 
 fn number(reader: &mut Reader<'_>) -> Result<u32, DecodeError> {
@@ -208,6 +268,30 @@ mod tests {
     }
 
     #[test]
+    fn edits_and_their_files_are_kept_and_unknown_records_passed_over() {
+        let (_, mut file) = file();
+        let environment = lumencast_scene::Environment::clear_sky(1000.0);
+        file.edits = vec![Edit::SetEnvironment { environment }];
+        file.files = vec![SavedFile { name: "sky/a b.hdr".into(), bytes: vec![7; 300] }];
+        let mut bytes = file.write();
+        put_record(&mut bytes, 99, &[b"of a later version"]);
+        assert_eq!(LightFile::read(&bytes), Ok(file.clone()));
+
+        let mut edits = Vec::new();
+        put_record(&mut edits, kind::EDITS, &[br#"{"edits":[{"edit":"turn_to_gold"}, 7]}"#]);
+        let read = LightFile::read(&[&bytes[..], &edits].concat()).expect("a file");
+        assert_eq!(read.edits, []);
+
+        let mut nameless = bytes.clone();
+        put_record(&mut nameless, kind::FILE, &[&[2], b"\xff\xff", b"contents"]);
+        assert_eq!(LightFile::read(&nameless).map_err(|e| e.kind()), Err("malformed"));
+        let mut headless = MAGIC.to_vec();
+        headless.push(VERSION);
+        put_record(&mut headless, kind::FILE, &[&[1], b"a", b""]);
+        assert_eq!(LightFile::read(&headless).map_err(|e| e.kind()), Err("malformed"));
+    }
+
+    #[test]
     fn every_truncation_is_refused_or_lacks_frames() {
         let (_, file) = file();
         let bytes = file.write();
@@ -216,10 +300,10 @@ mod tests {
                 assert!(part.frames.len() < file.frames.len());
             }
         }
-        assert_eq!(LightFile::read(b"LUMENCST\x02").map_err(|e| e.kind()), Err("version"));
+        assert_eq!(LightFile::read(b"LUMENCST\x01").map_err(|e| e.kind()), Err("version"));
         assert_eq!(LightFile::read(b"GIF89a..\x01").map_err(|e| e.kind()), Err("malformed"));
         // A record that claims to be huge allocates nothing.
-        let mut claim = b"LUMENCST\x01".to_vec();
+        let mut claim = b"LUMENCST\x02".to_vec();
         put_varint(&mut claim, (1 << 53) - 1);
         assert_eq!(LightFile::read(&claim).map_err(|e| e.kind()), Err("truncated"));
     }

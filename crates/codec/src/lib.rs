@@ -17,7 +17,7 @@ mod state;
 
 pub use catalog::{Catalog, Epoch, Field, SceneInfo, Use};
 pub use error::DecodeError;
-pub use file::{LightFile, SavedFrame};
+pub use file::{LightFile, SavedFile, SavedFrame};
 pub use probe::{
     EncodedRegion, ProbeDecoder, ProbeEncoder, ProbeHeader, Region, RegionLight, UpdateInfo,
     regions,

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use lumencast_scene::Edit;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use crate::catalog::json;
+use crate::catalog::json as checked;
 use crate::{DecodeError, limits};
 
 /// What happened in a tick, and, now and then, what all ticks so far come to.
@@ -145,17 +145,14 @@ impl StateFrame {
     /// the tick, time, clock or version that can be used.
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         DecodeError::limit("bytes of a frame", bytes.len(), limits::FRAME_BYTES)?;
-        let frame: Read = json(serde_json::from_slice(bytes))?;
+        let frame: Read = checked(serde_json::from_slice(bytes))?;
         DecodeError::limit("edits in a frame", frame.edits.len(), limits::DELTA_EDITS)?;
         DecodeError::limit("refusals in a frame", frame.refused.len(), limits::DELTA_EDITS)?;
-        if let Some(edits) = &frame.snapshot {
-            DecodeError::limit("edits in a snapshot", edits.len(), limits::SNAPSHOT_EDITS)?;
-        }
         let measure = |value: &Value| value.as_f64().filter(|v| *v >= 0.0).unwrap_or(0.0);
-        let snapshot = frame.snapshot.map(|edits| SceneState {
-            edits: edits.into_iter().filter_map(known).collect(),
-            acks: acks(&frame.acks),
-        });
+        let snapshot = match frame.snapshot {
+            Some(edits) => Some(SceneState { edits: known_edits(edits)?, acks: acks(&frame.acks) }),
+            None => None,
+        };
         Ok(Self {
             tick: whole(&frame.tick).ok_or(DecodeError::Malformed("tick"))?,
             time: frame.time,
@@ -195,6 +192,26 @@ fn refused(entry: &Value) -> Option<RefusedEdit> {
         seq: whole(entry.get("seq")?)?,
         reason: text("reason")?,
     })
+}
+
+/// Edits that turn a scene's file into a scene, as JSON.
+pub(crate) fn write_edits(edits: &[Edit]) -> Vec<u8> {
+    serde_json::to_vec(&json!({ "edits": edits })).expect("edits have a JSON form")
+}
+
+/// The same, read; edits that this program does not know are left out.
+pub(crate) fn read_edits(bytes: &[u8]) -> Result<Vec<Edit>, DecodeError> {
+    DecodeError::limit("bytes of edits", bytes.len(), limits::FRAME_BYTES)?;
+    let mut value: Value = checked(serde_json::from_slice(bytes))?;
+    match value.get_mut("edits").map(Value::take) {
+        Some(Value::Array(edits)) => known_edits(edits),
+        _ => Err(DecodeError::Malformed("edits")),
+    }
+}
+
+fn known_edits(edits: Vec<Value>) -> Result<Vec<Edit>, DecodeError> {
+    DecodeError::limit("edits in a snapshot", edits.len(), limits::SNAPSHOT_EDITS)?;
+    Ok(edits.into_iter().filter_map(known).collect())
 }
 
 /// The edit, if this program knows it.
@@ -245,7 +262,7 @@ impl ClientEdit {
     pub fn decode(bytes: &[u8]) -> Result<Self, (Option<u64>, DecodeError)> {
         DecodeError::limit("bytes of an edit", bytes.len(), limits::EDIT_BYTES)
             .map_err(|error| (None, error))?;
-        let value: Value = json(serde_json::from_slice(bytes)).map_err(|error| (None, error))?;
+        let value: Value = checked(serde_json::from_slice(bytes)).map_err(|error| (None, error))?;
         let seq = value.get("seq").and_then(Value::as_u64);
         if let Some(seq) = seq.filter(|seq| *seq > limits::LARGEST_NUMBER) {
             let (what, limit) = ("sequence number", limits::LARGEST_NUMBER);
@@ -254,7 +271,7 @@ impl ClientEdit {
         if holds_more_than_32_bits(&value) {
             return Err((seq, DecodeError::Malformed("a number beyond 32 bits")));
         }
-        json(serde_json::from_value(value)).map_err(|error| (seq, error))
+        checked(serde_json::from_value(value)).map_err(|error| (seq, error))
     }
 }
 

@@ -186,6 +186,14 @@ export interface Timing {
   readonly bytes: number;
 }
 
+/** What a saved light field keeps of its scene beside the light. */
+export interface SavedScene {
+  /** Edits that turn the scene as it stands in its file into the scene that the light is of. */
+  readonly edits: readonly Edit[];
+  /** Files of the scene's folder that the edits name, by their names. */
+  readonly files: ReadonlyMap<string, Uint8Array>;
+}
+
 /** A connection to the light of one scene, or a saved light field that stands in for one. */
 export interface Session {
   /** The server's address, without a path. */
@@ -201,6 +209,8 @@ export interface Session {
   readonly ready: Promise<void>;
   /** What the server offers, until it has said so what a saved light field holds; else `undefined`. */
   readonly catalog: Catalog | undefined;
+  /** What a saved light field that the session started from says of the scene. */
+  readonly saved: SavedScene | undefined;
   readonly stats: SessionStats;
 
   /** Calls `listener` at each event of the kind; returns the function that ends this. */

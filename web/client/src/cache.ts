@@ -1,4 +1,4 @@
-import type { AcceptedEdit, FieldLight, LightState, RefusedEdit } from './api.js';
+import type { AcceptedEdit, FieldLight, LightState, RefusedEdit, SavedScene } from './api.js';
 import { ServerClock } from './cache/clock.js';
 import { FieldCache } from './cache/field.js';
 import { type PendingEdit, PendingEdits } from './cache/pending.js';
@@ -81,14 +81,27 @@ export class Cache {
     return false;
   }
 
-  /** Starts from a saved light field; a server's light takes its place when it comes. */
-  load(file: Uint8Array, now: number): void {
-    const { catalog, frames } = readLightFile(file);
-    this.setCatalog(catalog);
-    this.saved = true;
+  /**
+   * Starts from a saved light field; a server's light takes its place when it comes. Returns what the
+   * file says of the scene.
+   * @throws WireError when the bytes are none, Error once a server has been heard of; nothing has changed
+   * then.
+   */
+  load(file: Uint8Array, now: number): SavedScene {
+    if (this.current && !this.saved) throw new Error('light of a server is there already');
+    const { catalog, edits, files, frames } = readLightFile(file);
+    const loaded = new Cache(this.client);
+    loaded.setCatalog(catalog);
     for (const { field, region, frame } of frames) {
-      this.savedTime = this.addProbes(field, region, frame, now)?.header.time ?? this.savedTime;
+      loaded.savedTime = loaded.addProbes(field, region, frame, now)?.header.time ?? loaded.savedTime;
     }
+    this.current = catalog;
+    this.fields = loaded.fields;
+    this.leftover = [];
+    this.savedTime = loaded.savedTime;
+    this.saved = true;
+    this.happened.push(...loaded.happened);
+    return { edits, files };
   }
 
   private setCatalog(catalog: Catalog): void {
@@ -106,20 +119,29 @@ export class Cache {
         this.fields.set(field.id, same);
         old.delete(field.id);
       } else {
-        if (same && anew) this.leftover.push(same);
+        if (same && anew) this.leave(same);
         this.fields.set(field.id, new FieldCache(field, catalog.tickSeconds));
       }
     }
     if (restarted) {
       const gone = [...old.values()].filter(({ field }) => !this.fields.has(field.id));
-      for (const cache of gone) cache.forgetUpdates();
-      this.leftover.push(...gone);
+      for (const cache of gone) {
+        cache.forgetUpdates();
+        this.leave(cache);
+      }
       this.restart();
     }
     if (!before || restarted) this.clock = new ServerClock(catalog.tickSeconds);
     this.saved = false;
     this.current = catalog;
     this.happened.push({ kind: 'catalog', catalog, restarted });
+  }
+
+  /** Keeps showing a field's light; one field has one, however often its shape changes. */
+  private leave(cache: FieldCache): void {
+    if (!cache.lit) return;
+    this.leftover = this.leftover.filter(({ field }) => field.id !== cache.field.id);
+    this.leftover.push(cache);
   }
 
   /** Forgets what the catalog's old epoch numbered, but for the light. */

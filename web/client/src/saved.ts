@@ -1,6 +1,7 @@
 import {
   EditError,
   type LightState,
+  type SavedScene,
   type Session,
   type SessionEvents,
   type SessionStats,
@@ -72,6 +73,7 @@ class SavedSession implements Session {
   readonly ready = Promise.resolve();
   readonly stats = NO_STATS;
   readonly pending = [];
+  readonly saved: SavedScene;
   status: Status = { state: 'saved' };
   private readonly cache = new Cache('');
   private readonly emitter = new Emitter<SessionEvents>();
@@ -81,7 +83,7 @@ class SavedSession implements Session {
     // Blobs and data lie in no folder.
     this.files = URL.canParse('.', folder) ? new URL('.', folder).href : pageAddress();
     this.origin = folder.origin;
-    this.cache.load(bytes, performance.now() / 1000);
+    this.saved = this.cache.load(bytes, performance.now() / 1000);
   }
 
   get scene(): string {

@@ -4,6 +4,7 @@ import {
   type EditOptions,
   type LightState,
   type Problem,
+  type SavedScene,
   type Session,
   type SessionEvents,
   type SessionStats,
@@ -88,6 +89,7 @@ class LiveSession implements Session, Sink {
   readonly scene: string;
   readonly client: string;
   readonly ready: Promise<void>;
+  readonly saved: SavedScene | undefined;
   private settleReady: { resolve: () => void; reject: (error: Error) => void } | undefined;
   private readonly cache: Cache;
   private readonly outbox: Outbox;
@@ -120,7 +122,7 @@ class LiveSession implements Session, Sink {
     // Who does not wait for it need not hear that it failed.
     this.ready.catch(() => {});
     if (options.saved) {
-      this.cache.load(options.saved, seconds());
+      this.saved = this.cache.load(options.saved, seconds());
       // Nobody listens yet; the catalog is there to be read.
       this.cache.events();
     }
@@ -392,14 +394,12 @@ class LiveSession implements Session, Sink {
 /** Waits for some seconds, or less when `signal` is aborted. */
 function pause(time: number, signal: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
-    const timer = setTimeout(resolve, 1000 * time);
-    signal.addEventListener(
-      'abort',
-      () => {
-        clearTimeout(timer);
-        resolve();
-      },
-      { once: true },
-    );
+    const end = () => {
+      clearTimeout(timer);
+      signal.removeEventListener('abort', end);
+      resolve();
+    };
+    const timer = setTimeout(end, 1000 * time);
+    signal.addEventListener('abort', end);
   });
 }

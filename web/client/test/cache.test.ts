@@ -4,7 +4,8 @@ import { Cache, type CacheEvent } from '../src/cache.js';
 import type { Edit } from '../src/edit.js';
 import { WireError } from '../src/wire-error.js';
 import { FakeServer, json, type SentFrame, TICK } from './support/fake-server.js';
-import { lightFile } from './support/light-file.js';
+import { lightFile, record } from './support/light-file.js';
+import { join } from './support/probe-encoder.js';
 import { random } from './support/random.js';
 import { SimulatedLink } from './support/simulated-link.js';
 
@@ -468,5 +469,33 @@ describe('a saved light field', () => {
     const wrong = good.slice();
     wrong[0]++;
     expect(() => new Cache(ME).load(wrong, 0)).toThrow('not a light file');
+  });
+
+  it('changes nothing where it is damaged late, or comes late', () => {
+    const good = lightFile(new FakeServer({ brightness: () => 7, regions: 2 }));
+    const broken = good.slice();
+    broken.fill(0xff, broken.length - 8);
+    const cache = new Cache(ME);
+    expect(() => cache.load(broken, 0)).toThrow(WireError);
+    expect([cache.catalog, cache.light(0).fields, cache.events()]).toEqual([undefined, [], []]);
+    const server = new FakeServer({ brightness: () => 9 });
+    cache.addCatalog(server.catalog);
+    expect(() => cache.load(good, 0)).toThrow('light of a server');
+    feed(cache, server.step(), 0);
+    expect(shown(cache, 0)).toBeCloseTo(9, 2);
+  });
+
+  it('gives back what it keeps of its scene', () => {
+    const edit = { edit: 'set_environment', environment: { type: 'image', uri: 'sky/a%20b.hdr' } };
+    const edits = [{ edit: 'turn_to_gold' }, edit];
+    const file = lightFile(new FakeServer(), { edits, files: { 'sky/a b.hdr': new Uint8Array([1, 2]) } });
+    const later = join(file, record(99, [1, 2, 3]));
+    const kept = new Cache(ME).load(later, 0);
+    expect(kept.edits).toMatchObject([edit]);
+    expect([...kept.files]).toEqual([['sky/a b.hdr', new Uint8Array([1, 2])]]);
+    const nameless = join(file, record(3, [2, 0xff, 0xff]));
+    expect(() => new Cache(ME).load(nameless, 0)).toThrow('name of a file');
+    const headless = join(file.subarray(0, 9), record(3, [1, 97]));
+    expect(() => new Cache(ME).load(headless, 0)).toThrow('without a catalog');
   });
 });

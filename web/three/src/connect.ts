@@ -8,8 +8,9 @@ import {
 import type { Mesh, Scene } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { loadGltf } from './content.js';
+import { sceneFile } from './files.js';
 import { joined, reportLosses } from './joining.js';
-import { type AttachOptions, LumencastLight, type SceneEvent, sceneFile, warnInConsole } from './light.js';
+import { type AttachOptions, LumencastLight, type SceneEvent, warnInConsole } from './light.js';
 import { type NamedNode, readNames } from './names.js';
 import type { Platform } from './platform.js';
 

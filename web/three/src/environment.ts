@@ -45,7 +45,7 @@ async function environmentTexture(
     case 'sky':
       return skyTexture((up) => skyRadiance(environment, up));
     case 'image':
-      return imageTexture(urlOf(environment.uri));
+      return imageTexture(environment.uri, urlOf);
   }
 }
 
@@ -68,12 +68,12 @@ function skyTexture(radiance: (up: number) => Vec3): Texture {
   return equirectangular(texture);
 }
 
-async function imageTexture(url: string): Promise<Texture> {
-  const exr = url.toLowerCase().endsWith('.exr');
+async function imageTexture(uri: string, urlOf: (file: string) => string): Promise<Texture> {
+  const exr = uri.toLowerCase().endsWith('.exr');
   const Loader = exr
     ? (await import('three/addons/loaders/EXRLoader.js')).EXRLoader
     : (await import('three/addons/loaders/HDRLoader.js')).HDRLoader;
-  return equirectangular(await new Loader().loadAsync(url));
+  return equirectangular(await new Loader().loadAsync(urlOf(uri)));
 }
 
 function equirectangular<T extends Texture>(texture: T): T {

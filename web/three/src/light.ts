@@ -3,6 +3,7 @@ import { type Camera, type Light, type Object3D, type Scene, Vector3 } from 'thr
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import type { Content } from './content.js';
 import { expose, type SetWhileDrawn, whileDrawn } from './exposure.js';
+import { nameOf, SavedFiles, sceneFile } from './files.js';
 import { Following } from './following.js';
 import { ProbeGrids } from './grids.js';
 import { isPunctualLight } from './lights.js';
@@ -15,7 +16,8 @@ import { type ShadowOptions, Shadows } from './shadows.js';
 export type LightSession = Pick<
   Session,
   'files' | 'catalog' | 'status' | 'stats' | 'on' | 'edit' | 'light' | 'sceneTime' | 'setCamera' | 'close'
->;
+> &
+  Partial<Pick<Session, 'saved'>>;
 
 export interface AttachOptions {
   /** Where the light is shown. */
@@ -30,22 +32,6 @@ export interface AttachOptions {
 
 /** Which part of the light is drawn; emission and background are in all of them. */
 export type Shown = 'both' | 'direct' | 'indirect';
-
-/** The name of the file that a URI stands for; what is no sequence of UTF-8 stays as it is. */
-export function nameOf(uri: string): string {
-  return uri.replace(/(?:%[0-9a-f]{2})+/gi, (bytes) => {
-    try {
-      return decodeURIComponent(bytes);
-    } catch {
-      return bytes;
-    }
-  });
-}
-
-/** The address of a file of a session's scene, by its name. */
-export function sceneFile({ files }: Pick<LightSession, 'files'>, name: string): string {
-  return new URL(name.split('/').map(encodeURIComponent).join('/'), files).href;
-}
 
 /** Where warnings go unless a program takes them. */
 export function warnInConsole(message: string): void {
@@ -74,6 +60,7 @@ export class LumencastLight {
   readonly #shadows: Shadows | undefined;
   readonly #following: Following;
   readonly #unsubscribe: (() => void)[];
+  readonly #saved: SavedFiles;
   readonly #camera = new Vector3();
   readonly #warn: (message: string) => void;
   readonly #restoreHooks: () => void;
@@ -93,6 +80,7 @@ export class LumencastLight {
   ) {
     const { scene, gltf, shadows = {} } = options;
     this.#warn = options.onWarning ?? warnInConsole;
+    this.#saved = new SavedFiles(session);
     this.#grids = new ProbeGrids(scene, platform);
     this.#shadows = shadows === false ? undefined : new Shadows(shadows);
     this.#replica = new Replica(scene, gltf, session, (file) => this.urlOf(file), {
@@ -108,6 +96,7 @@ export class LumencastLight {
       session.on('snapshot', (snapshot) => this.#receive({ snapshot })),
       session.on('edit', (accepted) => this.#receive({ accepted })),
     ];
+    if (session.saved) this.#receive({ snapshot: session.saved.edits });
     for (const event of missed) this.#receive(event);
     if (session.catalog) this.#offered(session.catalog);
     if (names) void this.#following.match(names, scene);
@@ -199,7 +188,8 @@ export class LumencastLight {
 
   /** The address of a file of the scene, which edits name by its URI. */
   urlOf(uri: string): string {
-    return sceneFile(this.session, nameOf(uri));
+    const address = sceneFile(this.session, nameOf(uri));
+    return this.#saved.addressInstead(address) ?? address;
   }
 
   /**
@@ -210,6 +200,7 @@ export class LumencastLight {
     const ends = this.#following.clear();
     for (const unsubscribe of this.#unsubscribe) unsubscribe();
     this.#restoreHooks();
+    this.#saved.dispose();
     this.#grids.dispose();
     this.platform.unpatch(this.options.scene);
     const close = () => this.session.close();

@@ -209,6 +209,34 @@ describe('show', () => {
     light.dispose();
   });
 
+  it('shows the environment that the light keeps, and its picture', async () => {
+    const sky = { type: 'image' as const, uri: 'sky/./clear%20day.hdr', intensity: 2 };
+    const kept = { 'sky/clear day.hdr': tinyHdr() };
+    const edits = [{ edit: 'set_environment', environment: sky }];
+    const file = lightFile(new FakeServer(), { edits, files: kept });
+    const gltf = await load(ROOM);
+    vi.unstubAllGlobals();
+    vi.stubGlobal('ProgressEvent', class {});
+    const scene = new Scene().add(gltf.scene);
+    const onWarning = vi.fn();
+    const light = await showWith(platform, file, {
+      scene,
+      gltf,
+      onWarning,
+      file: 'http://host/shop/room.glb',
+    });
+    expect(light.environment).toEqual(sky);
+    const address = light.urlOf(sky.uri);
+    expect(address).toMatch(/^blob:/);
+    expect(new Uint8Array(await (await fetch(address)).arrayBuffer())).toEqual(tinyHdr());
+    expect(light.urlOf('other.hdr')).toBe('http://host/shop/other.hdr');
+    await vi.waitFor(() => expect(scene.background).not.toBeNull(), 30_000);
+    expect(scene.backgroundIntensity).toBe(2);
+    expect(onWarning).not.toHaveBeenCalled();
+    light.dispose();
+    await expect(fetch(address)).rejects.toThrow();
+  }, 60_000);
+
   it('names a file that is missing', async () => {
     vi.stubGlobal('fetch', () => Promise.resolve(new Response('', { status: 404 })));
     const scene = new Scene();
@@ -223,3 +251,9 @@ describe('show', () => {
     await expect(showWith(platform, saved, options)).rejects.toThrow('a web page was answered');
   });
 });
+
+/** An .hdr picture of 2 × 1 texels. */
+function tinyHdr(): Uint8Array {
+  const head = '#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n';
+  return new Uint8Array([...new TextEncoder().encode(head), 128, 128, 128, 129, 64, 64, 64, 129]);
+}

@@ -13,7 +13,7 @@ import { blankPadding, isHidden } from '../src/exported.js';
 import { loadGltf } from '../src/content.js';
 import { roughen } from '../src/glossiness.js';
 import { Replica } from '../src/replica.js';
-import { nameOf, sceneFile } from '../src/light.js';
+import { nameOf, sceneFile } from '../src/files.js';
 import { glbUrl, JOINTS, load, POSITION, WEIGHTS } from './support/glb.js';
 
 const session = { edit: () => Promise.resolve(), sceneTime: () => 0 };

@@ -31,7 +31,7 @@ export class Controls {
       { class: 'panel brand' },
       h('i', { class: 'dot' }),
       h('strong', {}, 'Lumencast'),
-      h('span', {}, viewer.options.isSaved ? `${session.scene} · saved light` : session.scene),
+      h('span', {}, viewer.isSaved ? `${session.scene} · saved light` : session.scene),
     );
     this.#dock = this.#createDock(gltf.cameras.map((camera, i) => camera.name || `Camera ${i + 1}`));
     this.#inspector = new Inspector({
@@ -72,7 +72,7 @@ export class Controls {
     dock.set('flashlight', viewer.flashlight.on);
     dock.set('playing', !viewer.playing);
     // Without a server, nothing moves and nobody computes another light's way.
-    const { isSaved } = viewer.options;
+    const { isSaved } = viewer;
     dock.hide('playing', isSaved || viewer.light.content.animations.size === 0);
     dock.hide('flashlight', isSaved);
     dock.set('stats', !this.#stats.element.hidden);
@@ -198,10 +198,9 @@ export class Controls {
   }
 
   #say(status: Status): void {
-    const { isSaved } = this.viewer.options;
-    this.#brand.dataset.state = isSaved ? 'saved' : status.state;
+    this.#brand.dataset.state = status.state;
     // While it connects, first or again, what was said stays.
-    if (status.state === 'connecting' || isSaved) return;
+    if (status.state === 'connecting') return;
     this.notices.standing(wordsFor(status, this.viewer.session.catalog !== undefined));
   }
 }

@@ -1,7 +1,7 @@
-import { connect, type ConnectOptions, type Session } from '@lumencast/client';
+import { connect, type ConnectOptions, fetchLight, openLight, type Session } from '@lumencast/client';
 import './style.css';
 import { openPage } from './page.js';
-import { Failure, missingFile } from './words.js';
+import { Failure } from './words.js';
 
 /** What the server says of itself, in `lumencast.json`. */
 interface Served {
@@ -26,7 +26,7 @@ void openPage(async () => {
   if (saved && gltf !== null) {
     const file = beside(gltf);
     const name = decodeURIComponent(file.pathname.split('/').at(-1) ?? '') || 'scene';
-    return { name, file: file.href, isSaved: true, connect: () => withFile(() => savedLight(name, saved)) };
+    return { name, file: file.href, connect: () => withFile(() => openLight(saved, { files: file })) };
   }
   const { broadcast, root } = await askServer();
   const address = beside(`./${encodeURIComponent(broadcast)}${location.search}`);
@@ -59,15 +59,14 @@ function isServed(value: unknown): value is Served {
   return typeof broadcast === 'string' && typeof root === 'string';
 }
 
-async function readLight({ href }: URL): Promise<Uint8Array> {
-  const response = await fetch(href).catch((error: unknown) => {
-    throw missingFile('The file of the light', href, 'nobody answers', error);
+async function readLight(address: URL): Promise<Uint8Array> {
+  return fetchLight(address).catch((cause: unknown) => {
+    throw new Failure(
+      `The file of the light does not come: ${(cause as Error).message}`,
+      'Is its name right, and is it where this address says?',
+      { cause },
+    );
   });
-  if (!response.ok) throw missingFile('The file of the light', href, String(response.status));
-  // Servers of single pages answer with their page where there is no file.
-  if (response.headers.get('content-type')?.startsWith('text/html'))
-    throw missingFile('The file of the light', href, '404');
-  return new Uint8Array(await response.arrayBuffer());
 }
 
 /** Makes a session, which reads the saved light if there is any. */
@@ -81,14 +80,6 @@ function withFile(session: () => Session): Session {
       { cause },
     );
   }
-}
-
-/** A session that asks no server. */
-function savedLight(scene: string, saved: Uint8Array): Session {
-  const connector = () => Promise.reject(new Error('there is none'));
-  const session = connect(location.origin, { scene, saved, connector });
-  session.close('this is saved light, without a server');
-  return session;
 }
 
 /** `?transport=websocket` and the like, for measurements and for networks that swallow UDP. */

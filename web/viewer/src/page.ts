@@ -10,8 +10,6 @@ export interface Source {
   readonly name: string;
   /** Address of its glTF file. */
   readonly file: string;
-  /** Saved light, without a server: nothing of it changes. */
-  readonly isSaved?: boolean;
   readonly connect: () => Session;
 }
 
@@ -41,7 +39,7 @@ export async function openPage(find: () => Promise<Source>): Promise<void> {
   const stage = h('main', { class: 'stage' }, canvas);
   document.body.replaceChildren(stage, curtain.element);
   try {
-    const { name, file, isSaved = false, connect } = await find();
+    const { name, file, connect } = await find();
     document.title = `${name} · Lumencast`;
     const query = new URLSearchParams(location.search);
     const pixelRatio = Number(query.get('scale')) || undefined;
@@ -51,7 +49,6 @@ export async function openPage(find: () => Promise<Source>): Promise<void> {
       canvas,
       renderer: query.get('renderer') === 'webgpu' ? 'webgpu' : 'webgl',
       file,
-      isSaved,
       connect,
       pixelRatio,
       onProgress: (loaded, total) => curtain.progress(name, loaded, total),

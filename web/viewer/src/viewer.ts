@@ -28,8 +28,6 @@ export interface ViewerOptions {
   readonly renderer: 'webgl' | 'webgpu';
   /** Address of the scene's glTF file. */
   readonly file: string;
-  /** Saved light, without a server. */
-  readonly isSaved: boolean;
   /** Makes the session, once the scene is loaded. */
   readonly connect: () => Session;
   /** Pixels a CSS pixel; adapts to the device's speed unless given. */
@@ -236,6 +234,11 @@ export class Viewer {
   #meterWhenLit(): void {
     if (!this.autoExposure || this.light.lightRevision === 0) return;
     if (METER_AT.includes(this.#litFrames++)) void this.meter();
+  }
+
+  /** Whether this is saved light, which no server stands behind. */
+  get isSaved(): boolean {
+    return this.session.status.state === 'saved';
   }
 
   stats(): Figures {

@@ -535,7 +535,7 @@ describe('a page without a server', () => {
         const node = light.content.nodeOf(viewer.lights[0])!;
         return light.edit({ edit: 'set_light', node, intensity: 1 }).catch((error: Error) => error.message);
       });
-      expect(refused).toContain('without a server');
+      expect(refused).toContain('there is no server');
       expect(errors).toEqual([]);
       await page.close();
       // What is missing is named, with the address that it was looked for at.

@@ -13,7 +13,7 @@ use lumencast_picture::{Picture, ToneMap};
 
 use crate::arguments::{Exposure, SceneArguments, parse_positive};
 use crate::camera::{self, PictureArguments};
-use crate::out_file;
+use crate::{light_source, out_file};
 
 /// Draws a picture of a scene.
 #[derive(Debug, Args)]
@@ -132,7 +132,9 @@ impl Render {
             bail!("{asked} is for pictures that an adapter draws; give --lighting field");
         }
         self.check_outputs()?;
-        let mut scene = self.scene.source.open()?;
+        let light = self.raster.light.as_deref().map(light_source::light).transpose()?;
+        let edits = light.as_ref().map_or(&[][..], |light| &light.edits);
+        let mut scene = self.scene.source.open_edited(edits)?;
         let mut inputs = self.scene.source.files(&scene);
         inputs.extend(self.raster.light_file());
         out_file::check_apart(&self.output, &inputs)?;
@@ -141,7 +143,7 @@ impl Render {
         match self.lighting() {
             Lighting::Reference => self.trace_picture(&mut scene, view),
             #[cfg(feature = "gpu")]
-            _ => self.draw_picture(&mut scene, view),
+            _ => self.draw_picture(&mut scene, view, light),
             #[cfg(not(feature = "gpu"))]
             _ => bail!("{}", crate::absent::GPU),
         }

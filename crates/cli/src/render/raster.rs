@@ -13,7 +13,7 @@ use serde_json::json;
 use super::raster_arguments::{RasterArguments, ShadingArgument, TransparencyArgument};
 use super::{Lighting, PartsArgument, Render};
 use crate::arguments::occlusion;
-use crate::light_source::{self, Computed};
+use crate::light_source::{Computed, Found};
 use crate::output::{self, say, tell};
 
 /// Samples a pixel unless told otherwise.
@@ -24,7 +24,12 @@ const GLANCE: u32 = 4;
 const GLANCE_PRE_EXPOSURE: f32 = 1.0 / 1024.0;
 
 impl Render {
-    pub(super) fn draw_picture(&self, scene: &mut Scene, view: View) -> Result<()> {
+    pub(super) fn draw_picture(
+        &self,
+        scene: &mut Scene,
+        view: View,
+        light: Option<Found>,
+    ) -> Result<()> {
         ensure!(
             self.parts == PartsArgument::All,
             "--parts is for the reference; give --lighting direct or --lighting indirect"
@@ -40,7 +45,7 @@ impl Render {
         renderer.set_scene(&snapshot);
         let mut probes = 0;
         if settings.lighting.indirect {
-            let volumes = self.volumes(scene)?;
+            let volumes = self.volumes(scene, light)?;
             probes = volumes.iter().map(|volume| volume.grid.probe_count()).sum();
             let (offset, window) = (self.raster.reading.offset, self.raster.window);
             renderer.set_light(&LightField::new(volumes).seen(offset, window))?;
@@ -96,11 +101,10 @@ impl Render {
     }
 
     /// The field given, or else one computed for this picture.
-    fn volumes(&self, scene: &mut Scene) -> Result<Vec<ProbeVolume>> {
-        if let Some(light) = &self.raster.light {
-            let (catalog, volumes) = light_source::light(light)?;
-            light_source::check_fits(light, &catalog, scene);
-            return Ok(volumes);
+    fn volumes(&self, scene: &mut Scene, light: Option<Found>) -> Result<Vec<ProbeVolume>> {
+        if let Some(light) = light {
+            light.check_fits(scene);
+            return Ok(light.volumes);
         }
         let computed = Computed {
             effort: self.raster.effort.with(self.raster.probe_samples),

@@ -87,7 +87,7 @@ impl ProbeHeader {
         let mut reader = Reader(frame);
         let version = u64::from(reader.u8()?);
         if version != VERSION {
-            return Err(DecodeError::Version(version));
+            return Err(DecodeError::Version { found: version, known: VERSION });
         }
         let flags = reader.u8()?;
         if flags & !KEYFRAME != 0 {

@@ -197,14 +197,17 @@ impl Scene {
     pub fn files(&self) -> Vec<SceneFile> {
         let mut files: Vec<SceneFile> =
             self.models.iter().flat_map(|m| m.asset.files.iter().cloned()).collect();
-        if let (Environment::Image { uri, .. }, Some(folder)) = (&self.environment, &self.folder)
-            && let Ok((name, path)) = folder.resolve(uri)
-        {
-            files.push(SceneFile { name, contents: FileContents::Path(path) });
-        }
+        files.extend(self.environment_file());
         let mut seen = std::collections::BTreeSet::new();
         files.retain(|file| seen.insert(file.name.clone()));
         files
+    }
+
+    /// The picture of the environment, where it is one.
+    pub fn environment_file(&self) -> Option<SceneFile> {
+        let Environment::Image { uri, .. } = &self.environment else { return None };
+        let (name, path) = self.folder.as_ref()?.resolve(uri).ok()?;
+        Some(SceneFile { name, contents: FileContents::Path(path) })
     }
 
     /// The box around everything that is drawn, in the world. Empty scenes have none: then it is a

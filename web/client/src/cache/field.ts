@@ -67,6 +67,11 @@ export class FieldCache {
     return this.regions.has(region);
   }
 
+  /** Whether any region has light. */
+  get lit(): boolean {
+    return [...this.regions.values()].some(({ to }) => to !== undefined);
+  }
+
   /** Whether another field's light could take this one's place. */
   sameShape(field: Field): boolean {
     const shape = ({ order, grid, offset, cellsMin, regions, use }: Field) => ({

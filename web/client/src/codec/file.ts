@@ -1,5 +1,8 @@
+import type { Edit } from '../edit.js';
 import { WireError } from '../wire-error.js';
 import { type Catalog, parseCatalog } from './catalog.js';
+import { parseEdit } from './edits.js';
+import { list, parseObject } from './json.js';
 import { LIMITS } from './limits.js';
 import { splitProbeFrame } from './probe-header.js';
 import { Reader } from './reader.js';
@@ -7,11 +10,19 @@ import { Reader } from './reader.js';
 /** A saved light field: a catalog and keyframes, the same bytes as on the wire. */
 export interface LightFile {
   readonly catalog: Catalog;
+  /** Edits that turn the scene as it stands in its file into the scene that this light is of. */
+  readonly edits: readonly Edit[];
+  /** Files of the scene's folder that the edits name, by their names. */
+  readonly files: ReadonlyMap<string, Uint8Array>;
   readonly frames: readonly { readonly field: number; readonly region: number; readonly frame: Uint8Array }[];
 }
 
 const MAGIC = new TextEncoder().encode('LUMENCST');
-const VERSION = 1;
+const VERSION = 2;
+
+/** What a record holds; those of other kinds are passed over. */
+const KIND = { catalog: 0, keyframe: 1, edits: 2, file: 3 } as const;
+const utf8 = new TextDecoder('utf-8', { fatal: true });
 
 /** Reads a `.light` file. The frames are views of `bytes`; their payloads are not decoded yet. */
 export function readLightFile(bytes: Uint8Array): LightFile {
@@ -21,20 +32,46 @@ export function readLightFile(bytes: Uint8Array): LightFile {
   if (magic.some((byte, i) => byte !== MAGIC[i])) throw new WireError('malformed', 'not a light file');
   const version = reader.u8();
   if (version !== VERSION) throw new WireError('version', `a light file of version ${version}`);
-  const catalog = parseCatalog(record(reader));
+  const first = record(reader);
+  if (first.kind !== KIND.catalog) throw new WireError('malformed', 'a light file without a catalog');
+  const catalog = parseCatalog(first.body.rest());
+  let edits: readonly Edit[] = [];
+  const files = new Map<string, Uint8Array>();
   const frames = [];
   while (reader.left > 0) {
-    const entry = new Reader(record(reader));
-    const [field, region] = [entry.varint(), entry.varint()];
-    const frame = entry.rest();
-    if (splitProbeFrame(frame).header.base !== undefined) {
-      throw new WireError('malformed', 'a delta in a light file');
-    }
-    frames.push({ field, region, frame });
+    const { kind, body } = record(reader);
+    if (kind === KIND.keyframe) frames.push(keyframe(body));
+    else if (kind === KIND.edits) edits = readEdits(body.rest());
+    else if (kind === KIND.file) files.set(name(body.take(body.varint())), body.rest());
   }
-  return { catalog, frames };
+  return { catalog, edits, files, frames };
 }
 
-function record(reader: Reader): Uint8Array {
-  return reader.take(reader.varint());
+function record(reader: Reader): { kind: number; body: Reader } {
+  const body = new Reader(reader.take(reader.varint()));
+  return { kind: body.varint(), body };
+}
+
+function keyframe(body: Reader): LightFile['frames'][number] {
+  const [field, region] = [body.varint(), body.varint()];
+  const frame = body.rest();
+  if (splitProbeFrame(frame).header.base !== undefined) {
+    throw new WireError('malformed', 'a delta in a light file');
+  }
+  return { field, region, frame };
+}
+
+function readEdits(bytes: Uint8Array): readonly Edit[] {
+  const { edits } = parseObject(bytes, 'the edits of a light file');
+  return list(edits, 'edits', LIMITS.snapshotEdits)
+    .map(parseEdit)
+    .filter((edit) => edit !== undefined);
+}
+
+function name(bytes: Uint8Array): string {
+  try {
+    return utf8.decode(bytes);
+  } catch {
+    throw new WireError('malformed', 'the name of a file');
+  }
 }

@@ -2,6 +2,7 @@
 import { layerOf, splitProbeFrame } from '../../src/codec/probe-header.js';
 import type { Vec3 } from '../../src/edit.js';
 import { json } from '../support/fake-server.js';
+import { record } from '../support/light-file.js';
 import { join, varint } from '../support/probe-encoder.js';
 import { bytesOf, readVectors } from '../support/vectors.js';
 
@@ -43,9 +44,15 @@ export const streams: readonly Uint8Array[] = sequences.map((sequence, number) =
 
 /** Saved light fields. */
 export const lightFiles: readonly Uint8Array[] = sequences.map((sequence) => {
-  const record = (...parts: (Uint8Array | number[])[]) => join(varint(join(...parts).length), ...parts);
-  const keyframe = record(varint(0), varint(0), sequence.frames[0]);
-  return join(Buffer.from('LUMENCST'), [1], record(catalogOf(sequence)), keyframe);
+  const kept = json({ edits: edits.map((edit) => edit.json) });
+  return join(
+    Buffer.from('LUMENCST'),
+    [2],
+    record(0, catalogOf(sequence)),
+    record(2, kept),
+    record(3, varint(5), Buffer.from('a.hdr'), kept.subarray(0, 40)),
+    record(1, varint(0), varint(0), sequence.frames[0]),
+  );
 });
 
 /**
