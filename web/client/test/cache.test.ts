@@ -438,6 +438,28 @@ describe('a field with an epoch of its own', () => {
     feed(cache, { probes: fresh.step().probes }, 1);
     expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([2]);
   });
+
+  it('keeps one old light, however often its shape changes', () => {
+    const shaped = (i: number) =>
+      new FakeServer({
+        epoch: `00000000000000${10 + i}`,
+        fieldEpoch: `00000000000001${10 + i}`,
+        regions: 1 + (i % 3),
+      });
+    const cache = joined(shaped(0));
+    feed(cache, shaped(0).step(), 0);
+    for (let i = 1; i < 50; i++) cache.addCatalog(shaped(i).catalog);
+    expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([1]);
+    // Shapes that never had light are not kept.
+    expect(cache['leftover'].length).toBe(1);
+    // Where each shape had light, the last is shown.
+    for (let i = 50; i < 80; i++) {
+      cache.addCatalog(shaped(i).catalog);
+      feed(cache, { probes: shaped(i).step().probes }, i);
+    }
+    cache.addCatalog(shaped(80).catalog);
+    expect(cache.light(81).fields.map(({ field }) => field.regions.length)).toEqual([1 + (79 % 3)]);
+  });
 });
 
 describe('a saved light field', () => {

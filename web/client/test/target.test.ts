@@ -14,4 +14,10 @@ describe('an address', () => {
     const target = parseTarget(new URL(address), options);
     expect([target.base.href, target.scene]).toEqual([base, scene]);
   });
+
+  it('that cannot be decoded is refused', () => {
+    for (const address of ['https://host/100%', 'https://host/%ff']) {
+      expect(() => parseTarget(new URL(address), {})).toThrow(TypeError);
+    }
+  });
 });

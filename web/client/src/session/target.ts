@@ -19,10 +19,10 @@ export function parseTarget(url: URL, options: TargetOptions): Target {
     throw new TypeError(`${url.href} does not begin with https:// or http://`);
   }
   const parts = url.pathname.split('/').filter((part) => part !== '');
-  const named = options.scene?.split('/') ?? parts.slice(-1).map(decodeURIComponent);
+  const named = options.scene?.split('/') ?? parts.slice(-1).map(decoded);
   const scene = named.join('/');
   if (scene === '') throw new TypeError(`${url.href} names no scene; it should end in /scene`);
-  const end = parts.slice(-named.length).map(decodeURIComponent).join('/');
+  const end = parts.slice(-named.length).map(decoded).join('/');
   const above = end === scene ? parts.slice(0, -named.length) : parts;
   return {
     base: new URL(above.map((part) => `/${part}`).join('') + '/', url.origin),
@@ -33,6 +33,15 @@ export function parseTarget(url: URL, options: TargetOptions): Target {
     transport: options.transport ?? 'auto',
     certificateHash: options.certificateHash,
   };
+}
+
+/** A part of an address as text. */
+function decoded(part: string): string {
+  try {
+    return decodeURIComponent(part);
+  } catch {
+    throw new TypeError(`${part} in the address is not UTF-8 once decoded; a % is written %25`);
+  }
 }
 
 /** 128 random bits in hexadecimal. */

@@ -1,4 +1,4 @@
-import type { LumencastLight, PunctualLight } from '@lumencast/three';
+import type { Edit, LumencastLight, PunctualLight } from '@lumencast/three';
 import {
   type Camera,
   Matrix4,
@@ -124,9 +124,10 @@ export class Flashlight {
     carrier.updateMatrixWorld();
   }
 
+  /** Temporary: it does not stay behind when the page is closed. */
   #add(): Promise<void> {
     const { translation, rotation } = this.#pose();
-    return this.around.light.edit({
+    const edit: Edit = {
       edit: 'add_light',
       light: {
         type: 'spot',
@@ -139,7 +140,8 @@ export class Flashlight {
         translation: translation.toArray(),
         rotation: rotation.toArray() as [number, number, number, number],
       },
-    });
+    };
+    return this.around.light.edit(edit, { temporary: true });
   }
 
   async #remove(): Promise<void> {
