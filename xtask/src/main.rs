@@ -6,6 +6,7 @@ mod arm;
 mod contenders;
 mod demo;
 mod figures;
+mod licences;
 mod oracles;
 mod run;
 mod setup;

@@ -39,9 +39,14 @@ pub(crate) fn npm(args: &[&str]) -> Command {
     command
 }
 
+/// Shows what begins now.
+pub(crate) fn heading(title: &str) {
+    println!("\n── {title}");
+}
+
 /// Runs a step and shows its heading and time.
 pub(crate) fn step(title: &str, mut command: Command) -> Result<()> {
-    println!("\n── {title}");
+    heading(title);
     let start = Instant::now();
     let status = command.status().with_context(|| {
         format!("{title}: could not start `{}`", command.get_program().to_string_lossy())
@@ -62,7 +67,7 @@ pub(crate) fn hand_over(title: &str, command: Command) -> Result<()> {
     {
         use std::os::unix::process::CommandExt;
         let mut command = command;
-        println!("\n── {title}");
+        heading(title);
         let error = command.exec();
         let program = command.get_program().to_string_lossy();
         Err(error).with_context(|| format!("{title}: could not start `{program}`"))

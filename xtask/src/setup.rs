@@ -23,8 +23,6 @@ struct Package {
     release: Release,
     purpose: Purpose,
     why: &'static str,
-    /// Whether the demo runs without it.
-    optional: bool,
     present: fn() -> bool,
 }
 
@@ -41,7 +39,6 @@ const fn of_windows(name: &'static str, present: fn() -> bool) -> Package {
         release: Release::Stable,
         purpose: Purpose::Test,
         why: "a part of X11 that windows need",
-        optional: false,
         present,
     }
 }
@@ -52,7 +49,6 @@ const PACKAGES: &[Package] = &[
         release: Release::Stable,
         purpose: Purpose::Demo,
         why: "a C compiler for the cryptography of QUIC",
-        optional: false,
         present: || runs("cc", "--version"),
     },
     Package {
@@ -60,7 +56,6 @@ const PACKAGES: &[Package] = &[
         release: Release::Stable,
         purpose: Purpose::Test,
         why: "the browser of the browser test",
-        optional: false,
         present: || runs("chromium", "--version"),
     },
     Package {
@@ -68,7 +63,6 @@ const PACKAGES: &[Package] = &[
         release: Release::Stable,
         purpose: Purpose::Test,
         why: "makes the certificate of the browser test",
-        optional: false,
         present: || runs("openssl", "version"),
     },
     Package {
@@ -76,7 +70,6 @@ const PACKAGES: &[Package] = &[
         release: Release::Stable,
         purpose: Purpose::Test,
         why: "makes the slow link of the browser test",
-        optional: false,
         present: || runs("tc", "-V"),
     },
     Package {
@@ -84,7 +77,6 @@ const PACKAGES: &[Package] = &[
         release: Release::Stable,
         purpose: Purpose::Test,
         why: "a display for the test of the window",
-        optional: false,
         present: || runs("Xvfb", "-help"),
     },
     of_windows("libx11-6", || has_library("libX11.so.6")),
@@ -97,7 +89,6 @@ const PACKAGES: &[Package] = &[
         release: Release::Stable,
         purpose: Purpose::Test,
         why: "fetches Embree, which rays are compared with",
-        optional: false,
         present: || {
             output("python3", &["-m", "pip", "--version"]).is_some_and(|text| text.contains("pip"))
         },
@@ -105,9 +96,8 @@ const PACKAGES: &[Package] = &[
     Package {
         name: "mesa-vulkan-drivers",
         release: Release::Backports,
-        purpose: Purpose::Demo,
+        purpose: Purpose::Test,
         why: "a GPU in software (lavapipe 25 or newer), for machines without one",
-        optional: true,
         present: || installed_version("mesa-vulkan-drivers").is_some_and(|major| major >= 25),
     },
 ];
@@ -115,20 +105,13 @@ const PACKAGES: &[Package] = &[
 /// Where bookworm-backports is added to the package sources.
 const BACKPORTS_FILE: &str = "/etc/apt/sources.list.d/bookworm-backports.sources";
 
-/// Programs of cargo that the tests call.
-const CARGO_TOOLS: &[(&str, &str)] =
-    &[("cargo-nextest", "runs the tests"), ("cargo-deny", "checks licences and duplicates")];
-
 /// Installs what is missing, or says how.
 pub(crate) fn install(purpose: Purpose) -> Result<()> {
     check_node()?;
     install_packages(purpose)?;
-    if purpose == Purpose::Test {
-        for (tool, why) in CARGO_TOOLS {
-            if !runs(tool, "--version") {
-                step(&format!("install {tool} ({why})"), cargo(&["install", "--locked", tool]))?;
-            }
-        }
+    if purpose == Purpose::Test && !runs("cargo-nextest", "--version") {
+        let install = cargo(&["install", "--locked", "cargo-nextest"]);
+        step("install cargo-nextest (runs the tests)", install)?;
     }
     Ok(())
 }
@@ -171,26 +154,14 @@ fn install_packages(purpose: Purpose) -> Result<()> {
     for package in &wanted {
         println!("missing: {} ({})", package.name, package.why);
     }
-    let can_wait = purpose == Purpose::Demo && wanted.iter().all(|p| p.optional);
-    if !is_bookworm() {
-        ensure!(can_wait, "only on Debian 12 are they installed: install them by other means");
-        return Ok(());
-    }
+    ensure!(is_bookworm(), "only on Debian 12 are they installed: install them by other means");
     let source = if backports.is_empty() { None } else { backports_source(&package_sources()) };
     if !is_root() {
         let commands = commands(&stable, &backports, source.as_deref());
         ask_root(&commands);
-        ensure!(can_wait, "packages are missing, and only root may install them");
-        println!("The demo goes on without.");
-        return Ok(());
+        bail!("packages are missing, and only root may install them");
     }
-    match install_as_root(&stable, &backports, source) {
-        Err(error) if can_wait => {
-            println!("\n{error:#}\nThe demo goes on without.");
-            Ok(())
-        }
-        result => result,
-    }
+    install_as_root(&stable, &backports, source)
 }
 
 fn install_as_root(stable: &[&str], backports: &[&str], source: Option<String>) -> Result<()> {

@@ -3,9 +3,9 @@
 use anyhow::Result;
 use clap::Args;
 
-use crate::oracles;
-use crate::run::{cargo, npm, step, target_dir};
+use crate::run::{cargo, heading, npm, step, target_dir};
 use crate::setup::{self, Purpose};
+use crate::{licences, oracles};
 
 /// Options of `cargo xtask test`.
 #[derive(Args)]
@@ -41,8 +41,8 @@ impl Test {
         }
         step("tests", tests)?;
         step("doctests", cargo(&["test", "--workspace", "--doc", "--quiet"]))?;
-        let deny = ["deny", "--all-features", "check", "bans", "licenses", "sources"];
-        step("licences and sources of dependencies", cargo(&deny))?;
+        heading("licences and sources of dependencies");
+        licences::check()?;
         if !self.no_browser {
             step("the program", cargo(&["build", "-p", "lumencast-cli"]))?;
             let mut browser = npm(&["run", "test:browser"]);
