@@ -65,41 +65,74 @@ impl Meter {
     }
 }
 
-/// What the middle of a picture's luminances becomes.
+/// What the middle of a picture's luminances becomes, unless too much burns out.
 const MIDDLE_GREY: f64 = 0.2;
 /// The pixels that count as its middle, of those that are lit.
 const MIDDLE: std::ops::Range<f64> = 0.1..0.95;
-/// So large a share of the lit pixels is to stay below [`BURNT`].
-const KEPT: f64 = 0.97;
-/// Three times white.
-const BURNT: f64 = 3.0;
+/// Luminance times exposure from which on tone mappings give up contrast and colour.
+const SHOULDER: f64 = 0.5;
+/// Stops up the shoulder past which it makes no difference: a lamp in the picture is to be white.
+const LOST: f64 = 4.0;
+/// So far may a picture be up the shoulder, in stops, on average of all its pixels.
+const MOST_BURNT: f64 = 0.18;
+/// Stops that exposure goes down for bright parts: a room with a window is not to be black.
+const MOST_STOPS_DOWN: f64 = 2.0;
+/// How finely an exposure in between is looked for, stops.
+const STEP: f64 = 0.01;
 /// A picture of which less is lit says nothing.
 const LEAST_LIT: f64 = 0.02;
 
-/// The exposure that suits a picture: the middle of its luminances becomes middle grey, unless that
-/// would burn out more than a few per cent of it. To a part of a bin; `None` where (nearly) all is
-/// black.
+/// The exposure that suits a picture; `None` where (nearly) all is black. The middle of its
+/// luminances becomes middle grey, or so far below it that no more than [`MOST_BURNT`] burns out. The
+/// page has the same rule (`web/viewer/src/view/exposure.ts`).
 pub(crate) fn exposure(histogram: &[u32]) -> Option<f32> {
     let all: f64 = histogram.iter().map(|n| f64::from(*n)).sum();
-    let lit = all - histogram.first().map_or(0.0, |n| f64::from(*n));
-    if lit <= LEAST_LIT * all {
+    // Luminances in stops, and how many pixels have them; the first bin is black.
+    let lit: Vec<(f64, f64)> = histogram
+        .iter()
+        .enumerate()
+        .skip(1)
+        .map(|(bin, count)| {
+            (f64::from(LEAST) + (bin as f64 - 0.5) / f64::from(BINS_A_STOP), f64::from(*count))
+        })
+        .collect();
+    let pixels: f64 = lit.iter().map(|(_, count)| count).sum();
+    if pixels <= LEAST_LIT * all {
         return None;
     }
-    let middle = MIDDLE.start * lit..MIDDLE.end * lit;
-    let (mut below, mut sum, mut bright) = (0.0, 0.0, 0.0);
-    for (bin, count) in histogram.iter().enumerate().skip(1) {
-        let count = f64::from(*count);
-        // Of its middle.
-        let stops = f64::from(LEAST) + (bin as f64 - 0.5) / f64::from(BINS_A_STOP);
-        let counted = (below + count).min(middle.end) - below.max(middle.start);
-        sum += stops * counted.max(0.0);
-        if below <= KEPT * lit && count > 0.0 {
-            bright = stops;
+    let key = MIDDLE_GREY.log2() - middle(&lit, pixels);
+    if burnt(&lit, pixels, key) <= MOST_BURNT {
+        return Some(key.exp2() as f32);
+    }
+    let (mut dark, mut bright) = (key - MOST_STOPS_DOWN, key);
+    while bright - dark > STEP {
+        let between = 0.5 * (dark + bright);
+        if burnt(&lit, pixels, between) > MOST_BURNT {
+            bright = between;
+        } else {
+            dark = between;
         }
+    }
+    Some(dark.exp2() as f32)
+}
+
+/// The average of the middle of luminances, stops.
+fn middle(lit: &[(f64, f64)], pixels: f64) -> f64 {
+    let middle = MIDDLE.start * pixels..MIDDLE.end * pixels;
+    let (mut below, mut sum) = (0.0, 0.0);
+    for (stops, count) in lit {
+        let counted = (below + count).min(middle.end) - middle.start.max(below);
+        sum += stops * counted.max(0.0);
         below += count;
     }
-    let average = (sum / (middle.end - middle.start)).exp2();
-    Some((MIDDLE_GREY / average).min(BURNT / bright.exp2()) as f32)
+    sum / (middle.end - middle.start)
+}
+
+/// How far luminances are up the shoulder on average, in stops, under an exposure in stops: few that
+/// are far up count like many that are not.
+fn burnt(lit: &[(f64, f64)], pixels: f64, exposure: f64) -> f64 {
+    let up = |stops: f64| (stops + exposure - SHOULDER.log2()).clamp(0.0, LOST);
+    lit.iter().map(|(stops, count)| up(*stops) * count).sum::<f64>() / pixels
 }
 
 #[cfg(test)]
@@ -132,10 +165,24 @@ mod tests {
         close(of(&[(1.0, 950), (1000.0, 20), (0.001, 30)], 0), 0.2);
     }
 
+    /// As the page's rule has it: by as much as keeps the bright part's colours, by two stops at most.
     #[test]
     fn bright_parts_are_not_burnt_out() {
-        // A tenth of the picture is 1,000 times as bright as the rest.
-        close(of(&[(1.0, 900), (1000.0, 100)], 0), 3.0 / 1000.0);
+        // Three tenths of the picture are eight times as bright as the rest. Of them 0.6 stops may be
+        // up the shoulder each.
+        let found = of(&[(1.0, 700), (8.0, 300)], 0);
+        close(found, 0.5 * (MOST_BURNT / 0.3).exp2() as f32 / 8.0);
+        // A fifth is a window, which is lost whatever is done.
+        let (bright, alone) = (of(&[(1.0, 800), (1000.0, 200)], 0), middle_grey(&[0.8, 0.2]));
+        close(bright, alone / 4.0);
+    }
+
+    /// The exposure by the middle alone, of a part at 1 cd/m² and one at 1,000.
+    fn middle_grey([dark, bright]: &[f32; 2]) -> f32 {
+        let middle = (MIDDLE.end - MIDDLE.start) as f32;
+        let counted = bright - (1.0 - MIDDLE.end as f32);
+        assert!(*dark > MIDDLE.start as f32);
+        MIDDLE_GREY as f32 / 1000.0f32.powf(counted / middle)
     }
 
     #[test]
