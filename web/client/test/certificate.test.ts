@@ -39,6 +39,13 @@ it('is not asked from other machines', async () => {
   expect(await developmentServer(new URL('https://light.example/'), never)).toBeUndefined();
 });
 
+it('is asked for at plain addresses, but not of a proxy', async () => {
+  const url = await serve(200, HASH);
+  url.protocol = 'http:';
+  expect((await developmentServer(url, never))?.base.href).toBe(url.href);
+  expect(await developmentServer(new URL('light/', url), never)).toBeUndefined();
+});
+
 it('is given up when the attempt is', async () => {
   const url = await serve(200, HASH);
   expect(await developmentServer(url, AbortSignal.abort())).toBeUndefined();

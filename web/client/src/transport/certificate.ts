@@ -13,16 +13,18 @@ export interface DevelopmentServer {
 
 /**
  * The development server at an address: it offers its certificate's hash at `certificate.sha256`. Asked
- * for only on this machine's own addresses: elsewhere an authority vouches for the certificate, and
+ * at https only on this machine's own addresses: elsewhere an authority vouches for the certificate, and
  * browsers refuse long-lived certificates by hash. A server with such a certificate speaks plain HTTP
- * on the same port, so that is tried too.
+ * on the same port, so that is tried too. Under a path a proxy stands before the server, which
+ * WebTransport does not pass.
  */
 export async function developmentServer(
   base: URL,
   signal: AbortSignal,
 ): Promise<DevelopmentServer | undefined> {
-  if (!isLoopback(base.hostname)) return undefined;
   const limit = AbortSignal.any([signal, AbortSignal.timeout(PATIENCE)]);
+  if (base.protocol === 'http:') return base.pathname === '/' ? ask(base, limit) : undefined;
+  if (!isLoopback(base.hostname)) return undefined;
   const plain = new URL(base);
   plain.protocol = 'http:';
   return (await ask(base, limit)) ?? (await ask(plain, limit));

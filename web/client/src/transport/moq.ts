@@ -18,18 +18,18 @@ const GROUP_FRAMES = 512;
 /** Connects by Media over QUIC, over WebTransport or, where that fails, a WebSocket. */
 export const moqConnector: Connector = async (target, signal) => {
   const { base, transport, certificateHash } = target;
-  // With an http address the library asks for the hash itself.
-  const asked = base.protocol === 'https:' && !certificateHash;
-  const found = asked ? await developmentServer(base, signal) : undefined;
+  const found = certificateHash ? undefined : await developmentServer(base, signal);
   const hash = certificateHash ?? found?.hash;
+  // Without TLS, and without a certificate of the server's own, there is no WebTransport.
+  const isPlain = base.protocol === 'http:' && !hash && transport === 'auto';
   try {
-    const connection = await Connection.connect(dialled(base, target), {
+    const connection = await Connection.connect(dialled(base, target, isPlain ? 'websocket' : transport), {
       signal,
       webtransport: hash ? { serverCertificateHashes: [{ value: hash }] } : {},
       websocket: {
         enabled: transport !== 'webtransport',
-        delay: transport === 'websocket' ? 0 : WEBSOCKET_DELAY,
-        url: dialled(found?.base ?? base, target),
+        delay: transport === 'websocket' || isPlain ? 0 : WEBSOCKET_DELAY,
+        url: dialled(found?.base ?? base, target, 'websocket'),
       },
     });
     return new MoqLink(connection, target, found?.base ?? base);
@@ -39,11 +39,12 @@ export const moqConnector: Connector = async (target, signal) => {
 };
 
 /** The base is dialled and not the scene, so that names mean the same through any relay. */
-function dialled(base: URL, { token, transport }: Target): URL {
+function dialled(base: URL, { token }: Target, transport: Target['transport']): URL {
   const url = new URL(base);
   if (token) url.searchParams.set('jwt', token);
-  // WebTransport refuses these schemes, which leaves the WebSocket.
+  // WebTransport refuses these schemes, which leaves the WebSocket; at http it asks for a hash itself.
   if (transport === 'websocket') url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+  else url.protocol = 'https:';
   return url;
 }
 
