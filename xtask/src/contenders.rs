@@ -1,10 +1,10 @@
-//! The comparisons of docs/results.md with programs of others, measured on this machine.
+//! The comparisons of docs/results with programs of others, measured on this machine.
 //!
 //! Each runs in turns with its contender, so that what else the machine does meets both, and is told
 //! as the median of the rounds' ratios:
-//! - `rays`: rays and building beside Embree's, on one thread and on two;
-//! - `paths`: camera paths a second beside Mitsuba's;
-//! - `error`: squared error at equal time beside Mitsuba's, against a converged picture.
+//! - `rays`: rays and building beside Embree's, on one thread and on two (rays.md, building.md);
+//! - `paths`: camera paths a second beside Mitsuba's (paths.md);
+//! - `error`: squared error at equal time beside Mitsuba's, against a converged picture (error.md).
 //!
 //! Nothing else should run meanwhile.
 
@@ -91,7 +91,7 @@ struct Effort {
     reference_spp: u32,
 }
 
-/// What docs/results.md is measured with.
+/// What docs/results is measured with.
 const FULL: Effort = Effort {
     threads: &[2, 1],
     rays: 500_000,

@@ -1,4 +1,4 @@
-//! The figures of docs/results.md, measured on this machine.
+//! The figures of docs/results (tick.md, link.md, settling.md), measured on this machine.
 
 use std::path::Path;
 use std::process::Command;

@@ -171,7 +171,7 @@ pub(crate) fn source(options: &GatherOptions) -> String {
 /// Points a probe of light that is computed once, unless told otherwise.
 const POINTS: u32 = 256;
 /// Where fitted light is read unless told otherwise. Farther off, points on both sides of an edge read
-/// the same place; at the surface itself, both sides of a wall do (`docs/results.md`).
+/// the same place; at the surface itself, both sides of a wall do (`docs/results/walls.md`).
 const NEAR: Offset = Offset::Cells(0.125);
 
 /// Samples of a probe, at most, unless told otherwise.

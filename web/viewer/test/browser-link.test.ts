@@ -206,7 +206,7 @@ function watch(camera: [number, number, number]): void {
   setInterval(note, 20);
 }
 
-/** A line of the table in docs/results.md. */
+/** A line of the table in docs/results/link.md. */
 function row(transport: string, rate: number, { layers, regions }: Figures): string {
   const ms = (seconds: number) => `${Math.round(seconds * 1000)} ms`;
   const cells = ({ updates, median, p99 }: RegionFigures) =>

@@ -37,7 +37,7 @@ Examples:
   lumencast bench quality sponza.glb --environment sky:4 --volume 10x6x7 --volume 20x12x14
   lumencast bench quality breakfast.glb --volume 8x4x8 --orders 2,3,4 --keep references -o results
   lumencast bench quality breakfast.glb --volume 8x4x8 --resolutions 64,128,256,512 -o results
-  lumencast bench quality breakfast.glb --volume 8x4x8 --document docs/results.md
+  lumencast bench quality breakfast.glb --volume 8x4x8 --document docs/results/pictures-breakfast.md
 
 Every --volume is a grid to be measured by itself. A row is a grid and an order, as its light is
 gathered, and, unless --fit is 0, another one fitted to surfaces; the first grid is also measured, as
