@@ -19,8 +19,9 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 use super::TriangleBvh;
-use super::kernel::{Kernel, fetch_line};
+use super::kernel::Kernel;
 use super::pages::Pages;
+use super::walk::fetch_line;
 use fill::Grid;
 pub(super) use shape::{Flat, Shape, corners};
 

@@ -10,8 +10,9 @@
 use glam::Vec3;
 
 use super::cells::{AHEAD, Cells, Flat, Listed, Margins, Shape, corners};
-use super::kernel::{Kernel, Setup, TriangleHits, nearest, triangles_portable};
+use super::kernel::Kernel;
 use super::triangle_bvh::Block;
+use super::walk::{Setup, TriangleHits, nearest};
 use super::{Accel, Hit, Ray, fetch_ahead};
 
 /// What is nearer to the eye than this share of the scene's size is listed for all cells.
@@ -76,37 +77,9 @@ impl ItemBuffer {
         self.cells.count()
     }
 
-    /// Finds the nearest surface that `accept` lets count on each of the rays, like [`Accel::closest`].
-    /// Rays that it cannot tell of are passed to `left`.
-    #[inline]
-    pub(crate) fn closest<T: Copy>(
-        &self,
-        rays: impl Iterator<Item = (Ray, T)>,
-        accept: impl Fn(&T, &Hit) -> bool,
-        found: impl FnMut(T, Option<Hit>),
-        left: impl FnMut(Ray, T),
-    ) {
-        match self.cells.kernel {
-            #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2(_) => {
-                #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
-                // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for what it needs.
-                unsafe {
-                    super::kernel_avx2::closest_seen(self, rays, accept, found, left);
-                }
-            }
-            #[cfg(target_arch = "aarch64")]
-            Kernel::Neon => {
-                #[expect(unsafe_code, reason = "calls code compiled for NEON")]
-                // SAFETY: `kernel_neon` refuses to compile for a target without NEON.
-                unsafe {
-                    super::kernel_neon::closest_seen(self, rays, accept, found, left);
-                }
-            }
-            Kernel::Portable => {
-                self.closest_with(rays, accept, found, left, triangles_portable);
-            }
-        }
+    /// What its rays are to be tested by.
+    pub(super) fn kernel(&self) -> Kernel {
+        self.cells.kernel
     }
 
     /// [`Self::closest`], by what tests a block. Each step is taken for several rays before the next,

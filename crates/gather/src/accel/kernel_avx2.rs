@@ -1,4 +1,4 @@
-//! Eight boxes, or four triangles, at a time with AVX2 and FMA; see [`super::kernel`].
+//! Eight boxes, or four triangles, at a time with AVX2 and FMA; see [`super::walk`].
 
 use std::arch::x86_64::{
     __m128, __m256, __m256i, _CMP_LE_OQ, _mm_add_ps, _mm_and_ps, _mm_cmpge_ps, _mm_cmpgt_ps,
@@ -11,15 +11,15 @@ use std::arch::x86_64::{
 };
 
 use super::item_buffer::ItemBuffer;
-#[cfg(test)]
-use super::kernel::BoxHits;
-use super::kernel::{Setup, Stacks, TriangleHits, WIDEN, trace_with};
 use super::light_buffer::LightBuffer;
 use super::triangle_bvh::{Block, LANES};
+#[cfg(test)]
+use super::walk::BoxHits;
+use super::walk::{Setup, Stacks, TriangleHits, WIDEN, trace_with};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
 
-/// [`super::kernel::trace`] compiled for AVX2.
+/// [`super::dispatch::trace`] compiled for AVX2.
 #[target_feature(enable = "avx2,fma,popcnt")]
 pub(super) fn trace<const ANY: bool, T: Copy>(
     accel: &Accel,

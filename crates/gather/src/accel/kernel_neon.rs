@@ -1,4 +1,4 @@
-//! Eight boxes, or four triangles, at a time with NEON; see [`super::kernel`].
+//! Eight boxes, or four triangles, at a time with NEON; see [`super::walk`].
 
 use std::arch::aarch64::{
     float32x4_t, uint32x4_t, vaddq_f32, vaddvq_u32, vandq_u32, vceqq_f32, vcgeq_f32, vcgtq_f32,
@@ -7,16 +7,16 @@ use std::arch::aarch64::{
 };
 
 use super::item_buffer::ItemBuffer;
-use super::kernel::{BoxHits, Setup, Stacks, TriangleHits, WIDEN, put, trace_with};
 use super::light_buffer::LightBuffer;
 use super::triangle_bvh::{Block, LANES};
+use super::walk::{BoxHits, Setup, Stacks, TriangleHits, WIDEN, put, trace_with};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
 
 // So that code compiled for NEON may be called wherever this module is.
 const _: () = assert!(cfg!(target_feature = "neon"), "the target has no NEON");
 
-/// [`super::kernel::trace`] compiled for NEON.
+/// [`super::dispatch::trace`] compiled for NEON.
 #[target_feature(enable = "neon")]
 pub(super) fn trace<const ANY: bool, T: Copy>(
     accel: &Accel,

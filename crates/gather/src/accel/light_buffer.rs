@@ -10,8 +10,9 @@
 use glam::{Vec3, Vec3A};
 
 use super::cells::{AHEAD, Cells, Flat, Listed, Margins, Shape, corners};
-use super::kernel::{Kernel, Setup, TriangleHits, nearest, triangles_portable};
+use super::kernel::Kernel;
 use super::triangle_bvh::{Block, LANES};
+use super::walk::{Setup, TriangleHits, nearest};
 use super::{Accel, Hit, Ray, fetch_ahead};
 
 /// Cells a leaf's place for a triangle. Four times as many, or half as many, trace as fast; filling
@@ -63,37 +64,9 @@ impl LightBuffer {
         ray.direction == self.direction && ray.t_max == f32::INFINITY
     }
 
-    /// Whether any surface that `accept` lets count lies on each of the rays, which it must be for;
-    /// otherwise like [`Accel::occluded`]. Rays that it cannot tell of are passed to `left`.
-    #[inline]
-    pub(crate) fn occluded<T: Copy>(
-        &self,
-        rays: impl Iterator<Item = (Ray, T)>,
-        accept: impl Fn(&T, &Hit) -> bool,
-        found: impl FnMut(T, bool),
-        left: impl FnMut(Ray, T),
-    ) {
-        match self.cells.kernel {
-            #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2(_) => {
-                #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
-                // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for what it needs.
-                unsafe {
-                    super::kernel_avx2::occluded(self, rays, accept, found, left);
-                }
-            }
-            #[cfg(target_arch = "aarch64")]
-            Kernel::Neon => {
-                #[expect(unsafe_code, reason = "calls code compiled for NEON")]
-                // SAFETY: `kernel_neon` refuses to compile for a target without NEON.
-                unsafe {
-                    super::kernel_neon::occluded(self, rays, accept, found, left);
-                }
-            }
-            Kernel::Portable => {
-                self.occluded_with(rays, accept, found, left, triangles_portable);
-            }
-        }
+    /// What its rays are to be tested by.
+    pub(super) fn kernel(&self) -> Kernel {
+        self.cells.kernel
     }
 
     /// [`Self::occluded`], by what tests a block. Each step is taken for several rays before the next,

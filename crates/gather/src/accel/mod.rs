@@ -14,18 +14,21 @@ mod build;
 mod cache;
 mod cells;
 mod collapse;
+mod dispatch;
 mod item_buffer;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_avx2;
 #[cfg(target_arch = "aarch64")]
 mod kernel_neon;
+mod kernel_portable;
 mod light_buffer;
 mod pages;
 #[cfg(test)]
 mod tests;
 mod triangle_bvh;
 mod triangles;
+mod walk;
 mod wide;
 
 use std::sync::Arc;
@@ -34,9 +37,10 @@ use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
 pub(crate) use cache::AccelCache;
 pub(crate) use item_buffer::{ItemBuffer, Pyramid};
-pub(crate) use kernel::{Kernel, Stacks, fetch_ahead};
+pub(crate) use kernel::Kernel;
 pub(crate) use light_buffer::LightBuffer;
 pub(crate) use triangle_bvh::TriangleBvh;
+pub(crate) use walk::{Stacks, fetch_ahead};
 
 use build::{BinaryTree, Item};
 use pages::Pages;
@@ -200,7 +204,7 @@ impl Accel {
         accept: impl Fn(&T, &Hit) -> bool,
         found: impl FnMut(T, Option<Hit>),
     ) {
-        kernel::trace::<false, T>(self, rays, stacks, accept, found);
+        dispatch::trace::<false, T>(self, rays, stacks, accept, found);
     }
 
     /// Whether any surface that `accept` lets count lies on each ray; otherwise like
@@ -213,7 +217,7 @@ impl Accel {
         accept: impl Fn(&T, &Hit) -> bool,
         mut found: impl FnMut(T, bool),
     ) {
-        kernel::trace::<true, T>(self, rays, stacks, accept, |with, hit| {
+        dispatch::trace::<true, T>(self, rays, stacks, accept, |with, hit| {
             found(with, hit.is_some())
         });
     }

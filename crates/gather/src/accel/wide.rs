@@ -18,7 +18,7 @@ pub(super) struct Node {
     /// For each octant of directions (see [`Setup::octant`]) the children's lanes, four bits each, the
     /// farthest first.
     ///
-    /// [`Setup::octant`]: super::kernel::Setup::octant
+    /// [`Setup::octant`]: super::walk::Setup::octant
     pub(super) far_first: [u32; 8],
 }
 

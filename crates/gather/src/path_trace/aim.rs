@@ -10,7 +10,7 @@ use std::f32::consts::PI;
 use glam::{Mat3, Quat, Vec3};
 use lumencast_light::{Order, sh};
 
-use super::integrator::Look;
+use super::paths::Look;
 use crate::accel::Ray;
 use crate::bsdf::frame;
 use crate::sampling::{Sampler, cosine_hemisphere, lattice, power_heuristic};

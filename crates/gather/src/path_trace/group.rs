@@ -8,7 +8,7 @@ use lumencast_light::LightField;
 
 use super::beam::{Found, Lit};
 use super::columns::{Columns, GROUP};
-use super::integrator::{Connection, Part, Path, Paths, Segment};
+use super::paths::{Connection, Part, Path, Paths, Segment};
 use super::vertex::{Scattered, Vertices};
 use crate::accel::{Hit, Ray};
 use crate::bsdf::Scatter;

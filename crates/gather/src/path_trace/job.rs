@@ -7,7 +7,8 @@ use lumencast_light::sh;
 use rayon::prelude::*;
 
 use super::aim::{Aim, Reach};
-use super::integrator::{Integrator, Look, Paths, Seen};
+use super::integrator::Integrator;
+use super::paths::{Look, Paths, Seen};
 use crate::world::World;
 use crate::{Job, Sums, SurfacePoint};
 

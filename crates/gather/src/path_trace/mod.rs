@@ -6,6 +6,7 @@ mod columns;
 mod group;
 pub(crate) mod integrator;
 mod job;
+pub(crate) mod paths;
 #[cfg(test)]
 mod tests;
 mod vertex;

@@ -10,7 +10,8 @@ use lumencast_scene::{Environment, HdrImage, Light, LightKind, Material, Scene, 
 use lumencast_testkit::scenes::{Stage, lambert};
 
 use super::group::LOST;
-use super::integrator::{Integrator, Look, Paths};
+use super::integrator::Integrator;
+use super::paths::{Look, Paths};
 use super::*;
 use crate::Receiver;
 use crate::sampling::Sampler;

@@ -6,7 +6,8 @@ use glam::{UVec2, Vec3};
 use super::Renderer;
 use super::picture::assemble;
 use crate::accel::{Hit, Ray, Stacks};
-use crate::path_trace::integrator::{Integrator, Look};
+use crate::path_trace::integrator::Integrator;
+use crate::path_trace::paths::Look;
 use crate::world::{Passing, World};
 
 /// One sample a pixel, row by row from the upper left.

@@ -7,7 +7,7 @@ use glam::UVec2;
 
 use super::Renderer;
 use crate::path_trace::beam::{Beam, Found};
-use crate::path_trace::integrator::Paths;
+use crate::path_trace::paths::Paths;
 use crate::sampling::{Sampler, luminance, mix};
 
 /// Pixels that are looked at, each twice; some more often where a picture has fewer.

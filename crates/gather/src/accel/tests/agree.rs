@@ -4,8 +4,8 @@ use glam::Vec3A;
 
 use super::lanes::{boxes, has, random_node, setup, triangles, with_zeros};
 use super::*;
-use crate::accel::kernel::{BoxHits, Setup, TriangleHits};
 use crate::accel::triangle_bvh::Block;
+use crate::accel::walk::{BoxHits, Setup, TriangleHits};
 
 /// Half an ulp of 1, the most by which one operation rounds, relative to its result.
 const ETA: f64 = 0.5 * f32::EPSILON as f64;

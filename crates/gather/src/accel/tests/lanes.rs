@@ -3,14 +3,13 @@
 use glam::{DVec3, Vec3, Vec3A};
 
 use super::{Aabb, Kernel, kernels, random};
-use crate::accel::kernel::{
-    BoxHits, Setup, TINY, TriangleHits, boxes_portable, triangles_portable,
-};
 #[cfg(target_arch = "x86_64")]
 use crate::accel::kernel_avx2 as compiled;
 #[cfg(target_arch = "aarch64")]
 use crate::accel::kernel_neon as compiled;
+use crate::accel::kernel_portable::{boxes_portable, triangles_portable};
 use crate::accel::triangle_bvh::{Block, LANES};
+use crate::accel::walk::{BoxHits, Setup, TINY, TriangleHits};
 use crate::accel::wide::Node;
 
 pub(super) fn boxes(kernel: Kernel, node: &Node, ray: &Setup, t_max: f32) -> BoxHits {

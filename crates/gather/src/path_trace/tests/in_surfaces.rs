@@ -8,7 +8,8 @@ use lumencast_testkit::scenes::{Stage, lambert};
 
 use super::{BLACK, check, down, look};
 use crate::accel::Kernel;
-use crate::path_trace::integrator::{Integrator, Look, Paths};
+use crate::path_trace::integrator::Integrator;
+use crate::path_trace::paths::{Look, Paths};
 use crate::sampling::{Sampler, sphere};
 use crate::surface::MaterialModel;
 use crate::world::{World, WorldCache};

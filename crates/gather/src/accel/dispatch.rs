@@ -1,0 +1,99 @@
+//! The choice of instructions for a whole batch of rays: the one place that calls what is compiled for
+//! a processor's own.
+
+use super::item_buffer::ItemBuffer;
+use super::kernel::Kernel;
+use super::kernel_portable::{boxes_portable, triangles_portable};
+use super::light_buffer::LightBuffer;
+use super::walk::{Stacks, put, trace_with};
+use super::{Accel, Hit, Ray};
+
+/// Calls a function by its twin that is compiled for the kernel's instructions.
+macro_rules! dispatch {
+    ($kernel:expr, $twin:ident::<$($generic:ident),*>($($argument:expr),*), $portable:expr) => {
+        match $kernel {
+            Kernel::Portable => $portable,
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Avx2(_) => {
+                #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
+                // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for what it needs.
+                unsafe {
+                    super::kernel_avx2::$twin::<$($generic),*>($($argument),*);
+                }
+            }
+            #[cfg(target_arch = "aarch64")]
+            Kernel::Neon => {
+                #[expect(unsafe_code, reason = "calls code compiled for NEON")]
+                // SAFETY: `kernel_neon` refuses to compile for a target without NEON.
+                unsafe {
+                    super::kernel_neon::$twin::<$($generic),*>($($argument),*);
+                }
+            }
+        }
+    };
+}
+
+/// Finds the nearest hit of each ray, or with `ANY` the first found, and tells of each ray as soon as
+/// it is done. What comes with a ray is passed on to `accept` and `found`.
+#[inline]
+pub(super) fn trace<const ANY: bool, T: Copy>(
+    accel: &Accel,
+    rays: impl Iterator<Item = (Ray, T)>,
+    stacks: &mut Stacks,
+    accept: impl Fn(&T, &Hit) -> bool,
+    found: impl FnMut(T, Option<Hit>),
+) {
+    dispatch!(
+        accel.kernel,
+        trace::<ANY, T>(accel, rays, stacks, accept, found),
+        trace_with::<ANY, T>(
+            accel,
+            rays,
+            stacks,
+            accept,
+            found,
+            |node, ray, t_max, stack| {
+                put::<ANY>(node, ray, &boxes_portable(node, ray, t_max), stack)
+            },
+            triangles_portable,
+        )
+    );
+}
+
+impl ItemBuffer {
+    /// Finds the nearest surface that `accept` lets count on each of the rays, like [`Accel::closest`].
+    /// Rays that it cannot tell of are passed to `left`.
+    #[inline]
+    pub(crate) fn closest<T: Copy>(
+        &self,
+        rays: impl Iterator<Item = (Ray, T)>,
+        accept: impl Fn(&T, &Hit) -> bool,
+        found: impl FnMut(T, Option<Hit>),
+        left: impl FnMut(Ray, T),
+    ) {
+        dispatch!(
+            self.kernel(),
+            closest_seen::<T>(self, rays, accept, found, left),
+            self.closest_with(rays, accept, found, left, triangles_portable)
+        );
+    }
+}
+
+impl LightBuffer {
+    /// Whether any surface that `accept` lets count lies on each of the rays, which it must be for;
+    /// otherwise like [`Accel::occluded`]. Rays that it cannot tell of are passed to `left`.
+    #[inline]
+    pub(crate) fn occluded<T: Copy>(
+        &self,
+        rays: impl Iterator<Item = (Ray, T)>,
+        accept: impl Fn(&T, &Hit) -> bool,
+        found: impl FnMut(T, bool),
+        left: impl FnMut(Ray, T),
+    ) {
+        dispatch!(
+            self.kernel(),
+            occluded::<T>(self, rays, accept, found, left),
+            self.occluded_with(rays, accept, found, left, triangles_portable)
+        );
+    }
+}
