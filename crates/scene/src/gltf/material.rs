@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use glam::{Vec3, Vec4};
 
 use super::texture::{Images, image_of};
+use super::uv_sets::{UvSets, textures};
 use super::{glossiness, json};
 use crate::error::{At, Fault, invalid};
 use crate::limits::{self, Budget};
@@ -19,61 +20,6 @@ pub(super) fn images_used(root: &json::Root) -> Result<Vec<usize>, Fault> {
         }
     }
     Ok(used.into_iter().collect())
-}
-
-fn textures(m: &json::Material) -> impl Iterator<Item = &json::TextureInfo> {
-    let pbr = &m.pbr_metallic_roughness;
-    let specular = m.extensions.specular.as_ref();
-    let [first, second] = match &m.extensions.glossiness {
-        Some(gloss) => [&gloss.diffuse_texture, &gloss.specular_glossiness_texture],
-        None => [&pbr.base_color_texture, &pbr.metallic_roughness_texture],
-    };
-    [
-        first.as_ref(),
-        second.as_ref(),
-        m.normal_texture.as_ref().map(|n| &n.info),
-        m.occlusion_texture.as_ref().map(|o| &o.info),
-        m.emissive_texture.as_ref(),
-        m.extensions.transmission.as_ref().and_then(|t| t.transmission_texture.as_ref()),
-        specular.and_then(|s| s.specular_texture.as_ref()),
-        specular.and_then(|s| s.specular_color_texture.as_ref()),
-    ]
-    .into_iter()
-    .flatten()
-}
-
-/// Which sets of texture coordinates a material reads, as many as vertices hold: TEXCOORD_0 and 1
-/// unless it asks for a later one.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct UvSets([usize; 2]);
-
-impl UvSets {
-    pub(super) fn of(material: Option<&json::Material>) -> Self {
-        let mut sets = Vec::new();
-        for info in material.into_iter().flat_map(textures) {
-            if !sets.contains(&info.uv_set()) {
-                sets.push(info.uv_set());
-            }
-        }
-        if sets.iter().all(|set| *set < 2) {
-            return Self([0, 1]);
-        }
-        // Those of textures that count for more come first.
-        sets.truncate(2);
-        sets.sort_unstable();
-        let first = sets[0];
-        Self([first, sets.get(1).copied().unwrap_or(if first == 0 { 1 } else { 0 })])
-    }
-
-    /// By place among a vertex's coordinates.
-    pub(super) fn numbers(self) -> [usize; 2] {
-        self.0
-    }
-
-    /// The place of a set.
-    pub(super) fn place(self, set: usize) -> Option<usize> {
-        self.0.iter().position(|here| *here == set)
-    }
 }
 
 /// The file's materials, and after them glTF's default material.

@@ -15,6 +15,8 @@ mod skin;
 pub(crate) mod source;
 mod tangents;
 mod texture;
+mod uv_sets;
+mod vertices;
 
 use std::path::Path;
 use std::sync::Arc;

@@ -4,7 +4,7 @@ use glam::{Affine3A, Mat4, Vec4};
 
 use super::accessor::Accessors;
 use super::json;
-use super::mesh::{Notes, mend};
+use super::vertices::{Notes, mend};
 use crate::asset::Skin;
 use crate::error::{At, Fault, invalid};
 

@@ -9,7 +9,7 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::mesh::select_vertices;
+use super::vertices::select_vertices;
 use crate::material::TextureRef;
 use crate::mesh::Primitive;
 

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use super::accessor::Accessors;
 use super::json;
-use super::material::UvSets;
 use super::source::{Folder, data_uri, shorten};
+use super::uv_sets::UvSets;
 use crate::error::{At, Fault, invalid};
 use crate::limits;
 use crate::material::{Filter, Image, TextureRef, Wrap};
