@@ -6,8 +6,8 @@ use lumencast_scene::{Aabb, Deformation, MorphTarget, Pose, Primitive};
 use lumencast_shaders::{deform, layout};
 
 use crate::bindings;
-use crate::geometry::{self, Part};
 use crate::gpu::Gpu;
+use crate::part::{Part, SHAPE_SIZE};
 
 /// Vertices of a workgroup.
 const GROUP: u32 = 64;
@@ -34,7 +34,7 @@ impl Deformable {
         let vertices = primitive.vertices.positions.len();
         let floats = vertices * primitive.morph_targets.len() * DISPLACEMENT;
         let limits = gpu.device.limits();
-        let shapes = (vertices * geometry::SHAPE_SIZE) as u64;
+        let shapes = (vertices * SHAPE_SIZE) as u64;
         let sets = primitive.influence_sets().max(1);
         let influences = (vertices * sets * size_of::<layout::Influence>()) as u64;
         let most = shapes.max(influences).max((floats * size_of::<f32>()) as u64);

@@ -4,14 +4,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::UVec2;
 
+use crate::ShadeError;
 use crate::bindings::entry;
 use crate::settings::{Settings, Shading};
-use crate::{ShadeError, timing};
 
 /// What colours are drawn in before they are shown: linear, pre-exposed.
 pub(crate) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 /// Depth, of pictures and shadow maps alike.
 pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// The most passes of a frame that are timed: a query set holds no more pairs.
+pub(crate) const TIMED_PASSES: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
 
 /// What is used where an adapter has it, and done without where it has not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -162,7 +165,7 @@ impl Gpu {
                 keep(format!("device lost: {message}"), &of_loss);
             }
         });
-        let clock = timing::clock(&device);
+        let clock = clock(&device);
         let sample_shading = flags.contains(wgpu::DownlevelFlags::MULTISAMPLED_SHADING);
         Ok(Self { adapter, device, queue, info, clock, sample_counts, sample_shading, fault })
     }
@@ -327,6 +330,18 @@ impl Gpu {
         }
         buffer
     }
+}
+
+/// Two timestamps for each pass of a frame; nothing where the adapter has no clock.
+fn clock(device: &wgpu::Device) -> Option<wgpu::QuerySet> {
+    let has_clock = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+    has_clock.then(|| {
+        device.create_query_set(&wgpu::QuerySetDescriptor {
+            label: Some("passes"),
+            ty: wgpu::QueryType::Timestamp,
+            count: 2 * TIMED_PASSES as u32,
+        })
+    })
 }
 
 #[cfg(test)]

@@ -28,6 +28,7 @@ mod lights;
 mod materials;
 mod meter;
 mod occlusion;
+mod part;
 mod pipelines;
 mod readback;
 mod renderer;

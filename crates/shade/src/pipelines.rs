@@ -5,7 +5,7 @@ use lumencast_shaders::{Shading, background, depth, forward};
 use crate::gpu::{COLOR, DEPTH, Gpu};
 use crate::materials::Surface;
 use crate::settings::Transparency;
-use crate::{geometry, materials};
+use crate::{materials, part};
 
 /// What pipelines depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -228,7 +228,7 @@ fn mesh_pipeline(
     depth: wgpu::DepthStencilState,
     samples: u32,
 ) -> wgpu::RenderPipeline {
-    let buffers = geometry::vertex_layouts();
+    let buffers = part::vertex_layouts();
     let targets = [target];
     let fragment = entries.fragment.map(|entry| wgpu::FragmentState {
         module: entries.module,

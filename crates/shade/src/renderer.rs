@@ -530,7 +530,7 @@ impl Renderer {
     }
 }
 
-fn draw_call(pass: &mut wgpu::RenderPass<'_>, part: &crate::geometry::Part, call: &Call) {
+fn draw_call(pass: &mut wgpu::RenderPass<'_>, part: &crate::part::Part, call: &Call) {
     pass.set_vertex_buffer(0, part.shape.slice(..));
     pass.set_vertex_buffer(1, part.attributes.slice(..));
     pass.set_index_buffer(part.indices.slice(..), wgpu::IndexFormat::Uint32);

@@ -10,9 +10,10 @@ use lumencast_shaders::layout;
 
 use crate::camera::Frustum;
 use crate::deform::{Cause, Deformer};
-use crate::geometry::{Geometry, Part};
+use crate::geometry::Geometry;
 use crate::gpu::Gpu;
 use crate::materials::{GpuMaterial, Surface};
+use crate::part::Part;
 use crate::settings::Materials;
 use crate::textures::Textures;
 use crate::timing::{Commands, Stage};

@@ -1,7 +1,7 @@
 //! The commands of a frame, and how long their passes take on the device, where the adapter tells.
 
 use crate::ShadeError;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, TIMED_PASSES};
 use crate::readback::Readback;
 
 /// Seconds on the device, by what passes are for.
@@ -51,23 +51,9 @@ pub(crate) enum Stage {
     Screen,
 }
 
-/// The most passes of a frame that are timed: a query set holds no more pairs.
-const MOST: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
 /// Of a timestamp.
 const TICK: usize = size_of::<u64>();
 const DURING: &str = "reading timestamps";
-
-/// Two timestamps for each pass of a frame; nothing where the adapter has no clock.
-pub(crate) fn clock(device: &wgpu::Device) -> Option<wgpu::QuerySet> {
-    let has_clock = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
-    has_clock.then(|| {
-        device.create_query_set(&wgpu::QuerySetDescriptor {
-            label: Some("passes"),
-            ty: wgpu::QueryType::Timestamp,
-            count: 2 * MOST as u32,
-        })
-    })
-}
 
 /// Commands that are submitted together, whose passes are timed.
 #[derive(Debug)]
@@ -116,13 +102,13 @@ impl Commands {
     fn stamps(&mut self, stage: Stage) -> Option<[u32; 2]> {
         let pass = self.stages.len();
         self.stages.push(stage);
-        (pass < MOST).then_some([2 * pass as u32, 2 * pass as u32 + 1])
+        (pass < TIMED_PASSES).then_some([2 * pass as u32, 2 * pass as u32 + 1])
     }
 
     /// Submits the commands, and asks for what they will have taken.
     pub(crate) fn submit(self, gpu: &Gpu) -> Option<Timed> {
         let Self { mut encoder, clock, stages } = self;
-        let clock = clock.filter(|_| (1..=MOST).contains(&stages.len()));
+        let clock = clock.filter(|_| (1..=TIMED_PASSES).contains(&stages.len()));
         let read = clock.map(|clock| {
             let size = (2 * TICK * stages.len()) as u64;
             let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
