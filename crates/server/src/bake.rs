@@ -10,8 +10,9 @@ use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
 use crate::field::{Brought, Field, publish};
+use crate::gather_options::GatherOptions;
 use crate::noise;
-use crate::tick::{GatherOptions, look};
+use crate::tick::look;
 
 /// Samples of a probe in one job: enough to spread directions well, few enough to show progress.
 const SAMPLES_A_PASS: u32 = 256;

@@ -11,9 +11,20 @@ use lumencast_light::{LightField, ProbeVolume, VolumeId};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
+use crate::gather_options::GatherOptions;
 use crate::surfaces::Surfaces;
-use crate::tick::{GatherOptions, Moment};
 use crate::walls::{Buried, Sight};
+
+/// A moment of the scene.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moment {
+    /// The tick in which it was looked at.
+    pub(crate) tick: u64,
+    /// Scene time, seconds.
+    pub(crate) time: f64,
+    /// [`Snapshot::version`].
+    pub(crate) version: u64,
+}
 
 /// A volume with all that turns sums into frames.
 ///

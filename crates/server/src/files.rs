@@ -1,53 +1,18 @@
 //! Files that may be served: an allow-list of names, so that no request can name another.
 
 use std::collections::BTreeMap;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
-use axum::body::{Body, Bytes};
+use axum::body::Body;
 use axum::http::request::Parts;
 use axum::http::{HeaderValue, Request, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use flate2::Compression;
-use flate2::write::GzEncoder;
 use tower_http::services::ServeDir;
 
+use crate::contents::Contents;
+use crate::media_type::content_type;
 use crate::open_file::Resource;
-
-/// Text shorter than this, bytes, is not worth compressing.
-const SHORT: usize = 1024;
-
-/// Where the bytes of a file are.
-#[derive(Clone, Debug)]
-pub(crate) enum Contents {
-    /// On disk, by a path without links; streamed at each request.
-    Path(PathBuf),
-    /// In memory, and for those who accept it the same compressed.
-    Bytes { plain: Bytes, gzip: Option<Bytes> },
-}
-
-impl Contents {
-    /// A file on disk. Where a link leads is looked up now, and followed no more.
-    pub(crate) fn at(path: &Path) -> io::Result<Self> {
-        Ok(Self::Path(path.canonicalize()?))
-    }
-
-    pub(crate) fn of(bytes: Bytes) -> Self {
-        Self::Bytes { plain: bytes, gzip: None }
-    }
-
-    /// The same with text that is kept in memory compressed, too.
-    fn compressed(self, name: &str) -> Self {
-        match self {
-            Self::Bytes { plain, .. } if is_text(name) && plain.len() >= SHORT => {
-                let mut gzip = GzEncoder::new(Vec::new(), Compression::best());
-                let gzip = gzip.write_all(&plain).and_then(|()| gzip.finish());
-                Self::Bytes { plain, gzip: gzip.ok().map(Bytes::from) }
-            }
-            other => other,
-        }
-    }
-}
 
 /// Names, relative to a URL, with forward slashes, and what stands behind them.
 #[derive(Clone, Debug, Default)]
@@ -143,42 +108,12 @@ pub(crate) async fn respond(name: &str, contents: Option<Contents>, asked: &Part
     response
 }
 
-/// Whether a file of this name is text, by its ending.
-fn is_text(name: &str) -> bool {
-    let kind = content_type(name);
-    kind.starts_with("text/") || kind == "application/json" || kind == "image/svg+xml"
-}
-
-/// The media type of a file by the end of its name.
-fn content_type(name: &str) -> &'static str {
-    let extension = name.rsplit_once('.').map_or("", |(_, e)| e).to_ascii_lowercase();
-    match extension.as_str() {
-        "html" => "text/html; charset=utf-8",
-        "js" | "mjs" => "text/javascript; charset=utf-8",
-        "css" => "text/css; charset=utf-8",
-        "json" | "map" => "application/json",
-        "txt" => "text/plain; charset=utf-8",
-        "svg" => "image/svg+xml",
-        "png" => "image/png",
-        "jpg" | "jpeg" => "image/jpeg",
-        "webp" => "image/webp",
-        "ico" => "image/x-icon",
-        "woff2" => "font/woff2",
-        "wasm" => "application/wasm",
-        "glb" => "model/gltf-binary",
-        "gltf" => "model/gltf+json",
-        "hdr" => "image/vnd.radiance",
-        "exr" => "image/x-exr",
-        _ => "application/octet-stream",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::fs;
     use std::io::Read;
 
-    use axum::body::HttpBody;
+    use axum::body::{Bytes, HttpBody};
     use flate2::read::GzDecoder;
 
     use super::*;

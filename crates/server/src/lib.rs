@@ -8,13 +8,16 @@
 #![forbid(unsafe_code)]
 
 mod bake;
+mod contents;
 mod edits;
 mod error;
 mod field;
 mod files;
+mod gather_options;
 mod http;
 mod inbox;
 mod loader;
+mod media_type;
 mod metrics;
 mod names;
 mod noise;
@@ -32,6 +35,7 @@ mod walls;
 
 pub use bake::{Baked, Done, Effort, bake};
 pub use error::ServerError;
+pub use gather_options::{FitOptions, GatherOptions};
 pub use inbox::{Inbox, Limits, Mail, Received, Verdict};
 pub use metrics::Metrics;
 pub use pace::{Beat, Budget, SampleRange};
@@ -40,4 +44,4 @@ pub use placement::{Survey, default_volume, survey, volumes};
 pub use publish::Outlet;
 pub use report::{Report, Stage};
 pub use server::{Server, ServerConfig};
-pub use tick::{FitOptions, GatherOptions, Tick, TickOptions};
+pub use tick::{Tick, TickOptions};

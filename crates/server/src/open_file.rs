@@ -13,7 +13,7 @@ use axum::body::Bytes;
 use tokio::io::{AsyncRead, AsyncSeek, ReadBuf};
 use tower_http::services::fs::{self as served, Backend};
 
-use crate::files::Contents;
+use crate::contents::Contents;
 
 /// One file, whatever the path that is asked for; compressed where the path ends so.
 #[derive(Clone, Debug)]

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use axum::body::Bytes;
 
-use crate::files::{Contents, FileSet};
+use crate::contents::Contents;
+use crate::files::FileSet;
 
 /// `(name, bytes)` of the page's files if it was built when this crate was compiled.
 mod embedded {

@@ -11,9 +11,10 @@ use lumencast_codec::Epoch;
 use lumencast_gather::Gather;
 use lumencast_scene::{FileContents, Scene};
 
+use crate::contents::Contents;
 use crate::edits;
 use crate::error::ServerError;
-use crate::files::{Contents, FileSet};
+use crate::files::FileSet;
 use crate::http::{self, Shared, Ticked};
 use crate::inbox::{Inbox, Limits};
 use crate::loader::Loader;

@@ -10,7 +10,7 @@ use lumencast_gather::{Job, Receiver, Sums, SurfacePoint};
 use lumencast_light::Grid;
 use lumencast_scene::Snapshot;
 
-use crate::tick::FitOptions;
+use crate::gather_options::FitOptions;
 
 /// What a point's light is known from begins anew when the point has moved by more than this share of
 /// a cell, or its normal turned by more than the angle of this cosine.

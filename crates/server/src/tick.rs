@@ -8,13 +8,13 @@ use lumencast_codec::{
     AcceptedEdit, Catalog, EncodedRegion, Epoch, RefusedEdit, SceneInfo, SceneState, StateFrame,
     limits,
 };
-use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::{Gather, Ticket};
-use lumencast_light::{LightField, Offset, ProbeVolume};
+use lumencast_light::{LightField, ProbeVolume};
 use lumencast_scene::{Edit, FileRead, Scene, Script, Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
-use crate::field::{Brought, Field, publish};
+use crate::field::{Brought, Field, Moment, publish};
+use crate::gather_options::GatherOptions;
 use crate::inbox::{Mail, Received, refusal};
 use crate::pace::{Budget, SampleRange};
 use crate::placement;
@@ -55,44 +55,6 @@ impl Default for TickOptions {
             source: String::new(),
         }
     }
-}
-
-/// How light is gathered and blended.
-#[derive(Clone, Copy, Debug)]
-pub struct GatherOptions {
-    /// Surface scattering events on a path seen from a probe.
-    pub bounces: u32,
-    /// Upper limit of one path vertex's contribution, cd/m².
-    pub clamp: f32,
-    /// How updates are blended over time.
-    pub blend: BlendSettings,
-    /// Whether, and how, probes are fitted to the surfaces about them; otherwise they hold the light
-    /// that arrives at them.
-    pub fit: Option<FitOptions>,
-    /// Where in front of surfaces clients are to read the light. Fitted light is right there alone.
-    pub offset: Offset,
-}
-
-impl Default for GatherOptions {
-    fn default() -> Self {
-        Self {
-            bounces: 3,
-            clamp: f32::INFINITY,
-            blend: BlendSettings::default(),
-            fit: None,
-            offset: Offset::default(),
-        }
-    }
-}
-
-/// How probes are fitted to surfaces ([`lumencast_gather::fit`]).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FitOptions {
-    /// Directions a probe in which points of surfaces are looked for, at least 1; fewer where a volume
-    /// has so many probes that there would be more than a million points. Gathering at them takes as
-    /// many samples as gathering at the probes, in all, and up to as many more as there are places about
-    /// the volume from which something is seen.
-    pub points: u32,
 }
 
 /// Rounds and steps of a tick's fit, which goes on from the last one's.
@@ -477,17 +439,6 @@ pub(crate) fn look(
         }
     }
     failed
-}
-
-/// A moment of the scene.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Moment {
-    /// The tick in which it was looked at.
-    pub(crate) tick: u64,
-    /// Scene time, seconds.
-    pub(crate) time: f64,
-    /// [`Snapshot::version`].
-    pub(crate) version: u64,
 }
 
 /// Cuts reasons where many edits are refused, so that a frame holds all refusals.
