@@ -2,6 +2,9 @@
 
 use std::net::SocketAddr;
 
+/// Why a connection did not become a session, or how its session ended.
+pub(crate) type Failure = Box<dyn std::error::Error + Send + Sync>;
+
 /// An error of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

@@ -11,10 +11,10 @@ use tower::ServiceExt as _;
 
 use crate::guests::Guests;
 use crate::origin_check::{OriginCheck, Refusal};
+use crate::peer::Peer;
 use crate::progress::{Patience, Progress, under_way};
 use crate::refusals::RefusalKind;
 use crate::session::Backend;
-use crate::tcp::Peer;
 use crate::tls::Fingerprint;
 use crate::websocket;
 

@@ -44,6 +44,7 @@ mod in_order;
 mod listen;
 mod names;
 mod origin_check;
+mod peer;
 mod progress;
 mod quic;
 mod rarely;

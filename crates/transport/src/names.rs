@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use moq_net::{announce, origin};
 use moq_relay::auth;
 
-use crate::session::Failure;
+use crate::error::Failure;
 
 /// Bytes of a name, with the scene's.
 const LONGEST: usize = 256;

@@ -10,7 +10,8 @@ use std::time::Duration;
 use axum::http::StatusCode;
 use web_transport_moq::{Request, noq, proto};
 
-use crate::session::{Admitted, Ask, Backend, Failure, HANDSHAKE};
+use crate::error::Failure;
+use crate::session::{Admitted, Ask, Backend, HANDSHAKE};
 
 /// How long a refused client may take to hear so.
 const ANSWER: Duration = Duration::from_secs(1);

@@ -12,13 +12,14 @@ use tokio::task::JoinHandle;
 use web_transport_moq::noq;
 
 use crate::access::{self, Access, Sessions};
+use crate::error::Failure;
 use crate::guests::Guests;
 use crate::http::Front;
 use crate::names::Names;
 use crate::origin_check::OriginCheck;
 use crate::progress::Patience;
 use crate::refusals::Refusals;
-use crate::session::{Backend, Failure};
+use crate::session::Backend;
 use crate::tls::{self, Fingerprint, Identified, Tls};
 use crate::{Announcements, Broadcast, Error, Result, descriptors, listen, quic, tcp};
 

@@ -9,6 +9,7 @@ use moq_net::web_transport_trait;
 use moq_relay::{auth, cluster, shutdown};
 
 use crate::access::Sessions;
+use crate::error::Failure;
 use crate::guests::{Guest, Guests};
 use crate::names::Names;
 use crate::origin_check::OriginCheck;
@@ -21,9 +22,6 @@ pub(crate) const HANDSHAKE: Duration = Duration::from_secs(10);
 /// Streams that a client may have open at once, of each kind: every subscription holds one, and
 /// every group on its way another.
 pub(crate) const MAX_STREAMS: u32 = 1024;
-
-/// Why a connection did not become a session, or how its session ended.
-pub(crate) type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 /// What sessions are checked by and served from.
 #[derive(Clone)]

@@ -1,7 +1,6 @@
 //! The TCP side of the server: HTTP, with TLS where there are certificate files.
 
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Body;
@@ -12,11 +11,13 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
 
+use crate::error::Failure;
 use crate::http::Front;
+use crate::peer::{Peer, stats};
 use crate::progress::Progress;
 use crate::rarely::Rarely;
 use crate::refusals::RefusalKind;
-use crate::session::{Failure, HANDSHAKE};
+use crate::session::HANDSHAKE;
 #[cfg(target_os = "linux")]
 use crate::unsent;
 
@@ -29,14 +30,6 @@ const HTTP1_BUFFER: usize = 128 << 10;
 /// The same of each stream, and how many of them there are.
 const HTTP2_BUFFER: usize = 64 << 10;
 const HTTP2_STREAMS: u32 = 32;
-
-/// Who is at the other end of a TCP connection.
-#[derive(Clone)]
-pub(crate) struct Peer {
-    pub(crate) remote: SocketAddr,
-    /// What the kernel knows of the connection, for the estimate of its bandwidth.
-    pub(crate) stats: Option<qmux::SharedSocketStats>,
-}
 
 /// Accepts connections until it is dropped.
 pub(crate) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, front: Front) {
@@ -125,14 +118,4 @@ where
         ended = served => ended,
         () = progress.stalled() => Err("it stands still".into()),
     }
-}
-
-#[cfg(unix)]
-fn stats(stream: &TcpStream) -> Option<qmux::SharedSocketStats> {
-    qmux::TcpStats::new(stream).ok().map(|stats| Arc::new(stats) as _)
-}
-
-#[cfg(not(unix))]
-fn stats(_: &TcpStream) -> Option<qmux::SharedSocketStats> {
-    None
 }

@@ -10,9 +10,10 @@ use qmux::ws::tokio_tungstenite::WebSocketStream;
 use qmux::ws::tungstenite::handshake;
 use qmux::ws::tungstenite::protocol::{Role, WebSocketConfig};
 
+use crate::error::Failure;
 use crate::in_order;
-use crate::session::{Admitted, Ask, Backend, Failure, MAX_STREAMS};
-use crate::tcp::Peer;
+use crate::peer::Peer;
+use crate::session::{Admitted, Ask, Backend, MAX_STREAMS};
 
 /// The largest message, bytes: of one record or frame of 16 KiB, with its head.
 const MESSAGE: usize = 17 << 10;
