@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::{Quat, UVec3, Vec3};
@@ -19,6 +19,10 @@ use lumencast_shade::Occlusion;
 
 use crate::environment::EnvironmentArgument;
 use crate::output::tell;
+use crate::values::{
+    parse_list, parse_offset, parse_order, parse_point, parse_positive, parse_rate, parse_samples,
+    parse_share,
+};
 use crate::{output, warnings};
 
 /// The port of `serve` unless told otherwise.
@@ -426,92 +430,10 @@ impl FromStr for VolumeArgument {
     }
 }
 
-/// `X,Y,Z`
-pub(crate) fn parse_point(text: &str) -> Result<Vec3> {
-    let point: [f32; 3] =
-        parse_list(text, ',').with_context(|| format!("{text:?}: a point is given as X,Y,Z"))?;
-    let point = Vec3::from(point);
-    ensure!(point.is_finite(), "{text:?}: coordinates are finite");
-    Ok(point)
-}
-
-fn parse_list<T: FromStr>(text: &str, separator: char) -> Result<[T; 3]>
-where
-    T::Err: std::error::Error + Send + Sync + 'static,
-{
-    let numbers = text.split(separator).map(|n| n.trim().parse()).collect::<Result<Vec<T>, _>>()?;
-    numbers.try_into().map_err(|n: Vec<T>| anyhow!("3 numbers are needed, not {}", n.len()))
-}
-
-/// How far in front of a surface a field is read.
-fn parse_offset(text: &str) -> Result<Offset, String> {
-    let number = |text: &str| text.parse().ok().filter(|number: &f32| number.is_finite());
-    let offset = match text {
-        "none" => Some(Offset::NONE),
-        "half-cell" => Some(Offset::HALF_CELL),
-        _ => match text.strip_suffix("-cells") {
-            Some(cells) => number(cells).map(Offset::Cells),
-            None => number(text).map(Offset::Metres),
-        },
-    };
-    offset.ok_or_else(|| "none, half-cell, cells as in 0.2-cells, or a number of metres".into())
-}
-
-/// How far ambient occlusion reaches, metres; 0 for none.
-pub(crate) fn parse_occlusion(text: &str) -> Result<f32> {
-    let metres: f32 = text.parse()?;
-    ensure!(metres >= 0.0 && metres.is_finite(), "metres, 0 or more");
-    Ok(metres)
-}
-
 /// Ambient occlusion that reaches so far.
 #[cfg(feature = "gpu")]
 pub(crate) fn occlusion(radius: f32) -> Option<Occlusion> {
     (radius > 0.0).then(|| Occlusion { radius, ..Occlusion::default() })
-}
-
-/// `1` to `4`
-pub(crate) fn parse_order(text: &str) -> Result<Order, String> {
-    let band: u8 = text.parse().map_err(|e| format!("{e}"))?;
-    Order::try_from(band)
-}
-
-/// `N` or `MIN..MAX`
-fn parse_samples(text: &str) -> Result<SampleRange> {
-    let number = |text: &str| -> Result<u32> {
-        let n = text.parse().with_context(|| format!("{text:?}: N or MIN..MAX is needed"))?;
-        ensure!((1..=1_000_000).contains(&n), "1 to 1000000 samples");
-        Ok(n)
-    };
-    match text.split_once("..") {
-        None => Ok(SampleRange::fixed(number(text)?)),
-        Some((min, max)) => {
-            let (min, max) = (number(min)?, number(max)?);
-            ensure!(min <= max, "{min} is more than {max}");
-            Ok(SampleRange { min, max })
-        }
-    }
-}
-
-/// More than 0, at most 1.
-fn parse_share(text: &str) -> Result<f32> {
-    let share: f32 = text.parse()?;
-    ensure!(share > 0.0 && share <= 1.0, "more than 0, at most 1");
-    Ok(share)
-}
-
-/// A number above 0, or `inf`.
-pub(crate) fn parse_positive(text: &str) -> Result<f32> {
-    let number: f32 = text.parse()?;
-    ensure!(number > 0.0, "more than 0");
-    Ok(number)
-}
-
-/// Ticks a second.
-fn parse_rate(text: &str) -> Result<f64> {
-    let rate: f64 = text.parse()?;
-    ensure!((0.1..=1000.0).contains(&rate), "0.1 to 1000 ticks a second");
-    Ok(rate)
 }
 
 #[cfg(test)]

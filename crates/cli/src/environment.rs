@@ -5,7 +5,7 @@ use std::str::FromStr;
 use anyhow::{Context, Result, bail, ensure};
 use lumencast_scene::Environment;
 
-use crate::arguments::parse_point;
+use crate::values::parse_point;
 
 /// `sky:LUX`, `R,G,B` or the name of a picture.
 #[derive(Clone, Debug, PartialEq)]

@@ -30,6 +30,7 @@ mod remote;
 mod render;
 mod serve;
 mod token;
+mod values;
 #[cfg(feature = "window")]
 mod view;
 mod warnings;

@@ -7,8 +7,9 @@ use lumencast_gather::reference::{ProbeEstimate, ProbeSettings, probe_sh};
 use lumencast_light::Order;
 use serde_json::{Value, json};
 
-use crate::arguments::{Materials, SceneSource, parse_order, parse_point};
+use crate::arguments::{Materials, SceneSource};
 use crate::output::{self, say};
+use crate::values::{parse_order, parse_point};
 
 /// Computes the spherical-harmonic coefficients of the radiance that arrives at points.
 #[derive(Debug, Args)]

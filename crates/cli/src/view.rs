@@ -18,12 +18,10 @@ use tokio::runtime::Runtime;
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 
-use crate::arguments::{
-    Exposure, GatherArguments, SceneArguments, TickArguments, occlusion, parse_occlusion,
-    parse_positive,
-};
+use crate::arguments::{Exposure, GatherArguments, SceneArguments, TickArguments, occlusion};
 use crate::camera::{self, CameraArgument, parse_size};
 use crate::light_source::{self, is_address};
+use crate::values::{parse_occlusion, parse_positive};
 use crate::{out_file, output, warnings};
 
 /// How long threads may take to end once the window is closed.

@@ -11,8 +11,9 @@ use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use lumencast_picture::{Picture, ToneMap};
 
-use crate::arguments::{Exposure, SceneArguments, parse_positive};
+use crate::arguments::{Exposure, SceneArguments};
 use crate::camera::{self, PictureArguments};
+use crate::values::parse_positive;
 use crate::{light_source, out_file};
 
 /// Draws a picture of a scene.

@@ -6,10 +6,9 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use glam::UVec2;
 
-use crate::arguments::{
-    EffortArguments, MOST_SAMPLES, ReadingArguments, parse_occlusion, parse_positive,
-};
+use crate::arguments::{EffortArguments, MOST_SAMPLES, ReadingArguments};
 use crate::light_source;
+use crate::values::{parse_occlusion, parse_positive};
 
 /// How an adapter draws.
 #[derive(Debug, Args)]

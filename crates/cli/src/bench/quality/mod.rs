@@ -20,8 +20,9 @@ use lumencast_light::Order;
 use lumencast_scene::{Scene, Snapshot, View, VolumeSpec};
 use lumencast_shade::{Gpu, Renderer, Settings, Shading, Shadows};
 
-use crate::arguments::{ReadingArguments, SceneArguments, parse_positive};
+use crate::arguments::{ReadingArguments, SceneArguments};
 use crate::camera::{self, PictureArguments};
+use crate::values::parse_positive;
 use crate::{out_file, output};
 use field::{Canvas, Field};
 use reference::Judge;
@@ -59,7 +60,7 @@ pub(crate) struct BenchQuality {
     picture: PictureArguments,
     /// Orders of the spherical harmonics.
     #[arg(long, value_name = "L,…", value_delimiter = ',', default_value = "2,3,4",
-          value_parser = crate::arguments::parse_order)]
+          value_parser = crate::values::parse_order)]
     orders: Vec<Order>,
     /// Samples a pixel of the reference.
     #[arg(long, value_name = "N", default_value_t = 256,

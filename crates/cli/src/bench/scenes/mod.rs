@@ -72,7 +72,7 @@ pub(crate) struct BenchScenes {
     times: Option<u32>,
     /// Also casts each scene's light for so many seconds of 25 ticks, as `serve` does with these samples
     /// a probe and tick, and compares what then is there with the same light converged.
-    #[arg(long, value_name = "SECONDS", value_parser = crate::arguments::parse_positive)]
+    #[arg(long, value_name = "SECONDS", value_parser = crate::values::parse_positive)]
     live: Option<f32>,
     /// Samples a probe and tick of --live.
     #[arg(long, value_name = "N", default_value_t = 64, requires = "live",
