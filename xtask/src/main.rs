@@ -5,7 +5,11 @@
 mod arm;
 mod contenders;
 mod demo;
+#[cfg(test)]
+mod documents;
 mod figures;
+#[cfg(test)]
+mod imports;
 mod licences;
 mod oracles;
 mod run;
