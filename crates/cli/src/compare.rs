@@ -26,7 +26,7 @@ the exposure, peak 1, clamped to 0 to 1 except for psnr_unclamped. HDR-FLIP is o
 both files have them; it finds its exposures itself. MSE and relative MSE, (p−r)²/(r²+0.01), are of
 linear values times the exposure. A PNG beside a linear file is decoded by the curve of sRGB and
 encoded again as that file is; the exposure is not applied to it. FLIP and HDR-FLIP are means over
-pixels, 0 to 1. docs/math.md gives definitions and sources.
+pixels, 0 to 1. docs/drawing.md gives definitions and sources.
 
 In JSON a PSNR of equal pictures, which is infinite, is null; so are SSIM of pictures under 11 × 11
 pixels and HDR-FLIP with a PNG. exposure is the factor used.")]

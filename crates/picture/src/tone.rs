@@ -10,7 +10,7 @@ use crate::luminance;
 /// How linear colour becomes display codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ToneMap {
-    /// Clamped, then v^(1/2.2): what errors are measured on (`docs/math.md`).
+    /// Clamped, then v^(1/2.2): what errors are measured on (`docs/drawing.md`).
     Gamma,
     /// Clamped, then the curve of sRGB (IEC 61966-2-1).
     #[default]
