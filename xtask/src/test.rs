@@ -41,6 +41,9 @@ impl Test {
         }
         step("tests", tests)?;
         step("doctests", cargo(&["test", "--workspace", "--doc", "--quiet"]))?;
+        let mut documentation = cargo(&["doc", "--workspace", "--no-deps", "--quiet"]);
+        documentation.env("RUSTDOCFLAGS", "-D warnings");
+        step("documentation", documentation)?;
         heading("licences and sources of dependencies");
         licences::check()?;
         if !self.no_browser {

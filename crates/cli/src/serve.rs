@@ -57,7 +57,7 @@ pub(crate) struct Serve {
     /// A name under which this server is reached, besides localhost and addresses; repeatable.
     #[arg(long, value_name = "NAME", help_heading = "Network")]
     allow_host: Vec<String>,
-    /// An origin (https://host[:port]) whose pages may connect, besides the server's own; repeatable.
+    /// An origin, as in https://host:port, whose pages may connect, besides the server's own; repeatable.
     #[arg(long, value_name = "ORIGIN", help_heading = "Network")]
     allow_origin: Vec<String>,
     /// Sessions open at once, at most; further ones are refused until one ends.

@@ -1,6 +1,6 @@
 //! Gathering of light: receivers in, sums out.
 //!
-//! A gatherer knows a [`Snapshot`](lumencast_scene::Snapshot) of the scene and receivers, not
+//! A gatherer knows a [`Snapshot`] of the scene and receivers, not
 //! volumes or lightmaps. It works on its own threads; the caller submits and polls.
 
 mod accel;
