@@ -61,13 +61,14 @@ impl AccelCache {
         }
         let rigid = snapshot.instances.iter().filter(|i| i.deformation.is_none());
         let (trees, rigid) = (self.trees, rigid.map(|i| (address(&i.mesh), i)));
-        update_all(&mut self.rigid, rigid, |kept, i| Kept::rigid(kept, i, trees));
+        update_all(&mut self.rigid, rigid, |kept, i| Kept::rigid(kept, i, trees), Kept::is_owned);
         let deforming =
             snapshot.instances.iter().filter_map(|i| Some((i, i.deformation.as_ref()?)));
         update_all(
             &mut self.deforming,
             deforming.map(|of| (deforming_key(of.0), of)),
             Kept::deformed,
+            |_| false,
         );
         let placed = (0..).zip(&snapshot.instances).map(|(index, instance)| {
             let bvh = match &instance.deformation {
@@ -95,11 +96,12 @@ fn deforming_key(instance: &Instance) -> (NodeId, Address) {
     (instance.node, address(&instance.mesh))
 }
 
-/// Brings what is kept to what there is now, several at once, and drops the rest.
+/// Brings what is kept to what there is now, several at once, and drops the rest unless it is to stay.
 fn update_all<K, I, D>(
     all: &mut HashMap<K, Kept<D>>,
     now: impl Iterator<Item = (K, I)>,
     update: impl Fn(Option<Kept<D>>, I) -> Kept<D> + Sync + Send,
+    stays: impl Fn(&Kept<D>) -> bool,
 ) where
     K: Copy + Eq + Hash + Send,
     I: Send,
@@ -108,10 +110,17 @@ fn update_all<K, I, D>(
     let mut seen = HashSet::new();
     let distinct = now.filter(|(key, _)| seen.insert(*key));
     let both: Vec<_> = distinct.map(|(key, of)| (key, all.remove(&key), of)).collect();
-    *all = both.into_par_iter().map(|(key, kept, of)| (key, update(kept, of))).collect();
+    all.retain(|_, kept| stays(kept));
+    all.par_extend(both.into_par_iter().map(|(key, kept, of)| (key, update(kept, of))));
 }
 
 impl Kept<()> {
+    /// Whether somebody else has the mesh, as a scene has those of files that edits have added: what is
+    /// taken away and added again is not built again, however often.
+    fn is_owned(&self) -> bool {
+        Arc::strong_count(&self.mesh) > 1
+    }
+
     fn rigid(kept: Option<Self>, instance: &Instance, trees: Trees) -> Self {
         kept.unwrap_or_else(|| Self {
             mesh: instance.mesh.clone(),

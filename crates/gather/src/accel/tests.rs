@@ -382,6 +382,11 @@ fn cache_keeps_what_has_not_changed() {
     };
     assert_eq!(a, b, "instances of a node share its hierarchy");
     update(&snapshot(vec![]));
+    let added_again = update(&snapshot(vec![instance(0, None)]));
+    assert_eq!(added_again[0], first[0], "somebody has the mesh still");
+    drop((both, moved));
+    drop(mesh);
+    update(&snapshot(vec![]));
     assert!(cache.rigid.is_empty() && cache.deforming.is_empty());
 }
 
