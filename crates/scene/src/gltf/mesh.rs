@@ -126,6 +126,8 @@ fn read_attributes(
         if let Some(index) = attribute("TANGENT") {
             let tangents = accessors.floats::<4>(index).at(|| "TANGENT".into())?;
             check("TANGENT", tangents.len())?;
+            let mut tangents: Vec<_> = tangents.into_iter().map(Vec4::from).collect();
+            mend("TANGENT", &mut tangents, Vec3::X.extend(1.0), notes);
             primitive.vertices.tangents = tangents.into_iter().map(unit_tangent).collect();
         }
     }
@@ -178,9 +180,9 @@ fn check_positions(primitive: &mut Primitive, notes: &mut Notes) -> Result<(), F
     Ok(())
 }
 
-fn unit_tangent(t: [f32; 4]) -> Vec4 {
-    let direction = Vec3::new(t[0], t[1], t[2]).try_normalize().unwrap_or(Vec3::X);
-    direction.extend(if t[3] < 0.0 { -1.0 } else { 1.0 })
+fn unit_tangent(tangent: Vec4) -> Vec4 {
+    let direction = tangent.truncate().try_normalize().unwrap_or(Vec3::X);
+    direction.extend(if tangent.w < 0.0 { -1.0 } else { 1.0 })
 }
 
 fn read_morph_targets(

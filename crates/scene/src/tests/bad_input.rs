@@ -219,6 +219,7 @@ pub(super) fn bent(attribute: &str, bad: f32) -> Vec<u8> {
         "COLOR_0" => ("VEC3", vec![0.5; 9]),
         "WEIGHTS_0" => ("VEC4", vec![0.5; 12]),
         "NORMAL" => ("VEC3", [0.0, 0.0, 1.0].repeat(3)),
+        "TANGENT" => ("VEC4", [1.0, 0.0, 0.0, 1.0].repeat(3)),
         _ => ("VEC3", TRIANGLE.to_vec()),
     };
     numbers[4] = bad;

@@ -16,13 +16,15 @@ fn warning(scene: &Scene) -> &str {
 
 #[test]
 fn attributes_that_are_not_finite_are_passed_over() {
-    for attribute in ["NORMAL", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0", "WEIGHTS_0"] {
+    for attribute in ["NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0", "WEIGHTS_0"] {
         for bad in [f32::NAN, f32::INFINITY, 1e30] {
             let scene = Scene::from_glb("test", bent(attribute, bad)).expect("mended");
             let expected = format!("mesh 1 \"bent\", primitive 0: {attribute}: 1 of its elements");
             assert!(warning(&scene).starts_with(&expected), "{}", warning(&scene));
             let primitive = &scene.meshes()[1].primitives[0];
             assert!(primitive.vertices.normals.iter().all(|n| *n == Vec3::Z));
+            let tangents = &primitive.vertices.tangents;
+            assert!(tangents.iter().all(|t| *t == Vec3::X.extend(1.0)), "{tangents:?}");
             assert!(primitive.uv.iter().flatten().all(|uv| uv.is_finite()));
             assert!(primitive.colors.iter().all(|c| c.is_finite()));
             assert!(primitive.weights.iter().all(|w| (w.element_sum() - 1.0).abs() < 1e-6));
