@@ -1,4 +1,4 @@
-//! Saved light fields.
+//! Saved light.
 
 #![no_main]
 

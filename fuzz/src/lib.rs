@@ -73,7 +73,7 @@ pub fn packed(track: u8, frame: &[u8]) -> Vec<u8> {
     [&[track, low, high], frame].concat()
 }
 
-/// Saved light fields.
+/// Saved light.
 pub fn light_file(data: &[u8]) {
     if let Ok(file) = LightFile::read(data) {
         LightFile::read(&file.write()).expect("what was written");

@@ -5,7 +5,7 @@ use std::path::Path;
 use base64::{Engine, prelude::BASE64_STANDARD};
 use glam::{Quat, UVec3, Vec3};
 use lumencast_codec::{Epoch, LightFile, ProbeHeader, SceneInfo, UpdateInfo};
-use lumencast_light::{Grid, Order, ProbeVolume, VolumeId};
+use lumencast_light::{FieldId, Grid, Order, ProbeVolume};
 use lumencast_scene::{FileContents, Scene};
 use serde_json::{Value, json};
 
@@ -72,7 +72,7 @@ fn dark(size: UVec3, order: Order) -> LightFile {
         size: size.as_vec3(),
         resolution: size,
     };
-    let volume = ProbeVolume::dark(VolumeId(0), grid, order);
+    let volume = ProbeVolume::dark(FieldId(0), grid, order);
     let scene = SceneInfo { name: "fuzz".into(), root: "fuzz.glb".into() };
     LightFile::of_volumes(Epoch(1), scene, 0.04, "seed", [&volume], UpdateInfo::default())
 }
@@ -103,7 +103,7 @@ pub fn edits() -> Vec<Vec<u8>> {
     client_edits().chunks(5).map(|lines| lines.join(&b'\n')).collect()
 }
 
-/// Saved light fields.
+/// Saved light.
 pub fn light_files() -> Vec<Vec<u8>> {
     let orders = [Order::L1, Order::L2, Order::L3, Order::L4];
     let file = |sequence: Sequence| {

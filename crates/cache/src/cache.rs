@@ -3,9 +3,8 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Deref;
 
-use glam::Vec3;
 use lumencast_codec::{Catalog, ClientEdit, Epoch, Field, LightFile, ProbeHeader, StateFrame};
-use lumencast_light::{LightField, ProbeVolume};
+use lumencast_light::{Light, Place, ProbeVolume};
 use lumencast_scene::Edit;
 
 use crate::CacheError;
@@ -31,7 +30,7 @@ pub struct Cache {
     /// Whether the catalog is that of a file.
     saved: bool,
     fields: BTreeMap<u32, BTreeMap<u32, RegionCache>>,
-    light: LightField,
+    light: Light,
     clock: ServerClock,
     state: Option<StateFrame>,
     edits: Edits,
@@ -49,10 +48,10 @@ pub struct Received {
 
 /// Light at a moment.
 #[derive(Clone, Copy, Debug)]
-pub struct Light<'a> {
-    /// The volumes, blended to that moment. Regions for which nothing has come yet hold the light
-    /// of before, or none.
-    pub field: &'a LightField,
+pub struct CurrentLight<'a> {
+    /// The fields, blended to that moment. Regions for which nothing has come yet hold the light of
+    /// before, or none.
+    pub light: &'a Light,
     /// Seconds since the newest light was computed; `None` when none came from a server.
     pub age: Option<f64>,
     /// Seconds since the oldest region's light was computed.
@@ -63,18 +62,11 @@ pub struct Light<'a> {
     pub scene_version: Option<u64>,
 }
 
-impl Light<'_> {
-    /// Irradiance on a surface at a world position, lux.
-    pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Vec3 {
-        self.field.irradiance(position, normal)
-    }
-}
+impl Deref for CurrentLight<'_> {
+    type Target = Light;
 
-impl Deref for Light<'_> {
-    type Target = LightField;
-
-    fn deref(&self) -> &LightField {
-        self.field
+    fn deref(&self) -> &Light {
+        self.light
     }
 }
 
@@ -143,7 +135,7 @@ impl Cache {
                 let old = before.field(field.id).filter(|old| old.has_shape_of(field))?;
                 Some(before.epoch_of(old))
             });
-            let known = self.light.volumes().iter().find(|volume| volume.id.0 == field.id);
+            let known = self.light.volumes().find(|volume| volume.id.0 == field.id);
             volumes.push(match known {
                 Some(volume) if same.is_some() => volume.clone(),
                 _ => lit_by(&self.light, field),
@@ -153,7 +145,7 @@ impl Cache {
             fields.insert(field.id, regions.unwrap_or_default());
         }
         self.fields = fields;
-        self.light = LightField::new(volumes);
+        self.light = Light::new(volumes);
         self.catalog = Some(catalog);
         self.saved = saved;
     }
@@ -197,7 +189,7 @@ impl Cache {
         if header.info.layer() != layer {
             return Err(CacheError::WrongLayer { update: header.info.update, layer });
         }
-        let volume = self.light.volumes_mut().iter_mut().find(|volume| volume.id.0 == field);
+        let volume = self.light.volumes_mut().find(|volume| volume.id.0 == field);
         let volume = volume.ok_or(CacheError::UnknownField(field))?;
         let regions = self.fields.entry(field).or_default();
         let news = regions
@@ -210,7 +202,7 @@ impl Cache {
     /// The light to be seen at `now`: every region on the way from its last update to its newest,
     /// which it reaches one measured interval after that one came. An update that is overdue leaves
     /// the newest standing.
-    pub fn light(&mut self, now: f64) -> Light<'_> {
+    pub fn light(&mut self, now: f64) -> CurrentLight<'_> {
         for volume in self.light.volumes_mut() {
             for region in self.fields.get_mut(&volume.id.0).into_iter().flat_map(|r| r.values_mut())
             {
@@ -224,8 +216,8 @@ impl Cache {
             .filter(|(field, _)| self.is_own(field))
             .map(|(_, newest)| newest.header.info)
             .max_by_key(|info| info.tick);
-        Light {
-            field: &self.light,
+        CurrentLight {
+            light: &self.light,
             age: ages().min_by(f64::total_cmp),
             oldest_age: ages().max_by(f64::total_cmp),
             tick: newest.map(|info| info.tick),
@@ -333,11 +325,11 @@ impl Cache {
 }
 
 /// A field's volume with the light that was known there before.
-fn lit_by(light: &LightField, field: &Field) -> ProbeVolume {
+fn lit_by(light: &Light, field: &Field) -> ProbeVolume {
     let mut volume = field.dark();
     for probe in 0..volume.grid.probe_count() {
         let position = volume.grid.position(volume.grid.cell(probe));
-        if let Some(before) = light.sample(position, Vec3::ZERO) {
+        if let Some(before) = light.sample(&Place::in_space(position)) {
             let n = field.order.coefficients();
             volume.probe_mut(probe).copy_from_slice(&before.coefficients[..n]);
         }

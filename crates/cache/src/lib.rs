@@ -21,6 +21,6 @@ mod edits;
 mod error;
 mod region;
 
-pub use cache::{Cache, Light, Received};
+pub use cache::{Cache, CurrentLight, Received};
 pub use edits::SceneEvent;
 pub use error::CacheError;

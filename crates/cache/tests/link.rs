@@ -6,7 +6,7 @@ use lumencast_codec::{
     AcceptedEdit, Catalog, ClientEdit, DecodeError, Epoch, Field, LightFile, ProbeEncoder,
     RefusedEdit, SceneInfo, SceneState, StateFrame, UpdateInfo, Use,
 };
-use lumencast_light::{Grid, Order, ProbeVolume, VolumeId};
+use lumencast_light::{FieldId, Grid, Order, ProbeVolume};
 use lumencast_scene::{Edit, NodeId};
 use lumencast_testkit::{Conditions, Link};
 
@@ -67,7 +67,7 @@ impl Server {
                 fields: vec![field],
             },
             encoder,
-            volume: ProbeVolume::dark(VolumeId(FIELD), grid, Order::L1),
+            volume: ProbeVolume::dark(FieldId(FIELD), grid, Order::L1),
             tick: 0,
             ahead: 1000.0,
             scene: SceneState::default(),
@@ -142,7 +142,7 @@ fn receive(cache: &mut Cache, link: &mut Link<Sent>, now: f64) {
 /// The light of the first and the last probe.
 fn shown(cache: &mut Cache, now: f64) -> [f32; 2] {
     let light = cache.light(now);
-    let volume = &light.field.volumes()[0];
+    let volume = light.volumes().next().unwrap();
     [volume.probe(0)[0].x, volume.probe(volume.grid.probe_count() - 1)[0].x]
 }
 
@@ -518,14 +518,14 @@ fn fields_that_are_listed_no_longer_are_forgotten() {
     let mut catalog = server.catalog.clone();
     catalog.fields.push(Field { id: 8, ..catalog.fields[0].clone() });
     cache.catalog(&catalog.encode(), 0.0).unwrap();
-    assert_eq!(cache.light(0.0).volumes().len(), 2);
+    assert_eq!(cache.light(0.0).volumes().count(), 2);
     server.shine(3.0);
     let frames = server.tick(0.0);
     for sent in &frames {
         take_in(&mut cache, sent, 0.0).unwrap();
     }
     cache.catalog(&server.catalog.encode(), 0.1).unwrap();
-    assert_eq!(cache.light(0.1).volumes().len(), 1);
+    assert_eq!(cache.light(0.1).volumes().count(), 1);
     assert!(near(shown(&mut cache, 0.1), 3.0), "the other field keeps its light");
     assert_eq!(cache.light(0.1).tick, Some(0), "and its numbers");
     let Some(Sent::Probes { bytes, .. }) = frames.last() else { panic!("no probe frames") };

@@ -1,4 +1,4 @@
-//! `lumencast bake`: a converged light field in a file.
+//! `lumencast bake`: converged light in a file.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `lumencast inspect`: what is in a saved light field, a running server or a scene.
+//! `lumencast inspect`: what is in saved light, a running server or a scene.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -56,7 +56,7 @@ impl Inspect {
     }
 }
 
-/// The bytes of a file that says it is a light field, or is called one.
+/// The bytes of a file that says it holds light, or is called one.
 fn light_file(path: &Path) -> Result<Option<Vec<u8>>> {
     let called = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("light"));
     if !called && !path.is_file() {

@@ -1,4 +1,4 @@
-//! Light fields from where people have them, files and servers, or computed on the spot.
+//! Light from where people have them, files and servers, or computed on the spot.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -51,7 +51,7 @@ pub(crate) fn light(what: &str) -> Result<Found> {
         Ok(Found { what: what.into(), catalog: file.catalog, edits: file.edits, volumes })
     };
     let read: Result<_, DecodeError> = read();
-    read.with_context(|| format!("{what} is no light field"))
+    read.with_context(|| format!("{what} is no light file"))
 }
 
 /// Warns where light is another scene's: by its name, or because none of it reaches this one.
@@ -93,7 +93,7 @@ impl Computed {
         tracer: &mut CpuPathTracer,
     ) -> Result<Baked> {
         let gather = self.reading.gathered(self.bounces, self.clamp, BlendSettings::default());
-        let bar = output::share_bar("Computing the light field");
+        let bar = output::share_bar("Computing light");
         let light = lumencast_server::bake(scene, volumes, tracer, self.effort, gather, |done| {
             show(&bar, done);
         });

@@ -87,7 +87,8 @@ async fn read(url: &str) -> Result<(Session, Seen)> {
     let what = || format!("{url}: it has gone");
     let seen = Seen {
         catalog: session.catalog().with_context(what)?,
-        volumes: session.light(Instant::now() + SETTLED, |light| light.field.volumes().to_vec()),
+        volumes: session
+            .light(Instant::now() + SETTLED, |light| light.volumes().cloned().collect()),
         scene: None,
         state: session.state().with_context(what)?,
         edits: session.edits().map_or(0, |edits| edits.len()),

@@ -8,7 +8,7 @@ use clap::Args;
 use glam::UVec2;
 use lumencast_client::{Session, SessionOptions, download};
 use lumencast_gather::path_trace::Levels;
-use lumencast_light::LightField;
+use lumencast_light::Light;
 use lumencast_picture::ToneMap;
 use lumencast_scene::{Edit, Scene};
 use lumencast_server::{Server, ServerConfig};
@@ -33,7 +33,7 @@ const GRACE: Duration = Duration::from_secs(2);
 Examples:
   lumencast view cornell                                  computes the light here, live
   lumencast view http://127.0.0.1:4443/sponza             a server's scene and light
-  lumencast view sponza.glb --light sponza.light          a saved light field
+  lumencast view sponza.glb --light sponza.light          saved light
   lumencast view sponza.glb --light http://10.0.0.2:4443/sponza   the scene from here
   lumencast view cornell --screenshot cornell.png         takes one picture and ends
 
@@ -158,7 +158,7 @@ impl View {
         let light = light_source::light(&name)?;
         let scene = self.edited_scene(&light.edits)?;
         light.check_fits(&scene);
-        Ok(Box::new(Still::new(scene, LightField::new(light.volumes), name)))
+        Ok(Box::new(Still::new(scene, Light::new(light.volumes), name)))
     }
 
     /// A scene from here under a server's light.

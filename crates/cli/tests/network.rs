@@ -120,7 +120,7 @@ impl Follower {
         while !matches!(self.take().await, Came::Light) {}
         let now = self.now();
         let light = self.cache.light(now);
-        let volume = &light.field.volumes()[0];
+        let volume = light.volumes().next().expect("a volume");
         let probes = volume.grid.probe_count();
         let sum: f32 = (0..probes).map(|probe| volume.probe(probe)[0].y).sum();
         (sum / probes as f32, light.scene_version.expect("light of a version"))
@@ -326,7 +326,8 @@ fn a_restarted_server_is_found_again() {
         let (before, _) = follower.next_light().await;
         let epoch = follower.cache.epoch();
         server.program.kill();
-        let standing = follower.cache.light(follower.now()).field.volumes()[0].clone();
+        let standing =
+            follower.cache.light(follower.now()).volumes().next().expect("a volume").clone();
         assert!(standing.coefficients.iter().any(|c| c.y > 0.0), "the light stays: {before}");
 
         let restarted = Serving::on("cornell", port, &SMALL);

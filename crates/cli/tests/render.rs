@@ -274,7 +274,7 @@ fn what_cannot_be_drawn_is_said() {
         .failed_saying(&["nowhere.light", "cannot read"]);
     let other = folder.0.join("other.light");
     std::fs::write(&other, b"LUMENCST is not all").expect("written");
-    render(&["--lighting", "field", "--light", text(&other)]).failed_saying(&["no light field"]);
+    render(&["--lighting", "field", "--light", text(&other)]).failed_saying(&["no light file"]);
     render(&["--lighting", "field", "--parts", "direct"]).failed_saying(&["--lighting direct"]);
     for what in [["--views", "stereo"], ["--light", "nowhere.light"]] {
         render(&[&["--lighting", "reference"][..], &what].concat())

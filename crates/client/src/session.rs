@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
-use lumencast_cache::{Cache, Light, SceneEvent};
+use lumencast_cache::{Cache, CurrentLight, SceneEvent};
 use lumencast_codec::{Catalog, StateFrame, limits};
 use lumencast_scene::Edit;
 use lumencast_transport::{
@@ -128,7 +128,7 @@ impl Session {
     }
 
     /// The light to be seen at `now`, handed to `see`; it stays the same while that runs.
-    pub fn light<R>(&self, now: Instant, see: impl FnOnce(Light<'_>) -> R) -> R {
+    pub fn light<R>(&self, now: Instant, see: impl FnOnce(CurrentLight<'_>) -> R) -> R {
         let now = self.shared.seconds(now);
         see(self.shared.lock().cache.light(now))
     }

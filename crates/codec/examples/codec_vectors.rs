@@ -12,7 +12,7 @@
 use base64::{Engine, prelude::BASE64_STANDARD};
 use glam::{Quat, UVec3, Vec3};
 use lumencast_codec::{DecodeError, ProbeDecoder, ProbeEncoder, RegionLight, UpdateInfo};
-use lumencast_light::{Grid, Order, ProbeVolume, VolumeId};
+use lumencast_light::{FieldId, Grid, Order, ProbeVolume};
 use serde_json::{Value, json};
 
 fn main() {
@@ -55,7 +55,7 @@ fn sequence(
     let size = UVec3::from_array(size);
     let grid =
         Grid { center: Vec3::ZERO, rotation: Quat::IDENTITY, size: Vec3::ONE, resolution: size };
-    let mut volume = ProbeVolume::dark(VolumeId(0), grid, order);
+    let mut volume = ProbeVolume::dark(FieldId(0), grid, order);
     let mut encoder = ProbeEncoder::new(size, order);
     let mut noise = Noise(u64::from(order.band() as u32) + 1);
     let mut frames = Vec::new();

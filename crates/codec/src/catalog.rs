@@ -5,7 +5,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use glam::{IVec3, Quat};
-use lumencast_light::{Grid, Offset, Order, ProbeVolume, VolumeId};
+use lumencast_light::{FieldId, Grid, Offset, Order, ProbeVolume};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
@@ -47,7 +47,7 @@ impl From<Epoch> for String {
     }
 }
 
-/// What a server offers: a scene and its light fields.
+/// What a server offers: a scene and its fields of light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Catalog {
     /// The server's run.
@@ -225,7 +225,7 @@ impl Catalog {
 impl Field {
     /// A volume of its shape without light.
     pub fn dark(&self) -> ProbeVolume {
-        ProbeVolume::dark(VolumeId(self.id), self.grid, self.order).read_at(self.offset)
+        ProbeVolume::dark(FieldId(self.id), self.grid, self.order).read_at(self.offset)
     }
 
     /// The region of a number.

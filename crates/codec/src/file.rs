@@ -1,4 +1,4 @@
-//! Light fields on disk: `.light` files (docs/wire.md, "Files").
+//! Light on disk: `.light` files (docs/wire.md, "Files").
 
 use std::collections::HashMap;
 
@@ -24,7 +24,7 @@ mod kind {
     pub(super) const FILE: u64 = 3;
 }
 
-/// A saved light field: a catalog and keyframes, the same bytes as on the wire.
+/// Saved light: a catalog and keyframes, the same bytes as on the wire.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightFile {
     /// What is in the file.
@@ -220,7 +220,7 @@ fn number(reader: &mut Reader<'_>) -> Result<u32, DecodeError> {
 mod tests {
     use super::*;
     use glam::{Quat, UVec3, Vec3};
-    use lumencast_light::{Grid, Offset, Order, VolumeId};
+    use lumencast_light::{FieldId, Grid, Offset, Order};
 
     fn file() -> (Vec<ProbeVolume>, LightFile) {
         let volumes: Vec<ProbeVolume> = [(7, UVec3::new(12, 2, 3)), (2, UVec3::ONE)]
@@ -232,7 +232,7 @@ mod tests {
                     size: Vec3::splat(3.0),
                     resolution,
                 };
-                let mut volume = ProbeVolume::dark(VolumeId(id), grid, Order::L2);
+                let mut volume = ProbeVolume::dark(FieldId(id), grid, Order::L2);
                 volume.offset = Offset::Cells(0.125 * id as f32);
                 for (i, c) in volume.coefficients.iter_mut().enumerate() {
                     *c = Vec3::new(1.0, 2.0, 3.0) / (1 + i % 9) as f32;

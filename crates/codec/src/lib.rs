@@ -1,4 +1,4 @@
-//! Light fields, scene state and catalogs as bytes: the frames of docs/wire.md.
+//! Light, scene state and catalogs as bytes: the frames of docs/wire.md.
 //!
 //! Sans-I/O: bytes in, values or a [`DecodeError`] out; nothing here opens a socket, reads a clock
 //! or starts a thread. Decoders are total: no bytes make them panic or allocate more than

@@ -5,7 +5,7 @@ use lumencast_codec::{
     Catalog, ClientEdit, DecodeError, EncodedRegion, LightFile, ProbeDecoder, ProbeEncoder,
     ProbeHeader, RegionLight, StateFrame, UpdateInfo,
 };
-use lumencast_light::{Grid, Order, ProbeVolume, VolumeId};
+use lumencast_light::{FieldId, Grid, Order, ProbeVolume};
 
 /// Numbers that only look random (splitmix64).
 struct Random(u64);
@@ -33,10 +33,10 @@ impl Random {
 fn volume(resolution: [u32; 3], order: Order) -> ProbeVolume {
     let resolution = UVec3::from_array(resolution);
     let grid = Grid { center: Vec3::ZERO, rotation: Quat::IDENTITY, size: Vec3::ONE, resolution };
-    ProbeVolume::dark(VolumeId(0), grid, order)
+    ProbeVolume::dark(FieldId(0), grid, order)
 }
 
-/// A noisy light field about which the encoder can know nothing.
+/// Noisy light about which the encoder can know nothing.
 fn light_up(volume: &mut ProbeVolume, brightness: f32, noise: f32, random: &mut Random) {
     for probe in 0..volume.grid.probe_count() {
         let own = brightness * (1.0 + 0.2 * (probe as f32).sin());

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Receiver};
-use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
+use lumencast_light::{FieldId, Grid, Light, Order, ProbeVolume};
 use lumencast_scene::{Scene, Snapshot};
 
 /// Jobs until feedback has settled, and samples a probe of each but the last.
@@ -49,14 +49,14 @@ impl Bench {
         &mut self,
         samples: u32,
         bounces: u32,
-        previous: Option<Arc<LightField>>,
+        previous: Option<Arc<Light>>,
         seed: u64,
-    ) -> (Arc<LightField>, f64) {
+    ) -> (Arc<Light>, f64) {
         let receivers: Vec<_> =
             self.grid.positions().map(|position| Receiver::probe(position, samples)).collect();
         let job = Job { bounces, previous, seed, ..Job::new(self.scene.clone(), receivers) };
         let ticket = self.tracer.submit(job);
-        let mut volume = ProbeVolume::dark(VolumeId(0), self.grid, Order::L2);
+        let mut volume = ProbeVolume::dark(FieldId(0), self.grid, Order::L2);
         let Some(gathered) = self.tracer.wait(ticket) else { unreachable!("nobody cancels") };
         for (i, sums) in gathered.sums.iter().enumerate() {
             for (c, mean) in volume.probe_mut(i).iter_mut().zip(sums.mean()) {
@@ -64,12 +64,12 @@ impl Bench {
             }
         }
         let taken = self.grid.probe_count() as f64 * f64::from(samples);
-        (Arc::new(LightField::new(vec![volume])), gathered.rays as f64 / taken)
+        (Arc::new(Light::new(vec![volume])), gathered.rays as f64 / taken)
     }
 
-    fn fed_back(&mut self, bounces: u32) -> (Arc<LightField>, f64) {
+    fn fed_back(&mut self, bounces: u32) -> (Arc<Light>, f64) {
         let mut light =
-            Arc::new(LightField::new(vec![ProbeVolume::dark(VolumeId(0), self.grid, Order::L2)]));
+            Arc::new(Light::new(vec![ProbeVolume::dark(FieldId(0), self.grid, Order::L2)]));
         for seed in 1..JOBS {
             light = self.gather(SAMPLES, bounces, Some(light), seed).0;
         }
@@ -77,8 +77,8 @@ impl Bench {
     }
 }
 
-fn coefficients(light: &LightField) -> impl Iterator<Item = Vec3> + '_ {
-    let volume = &light.volumes()[0];
+fn coefficients(light: &Light) -> impl Iterator<Item = Vec3> + '_ {
+    let volume = light.volumes().next().expect("a volume");
     (0..volume.grid.probe_count()).flat_map(|probe| volume.probe(probe).iter().copied())
 }
 
@@ -86,13 +86,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for name in std::env::args().skip(1) {
         let mut bench = Bench::new(&name)?;
         let (all, _) = bench.gather(COMPARED, ALL_BOUNCES, None, 0);
-        let report = |way: &str, (light, rays): (Arc<LightField>, f64)| {
-            let squares = |light: &LightField, other: f32| {
+        let report = |way: &str, (light, rays): (Arc<Light>, f64)| {
+            let squares = |light: &Light, other: f32| {
                 let pairs = coefficients(light).zip(coefficients(&all));
                 pairs.map(|(a, b)| (a - other * b).length_squared()).sum::<f32>()
             };
             let error = (squares(&light, 1.0) / squares(&all, 0.0)).sqrt();
-            let c0 = |light: &LightField| coefficients(light).step_by(9).sum::<Vec3>().y;
+            let c0 = |light: &Light| coefficients(light).step_by(9).sum::<Vec3>().y;
             let bias = c0(&light) / c0(&all) - 1.0;
             println!(
                 "{name}, {way}: differs by {:.1} %, mean {:+.1} %; {rays:.2} rays a sample",

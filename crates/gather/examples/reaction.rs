@@ -14,7 +14,7 @@ use lumencast_gather::blend::{BlendSettings, History};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Gathered, Job, Receiver};
 use lumencast_light::{Grid, Order};
-use lumencast_scene::{Light, LightKind, Snapshot};
+use lumencast_scene::{LightKind, PunctualLight, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 const STILL: u64 = 500;
@@ -28,7 +28,7 @@ fn room(lamp: Vec3) -> Arc<Snapshot> {
     stage.room(Vec3::Y, Vec3::splat(2.0), white);
     stage.room(Vec3::new(-0.4, 0.6, -0.3), Vec3::new(-0.6, 1.2, 0.6), red);
     stage.quad(Vec3::new(-0.3, 1.99, -0.3), 0.6 * Vec3::X, 0.6 * Vec3::Z, glow);
-    let light = Light {
+    let light = PunctualLight {
         kind: LightKind::Point { radius: 0.0 },
         color: Vec3::ONE,
         intensity: 1.0,

@@ -18,7 +18,7 @@ mod world;
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumencast_light::{LightField, Order};
+use lumencast_light::{Light, Order};
 use lumencast_scene::Snapshot;
 
 /// One request for light.
@@ -30,7 +30,7 @@ pub struct Job {
     /// then also sends what it scatters, of punctual lights and of this field. Each job so adds
     /// another bounce to what the last one found (the feedback of the first paper). Without it,
     /// light that is scattered more than `bounces` times is left out.
-    pub previous: Option<Arc<LightField>>,
+    pub previous: Option<Arc<Light>>,
     /// Points to gather at, each with its budget.
     pub receivers: Arc<[Receiver]>,
     /// Order of the expansion for probes.

@@ -396,7 +396,7 @@ pub(crate) fn itself(hit: &Hit) -> Itself {
 
 #[cfg(test)]
 mod tests {
-    use lumencast_scene::{Light, LightKind};
+    use lumencast_scene::{LightKind, PunctualLight};
     use lumencast_testkit::scenes::{Stage, lambert};
 
     use super::*;
@@ -415,7 +415,7 @@ mod tests {
         stage.quad(Vec3::new(-1.0, 1.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0, half);
         for &angle in angles {
             let kind = LightKind::Directional { angle };
-            let light = Light { kind, color: Vec3::ONE, intensity: 1.0, range: None };
+            let light = PunctualLight { kind, color: Vec3::ONE, intensity: 1.0, range: None };
             stage.light(light, Vec3::ZERO, Vec3::new(0.1, -1.0, 0.2));
         }
         stage.snapshot()

@@ -10,8 +10,8 @@ use lumencast_gather::reference::{
     Film, PictureSettings, ProbeEstimate, ProbeSettings, Renderer, probe_sh,
 };
 use lumencast_scene::{
-    AlphaMode, Environment, Filter, Image, Light, LightKind, Material, MaterialId, Mesh, MeshId,
-    Primitive, Projection, Snapshot, TextureRef, Vertices, View, Wrap,
+    AlphaMode, Environment, Filter, Image, LightKind, Material, MaterialId, Mesh, MeshId,
+    Primitive, Projection, PunctualLight, Snapshot, TextureRef, Vertices, View, Wrap,
 };
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -106,12 +106,17 @@ fn without_area() -> Vec<[Vec3; 3]> {
     ]
 }
 
-fn point_light(intensity: f32) -> Light {
-    Light { kind: LightKind::Point { radius: 0.0 }, color: Vec3::ONE, intensity, range: None }
+fn point_light(intensity: f32) -> PunctualLight {
+    PunctualLight {
+        kind: LightKind::Point { radius: 0.0 },
+        color: Vec3::ONE,
+        intensity,
+        range: None,
+    }
 }
 
-fn sun(illuminance: f32) -> Light {
-    Light {
+fn sun(illuminance: f32) -> PunctualLight {
+    PunctualLight {
         kind: LightKind::Directional { angle: 0.0 },
         color: Vec3::ONE,
         intensity: illuminance,
@@ -377,7 +382,7 @@ fn lights_and_materials_at_their_limits() {
         stage.light(sun(MOST), Vec3::ZERO, Vec3::NEG_ONE);
         stage.light(point_light(MOST), Vec3::new(0.5, -1.0 + 1e-5, -0.5), Vec3::X);
         let spot = LightKind::Spot { inner: 0.0, outer: 1e-3, radius: 0.0 };
-        let spot = Light { kind: spot, ..point_light(MOST) };
+        let spot = PunctualLight { kind: spot, ..point_light(MOST) };
         stage.light(spot, Vec3::new(0.5, 0.4, -0.5), Vec3::NEG_Y);
         let name = format!("metallic {metallic}, roughness {roughness}, index {ior}");
         scan(&name, &stage, &[Vec3::ZERO, Vec3::new(0.4, -0.999, -0.5)]);

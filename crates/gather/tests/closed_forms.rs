@@ -10,7 +10,7 @@ use lumencast_gather::reference::{
 };
 use lumencast_light::{Order, sh};
 use lumencast_scene::{
-    AlphaMode, Environment, Light, LightKind, Material, Projection, Snapshot, View,
+    AlphaMode, Environment, LightKind, Material, Projection, PunctualLight, Snapshot, View,
 };
 use lumencast_testkit::scenes::{Stage, lambert};
 use lumencast_testkit::vectors::GgxAlbedo;
@@ -64,8 +64,13 @@ fn zonal(axis: Vec3, moments: [Vec3; 3]) -> Vec<Vec3> {
         .collect()
 }
 
-fn point_light(intensity: f32) -> Light {
-    Light { kind: LightKind::Point { radius: 0.0 }, color: Vec3::ONE, intensity, range: None }
+fn point_light(intensity: f32) -> PunctualLight {
+    PunctualLight {
+        kind: LightKind::Point { radius: 0.0 },
+        color: Vec3::ONE,
+        intensity,
+        range: None,
+    }
 }
 
 #[test]
@@ -147,7 +152,10 @@ fn white_sphere_with_a_lamp() {
 #[test]
 fn point_light_over_a_plane() {
     for radius in [0.0, 0.6] {
-        lamp_over_a_plane(Light { kind: LightKind::Point { radius }, ..point_light(50.0) }, false);
+        lamp_over_a_plane(
+            PunctualLight { kind: LightKind::Point { radius }, ..point_light(50.0) },
+            false,
+        );
     }
 }
 
@@ -156,10 +164,10 @@ fn point_light_over_a_plane() {
 fn lamp_in_the_plane_of_a_ceiling() {
     lamp_over_a_plane(point_light(50.0), true);
     let spot = LightKind::Spot { inner: 1.570, outer: 1.5705, radius: 0.0 };
-    lamp_over_a_plane(Light { kind: spot, ..point_light(50.0) }, true);
+    lamp_over_a_plane(PunctualLight { kind: spot, ..point_light(50.0) }, true);
 }
 
-fn lamp_over_a_plane(lamp: Light, ceiling: bool) {
+fn lamp_over_a_plane(lamp: PunctualLight, ceiling: bool) {
     let (albedo, height) = (0.6, 0.7);
     let mut stage = Stage::default();
     let floor = stage.material(lambert(Vec3::splat(albedo), BLACK));
@@ -190,7 +198,7 @@ fn sunlit_floor(albedo: Vec3, illuminance: f32) -> (Stage, f32) {
     let mut stage = Stage::default();
     let floor = stage.material(lambert(albedo, BLACK));
     stage.quad(Vec3::new(-1e4, 0.0, 1e4), Vec3::X * 2e4, Vec3::NEG_Z * 2e4, floor);
-    let sun = Light {
+    let sun = PunctualLight {
         kind: LightKind::Directional { angle: 0.0 },
         color: Vec3::ONE,
         intensity: illuminance,

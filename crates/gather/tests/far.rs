@@ -8,7 +8,7 @@ use lumencast_gather::reference::{
     Film, PictureSettings, ProbeEstimate, ProbeSettings, Renderer, probe_sh,
 };
 use lumencast_gather::{Gather, Job, Place, Receiver, Sums};
-use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
+use lumencast_light::{FieldId, Grid, Light, Order, ProbeVolume};
 use lumencast_scene::View;
 use lumencast_testkit::rooms::{Placed, Rooms};
 
@@ -149,7 +149,7 @@ fn lumels_receive_what_they_receive_near_the_origin() {
 }
 
 /// Two volumes whose light differs, at places in the world of points of rooms.
-fn light(world: impl Fn(Vec3) -> Vec3) -> LightField {
+fn light(world: impl Fn(Vec3) -> Vec3) -> Light {
     let volume = |id, x: f32, radiance: f32| {
         let grid = Grid {
             center: world(Vec3::new(x, 1.5, 0.0)),
@@ -157,12 +157,12 @@ fn light(world: impl Fn(Vec3) -> Vec3) -> LightField {
             size: Vec3::new(3.9, 3.1, 4.1),
             resolution: UVec3::splat(3),
         };
-        let mut volume = ProbeVolume::dark(VolumeId(id), grid, Order::L1);
+        let mut volume = ProbeVolume::dark(FieldId(id), grid, Order::L1);
         let c0 = 2.0 * std::f32::consts::PI.sqrt() * radiance;
         (0..grid.probe_count()).for_each(|probe| volume.probe_mut(probe)[0] = Vec3::splat(c0));
         volume
     };
-    LightField::new(vec![volume(0, -2.0, 40.0), volume(1, 2.0, 3.0)])
+    Light::new(vec![volume(0, -2.0, 40.0), volume(1, 2.0, 3.0)])
 }
 
 /// What probes look at is told, and light of before is read, where it is in the world.

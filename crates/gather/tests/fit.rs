@@ -6,8 +6,8 @@ use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::fit::{FitSettings, Part, Surroundings, fit};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Place, Receiver, Sums};
-use lumencast_light::{Grid, LightField, Offset, Order, ProbeVolume, VolumeId};
-use lumencast_scene::{Environment, Light, LightKind, Material, Snapshot};
+use lumencast_light::{FieldId, Grid, Light, Offset, Order, ProbeVolume};
+use lumencast_scene::{Environment, LightKind, Material, PunctualLight, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 const POINTS: u32 = 64;
@@ -26,7 +26,7 @@ fn irradiance(sums: &Sums) -> Vec3 {
 fn look(scene: &Arc<Snapshot>, grid: Grid, bounces: u32) -> (ProbeVolume, Surroundings) {
     let probes =
         |samples| grid.positions().map(|at| Receiver::probe(at, samples)).collect::<Vec<_>>();
-    let mut volume = ProbeVolume::dark(VolumeId(0), grid, Order::L2);
+    let mut volume = ProbeVolume::dark(FieldId(0), grid, Order::L2);
     let sums = gather(Job { bounces, ..Job::new(scene.clone(), probes(4096)) });
     for (probe, sums) in sums.iter().enumerate() {
         for (c, mean) in volume.probe_mut(probe).iter_mut().zip(sums.mean()) {
@@ -56,9 +56,9 @@ fn fit_one(
     known: impl Fn(usize) -> Option<Vec3>,
 ) -> ProbeVolume {
     let irradiance = (0..around.points().len()).map(known).collect();
-    let mut light = LightField::new(vec![start.clone()]);
+    let mut light = Light::new(vec![start.clone()]);
     fit(&mut light, &[Part { gathered, around, irradiance }], &FitSettings::default());
-    light.into_volumes().remove(0)
+    light.volumes().next().expect("a volume").clone()
 }
 
 /// The volume fitted to what its surroundings receive.
@@ -81,7 +81,7 @@ fn rooms() -> Arc<Snapshot> {
     let wall = stage.material(Material { double_sided: true, ..wall });
     stage.room(Vec3::ZERO, Vec3::new(6.0, 2.0, 3.0), grey);
     stage.quad(Vec3::new(0.2, -1.0, -1.5), Vec3::Y * 2.0, Vec3::Z * 3.0, wall);
-    let lamp = Light {
+    let lamp = PunctualLight {
         kind: LightKind::Point { radius: 0.0 },
         color: Vec3::ONE,
         intensity: 100.0,
@@ -150,15 +150,14 @@ fn volumes_that_meet_in_a_wall_are_fitted_together() {
         .zip(grids)
         .map(|(id, grid)| {
             let (mut volume, around) = look(&scene, grid, 3);
-            volume.id = VolumeId(id);
+            volume.id = FieldId(id);
             (volume, around)
         })
         .collect();
-    let gathered = LightField::new(looks.iter().map(|(volume, _)| volume.clone()).collect());
+    let gathered = Light::new(looks.iter().map(|(volume, _)| volume.clone()));
     let mut light = gathered.clone();
     let parts: Vec<Part<'_>> = light
         .volumes()
-        .iter()
         .map(|volume| {
             let (gathered, around) = &looks[volume.id.0 as usize];
             Part { gathered, around, irradiance: known(&scene, around, 3) }
@@ -178,7 +177,7 @@ fn volumes_that_meet_in_a_wall_are_fitted_together() {
     assert!(bright > 0.0 && lit[30..].iter().all(|sums| irradiance(sums) == Vec3::ZERO));
     // As it is displayed.
     let code = |irradiance: f32| (irradiance.max(0.0) / bright).powf(1.0 / 2.2);
-    let off = |light: &LightField| {
+    let off = |light: &Light| {
         let squares = (0..60).map(|i| {
             let read = code(light.irradiance(at(i), Vec3::Y).y);
             (read - code(irradiance(&lit[i as usize]).y)).powi(2)
@@ -196,13 +195,13 @@ fn higher_bands_stay() {
     let (low, around) = look(&scene, grid_of_rooms(), 1);
     let fitted_low = fitted(&scene, &low, &around, 1);
     for order in [Order::L3, Order::L4] {
-        let mut gathered = ProbeVolume::dark(VolumeId(0), low.grid, order);
+        let mut gathered = ProbeVolume::dark(FieldId(0), low.grid, order);
         for probe in 0..low.grid.probe_count() {
             let light = gathered.probe_mut(probe);
             light.fill(Vec3::splat(0.3));
             light[..9].copy_from_slice(low.probe(probe));
         }
-        let dark = ProbeVolume::dark(VolumeId(0), low.grid, order);
+        let dark = ProbeVolume::dark(FieldId(0), low.grid, order);
         let known = |point: usize| {
             let at = around.points()[point]?;
             Some(fitted_low.sample(at.position, at.normal).irradiance(at.normal))

@@ -9,8 +9,8 @@ use glam::{Affine2, Affine3A, Mat3, Quat, UVec2, Vec2, Vec3};
 use lumencast_gather::path_trace::MaterialModel;
 use lumencast_gather::reference::{Film, Frame, PictureSettings, Renderer};
 use lumencast_scene::{
-    Environment, Filter, Image, Light, LightKind, Material, Primitive, Projection, Snapshot,
-    TextureRef, Vertices, View,
+    Environment, Filter, Image, LightKind, Material, Primitive, Projection, PunctualLight,
+    Snapshot, TextureRef, Vertices, View,
 };
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -105,7 +105,7 @@ fn suns() -> [Vec3; 3] {
 
 fn sun(stage: &mut Stage, towards: Vec3) {
     let kind = LightKind::Directional { angle: 0.0 };
-    let light = Light { kind, color: Vec3::ONE, intensity: SUN, range: None };
+    let light = PunctualLight { kind, color: Vec3::ONE, intensity: SUN, range: None };
     stage.light(light, BLACK, -towards);
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{UVec2, Vec3};
 use lumencast_gather::path_trace::MaterialModel;
 use lumencast_gather::reference::{Film, Filter, Parts, PictureSettings, Renderer};
-use lumencast_scene::{Environment, Light, LightKind, Material, Scene, Snapshot, View};
+use lumencast_scene::{Environment, LightKind, Material, PunctualLight, Scene, Snapshot, View};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 fn settings() -> PictureSettings {
@@ -79,7 +79,7 @@ fn sun_on_a_floor() {
     let mut stage = Stage::default();
     let material = stage.material(lambert(Vec3::new(0.2, 0.5, 0.8), Vec3::ZERO));
     stage.quad(Vec3::new(-9.0, 0.0, 9.0), Vec3::X * 18.0, Vec3::NEG_Z * 18.0, material);
-    let sun = Light {
+    let sun = PunctualLight {
         kind: LightKind::Directional { angle: 0.0 },
         color: Vec3::ONE,
         intensity: 1000.0,
@@ -246,9 +246,9 @@ fn sunlit_room(angle: f32, shines: bool) -> (Arc<Snapshot>, View) {
     stage.sphere(Vec3::new(-0.6, 0.5, 0.2), 0.4, 12, shiny);
     stage.sphere(Vec3::new(0.9, 0.5, -0.9), 0.4, 12, glass);
     let kind = LightKind::Directional { angle };
-    let sun = Light { kind, color: Vec3::ONE, intensity: 10.0, range: None };
+    let sun = PunctualLight { kind, color: Vec3::ONE, intensity: 10.0, range: None };
     stage.light(sun, Vec3::ZERO, Vec3::new(1.0, -0.9, -0.1));
-    let lamp = Light { kind: LightKind::Point { radius: 0.0 }, intensity: 0.02, ..sun };
+    let lamp = PunctualLight { kind: LightKind::Point { radius: 0.0 }, intensity: 0.02, ..sun };
     stage.light(lamp, Vec3::new(1.5, 2.2, 1.0), Vec3::NEG_Y);
     let view = View::look_at(Vec3::new(1.7, 1.6, 1.7), Vec3::new(-0.4, 0.6, -0.4), 1.2).unwrap();
     (stage.snapshot(), view)

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Place, Receiver, Sums};
-use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
-use lumencast_scene::{Environment, Light, LightKind, Material, Snapshot};
+use lumencast_light::{FieldId, Grid, Light, Order, ProbeVolume};
+use lumencast_scene::{Environment, LightKind, Material, PunctualLight, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 const BLACK: Vec3 = Vec3::ZERO;
@@ -191,25 +191,25 @@ fn grid(size: Vec3) -> Grid {
 }
 
 /// What a job found for the probes of a [`grid`].
-fn field(size: Vec3, sums: &[Sums]) -> Arc<LightField> {
-    let mut volume = ProbeVolume::dark(VolumeId(0), grid(size), Order::L2);
+fn field(size: Vec3, sums: &[Sums]) -> Arc<Light> {
+    let mut volume = ProbeVolume::dark(FieldId(0), grid(size), Order::L2);
     for (i, sums) in sums.iter().enumerate() {
         for (c, mean) in volume.probe_mut(i).iter_mut().zip(sums.mean()) {
             *c = mean;
         }
     }
-    Arc::new(LightField::new(vec![volume]))
+    Arc::new(Light::new(vec![volume]))
 }
 
 /// The same radiance everywhere.
-fn uniform(radiance: f32) -> Arc<LightField> {
+fn uniform(radiance: f32) -> Arc<Light> {
     let mut sum = vec![BLACK; 9];
     sum[0] = Vec3::splat(C0 * radiance);
     field(Vec3::ONE, &vec![Sums { sum, count: 1, ..Sums::default() }; 8])
 }
 
-fn lamp(radius: f32, intensity: f32) -> Light {
-    Light { kind: LightKind::Point { radius }, color: Vec3::ONE, intensity, range: None }
+fn lamp(radius: f32, intensity: f32) -> PunctualLight {
+    PunctualLight { kind: LightKind::Point { radius }, color: Vec3::ONE, intensity, range: None }
 }
 
 /// In a closed room each job adds a bounce to the last one's light, whether it begins at the walls or
@@ -229,7 +229,7 @@ fn bounces_add_up_from_job_to_job() {
             let job = Job { bounces: 0, seed, ..Job::new(stage.snapshot(), probes.clone()) };
             field(size, &gather(Job { previous: Some(before), ..job }))
         });
-        let found = light.sample(BLACK, BLACK).unwrap().coefficients[0].x;
+        let found = light.sample(&lumencast_light::Place::in_space(BLACK)).unwrap().coefficients[0].x;
         check(found, C0 * first / (1.0 - albedo), C0 * first * (1.0 + albedo), 5e-3);
     }
 }

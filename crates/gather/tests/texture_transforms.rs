@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{UVec2, Vec3};
 use lumencast_gather::reference::{PictureSettings, Renderer, Surface};
-use lumencast_scene::{Light, LightKind, NodeId, PlacedLight, Projection, View};
+use lumencast_scene::{LightKind, NodeId, PlacedLight, Projection, PunctualLight, View};
 use lumencast_testkit::mapped::MappedFloor;
 
 /// Lux.
@@ -16,7 +16,7 @@ const SUN: f32 = 10.0;
 fn seen(floor: &MappedFloor, towards: Vec3) -> (Surface, f32) {
     let mut snapshot = floor.scene().snapshot().as_ref().clone();
     let kind = LightKind::Directional { angle: 0.0 };
-    let light = Light { kind, color: Vec3::ONE, intensity: SUN, range: None };
+    let light = PunctualLight { kind, color: Vec3::ONE, intensity: SUN, range: None };
     let (node, position) = (NodeId(7), Vec3::ZERO);
     snapshot.lights.push(PlacedLight { node, light, position, direction: -towards });
     let projection =

@@ -9,7 +9,7 @@
 
 use glam::{Quat, UVec3, Vec3};
 use lumencast_light::sh::{Rotation, basis};
-use lumencast_light::{Atlas, Grid, Order, ProbeVolume, Sh, VolumeId, zh};
+use lumencast_light::{Atlas, FieldId, Grid, Order, ProbeVolume, Sh, zh};
 use serde_json::{Value, json};
 
 fn main() {
@@ -58,7 +58,7 @@ fn main() {
 fn atlas(order: Order) -> Value {
     let resolution = UVec3::new(2, 1, 2);
     let grid = Grid { center: Vec3::ZERO, rotation: Quat::IDENTITY, size: Vec3::ONE, resolution };
-    let mut volume = ProbeVolume::dark(VolumeId(0), grid, order);
+    let mut volume = ProbeVolume::dark(FieldId(0), grid, order);
     for (i, c) in volume.coefficients.iter_mut().enumerate() {
         let i = i as f32;
         *c = Vec3::new(100.0 / (1.0 + i), -0.001 * i * i, 2e-6 * i);

@@ -1,22 +1,25 @@
-//! Light fields: what a server computes and a client shades with.
+//! Light: what a server computes and a client shades with.
 //!
-//! A light field holds *indirect* light only: light of punctual lights after at least one surface,
-//! and light of emissive surfaces and of the environment. Probes store the spherical-harmonic
-//! coefficients of arriving radiance (cd/m²) in world axes; see [`LightField`] for the main use.
+//! [`Light`] is all that is known of a scene's *indirect* light: light of punctual lights after at
+//! least one surface, and light of emissive surfaces and of the environment. It consists of fields,
+//! each of a kind ([`Field`]). Probes store the spherical-harmonic coefficients of arriving radiance
+//! (cd/m²) in world axes. See [`Light`] for the main use.
 
 #![forbid(unsafe_code)]
 
-mod atlas;
 mod field;
-mod sample;
+mod field_id;
+mod light;
+mod place;
 mod scale;
 pub mod sh;
 mod volume;
 pub mod zh;
 
-pub use atlas::{Atlas, atlas_size, texels};
-pub use field::LightField;
-pub use sample::{Corners, Offset};
+pub use field::Field;
+pub use field_id::FieldId;
+pub use light::Light;
+pub use place::{OnTriangle, Place};
 pub use scale::ScaleRule;
 pub use sh::{Order, Sh};
-pub use volume::{Grid, ProbeVolume, VolumeId};
+pub use volume::{Atlas, Corners, Grid, Offset, ProbeVolume, atlas_size, texels};

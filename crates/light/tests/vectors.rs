@@ -2,7 +2,7 @@
 
 use glam::{Quat, UVec3, Vec3};
 use lumencast_light::sh::{Rotation, basis};
-use lumencast_light::{Atlas, Grid, Order, ProbeVolume, Sh, VolumeId, zh};
+use lumencast_light::{Atlas, FieldId, Grid, Order, ProbeVolume, Sh, zh};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -91,7 +91,7 @@ fn textures_have_the_recorded_bits() {
             size: Vec3::ONE,
             resolution: case.resolution,
         };
-        let mut volume = ProbeVolume::dark(VolumeId(0), grid, case.order);
+        let mut volume = ProbeVolume::dark(FieldId(0), grid, case.order);
         volume.coefficients.copy_from_slice(&case.coefficients);
         let atlas = Atlas::pack(&volume, case.scale_log2);
         assert_eq!((atlas.size, atlas.halves), (case.size, case.halves));

@@ -8,7 +8,7 @@ use glam::{Affine3A, DAffine3};
 use crate::animation::Curve;
 use crate::settings::Settings;
 use crate::trs::Trs;
-use crate::{Light, Material, Mesh};
+use crate::{Material, Mesh, PunctualLight};
 
 /// A glTF file's contents. Indices (of nodes, meshes, …) are the file's own and lie in range.
 #[derive(Clone, Debug, Default)]
@@ -44,7 +44,7 @@ pub(crate) struct AssetNode {
     pub(crate) instances: Option<Arc<[DAffine3]>>,
     pub(crate) skin: Option<u32>,
     pub(crate) camera: Option<u32>,
-    pub(crate) light: Option<Light>,
+    pub(crate) light: Option<PunctualLight>,
     /// It and all below it are neither drawn nor give light.
     pub(crate) hidden: bool,
     /// Morph weights; the mesh's own where empty.

@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 
-use crate::{AnimationId, Environment, Light, MaterialId, MeshId, NodeId};
+use crate::{AnimationId, Environment, MaterialId, MeshId, NodeId, PunctualLight};
 
 /// A change of the scene. Edits are applied whole or refused with a reason, in the server's order.
 ///
@@ -52,7 +52,7 @@ pub enum Edit {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<NodeName>,
         /// The light.
-        light: Light,
+        light: PunctualLight,
         /// Under which node; the scene's root when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         parent: Option<NodeId>,
@@ -164,7 +164,7 @@ pub enum InstanceSource {
     File(String),
 }
 
-/// Parts of a light; see [`Light`] for units and ranges.
+/// Parts of a light; see [`PunctualLight`] for units and ranges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LightSpec {
     /// Linear colour.

@@ -57,7 +57,7 @@ pub use edit::{Edit, InstanceSource, LightSpec, MaterialChange, NodeName, Playba
 pub use environment::{Environment, HdrImage};
 pub use error::{Fault, SceneError};
 pub use gltf::source::file_name;
-pub use light::{Light, LightKind, PlacedLight};
+pub use light::{LightKind, PlacedLight, PunctualLight};
 pub use material::{AlphaMode, Filter, Image, Material, TextureRef, Wrap};
 pub use mesh::{Mesh, MorphTarget, Primitive, Vertices};
 pub use scene::{AnimationInfo, EditError, FileRead, FileToRead, NodeInfo, PlacedCamera, Scene};

@@ -13,7 +13,7 @@ use crate::{NodeId, limits};
 /// Intensity means the same whatever the size: what a surface receives that faces the light's
 /// middle and sees all of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Light {
+pub struct PunctualLight {
     /// Point, spot or directional.
     #[serde(flatten)]
     pub kind: LightKind,
@@ -29,7 +29,7 @@ pub struct Light {
     pub range: Option<f32>,
 }
 
-impl Light {
+impl PunctualLight {
     /// Whether any light comes from it.
     pub(crate) fn shines(&self) -> bool {
         self.intensity > 0.0 && self.color != Vec3::ZERO
@@ -151,7 +151,7 @@ pub struct PlacedLight {
     /// The node that carries it.
     pub node: NodeId,
     /// What it is.
-    pub light: Light,
+    pub light: PunctualLight,
     /// World position, metres.
     pub position: Vec3,
     /// Unit vector along which it shines.

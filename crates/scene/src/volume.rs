@@ -75,7 +75,7 @@ fn cells(resolution: UVec3) -> u64 {
 mod tests {
     use super::*;
     use glam::Quat;
-    use lumencast_light::{LightField, ProbeVolume, VolumeId};
+    use lumencast_light::{FieldId, Light, Place, ProbeVolume};
 
     fn deep(layers: u32, rotation: Quat) -> VolumeSpec {
         let grid = Grid {
@@ -123,7 +123,7 @@ mod tests {
         let whole = deep(70, rotation);
         // Light that changes from layer to layer, as far as it can.
         let lit = |(id, piece, first): (u32, VolumeSpec, u32)| {
-            let mut volume = ProbeVolume::dark(VolumeId(id), piece.grid, piece.order);
+            let mut volume = ProbeVolume::dark(FieldId(id), piece.grid, piece.order);
             for probe in 0..piece.grid.probe_count() {
                 let layer = first + piece.grid.cell(probe).z;
                 volume.probe_mut(probe)[0] = Vec3::splat((layer % 2) as f32);
@@ -135,13 +135,13 @@ mod tests {
             first += piece.grid.resolution.z;
             lit((id, piece, first - piece.grid.resolution.z))
         });
-        let pieces = LightField::new(pieces.collect());
-        let whole_light = LightField::new(vec![lit((0, whole, 0))]);
-        assert_eq!(pieces.volumes().len(), 3);
+        let pieces = Light::new(pieces);
+        let whole_light = Light::new(vec![lit((0, whole, 0))]);
+        assert_eq!(pieces.volumes().count(), 3);
         let cell = whole.grid.spacing().z;
-        let read = |light: &LightField, z: f32| {
+        let read = |light: &Light, z: f32| {
             let position = whole.grid.center + rotation * Vec3::new(0.3, 0.2, z);
-            light.sample(position, Vec3::ZERO).expect("light").values()[0].x
+            light.sample(&Place::in_space(position)).expect("light").values()[0].x
         };
         // In hundredths of a cell, from the first probe to the last.
         let values: Vec<(f32, f32)> = (50..=6950)

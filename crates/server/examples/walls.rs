@@ -11,8 +11,8 @@ use std::sync::Arc;
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::{Grid, LightField, Offset, Order};
-use lumencast_scene::{Light, LightKind, Material, Snapshot, VolumeSpec};
+use lumencast_light::{Grid, Light, Offset, Order};
+use lumencast_scene::{LightKind, Material, PunctualLight, Snapshot, VolumeSpec};
 use lumencast_server::{Effort, FitOptions, GatherOptions, bake};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -37,13 +37,13 @@ fn rooms(wall: f32) -> Arc<Snapshot> {
         stage.room(Vec3::X * middle, ROOM, grey);
     }
     let kind = LightKind::Point { radius: 0.0 };
-    let lamp = Light { kind, color: Vec3::ONE, intensity: 100.0, range: None };
+    let lamp = PunctualLight { kind, color: Vec3::ONE, intensity: 100.0, range: None };
     stage.light(lamp, Vec3::new(-middle, 0.8, 0.3), Vec3::NEG_Y);
     stage.snapshot()
 }
 
 /// The mean irradiance that a field shows on the metre of a room's floor beside the wall.
-fn floor(light: &LightField, wall: f32, side: f32) -> f32 {
+fn floor(light: &Light, wall: f32, side: f32) -> f32 {
     let at = |i: u16| {
         let [x, z] = [i % 20, i / 20].map(|k| (f32::from(k) + 0.5) / 20.0);
         Vec3::new(side * (0.5 * wall + x), -0.5 * ROOM.y, (z - 0.5) * ROOM.z)
@@ -66,7 +66,7 @@ fn main() {
             let options = GatherOptions { blend, fit, offset, ..GatherOptions::default() };
             let effort = Effort::of_samples(16_384);
             let baked = bake(&scene, &[volume], tracer, effort, options, |_| ()).expect("light");
-            let light = LightField::new(baked.volumes);
+            let light = Light::new(baked.volumes);
             100.0 * floor(&light, wall, 1.0) / floor(&light, wall, -1.0)
         };
         let gathered = leaked(None, Offset::HALF_CELL, &mut tracer);

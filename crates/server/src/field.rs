@@ -7,7 +7,7 @@ use lumencast_codec::{self as codec, EncodedRegion, ProbeEncoder, UpdateInfo, li
 use lumencast_gather::blend::History;
 use lumencast_gather::fit::{FitSettings, Part, fit};
 use lumencast_gather::{Gathered, Job, Receiver};
-use lumencast_light::{LightField, ProbeVolume, VolumeId};
+use lumencast_light::{FieldId, Light, ProbeVolume};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
@@ -59,11 +59,11 @@ impl Field {
         volumes: &[VolumeSpec],
         options: &GatherOptions,
     ) -> Result<Vec<Self>, ServerError> {
-        let new = |(id, spec)| Self::new(VolumeId(id), spec, options);
+        let new = |(id, spec)| Self::new(FieldId(id), spec, options);
         Ok((0..).zip(pieces(volumes)?).map(new).collect())
     }
 
-    fn new(id: VolumeId, spec: VolumeSpec, options: &GatherOptions) -> Self {
+    fn new(id: FieldId, spec: VolumeSpec, options: &GatherOptions) -> Self {
         let VolumeSpec { grid, order } = spec;
         let GatherOptions { blend, fit, offset, .. } = *options;
         let dark = ProbeVolume::dark(id, grid, order).read_at(offset);
@@ -79,7 +79,7 @@ impl Field {
         }
     }
 
-    pub(crate) fn id(&self) -> VolumeId {
+    pub(crate) fn id(&self) -> FieldId {
         self.volume.id
     }
 
@@ -152,7 +152,7 @@ impl Field {
     pub(crate) fn job(
         &mut self,
         scene: Arc<Snapshot>,
-        previous: Option<Arc<LightField>>,
+        previous: Option<Arc<Light>>,
         samples: u32,
         options: GatherOptions,
         seed: u64,
@@ -208,9 +208,9 @@ impl Field {
 /// Brings up to date what fields publish: what arrives at their probes or, where they are fitted, the
 /// fit of all of them, with the effort of so many rounds of so many steps.
 pub(crate) fn publish(fields: &mut [Field], (rounds, steps): (u32, u32)) {
-    let mut light = LightField::new(fields.iter().map(|field| field.volume.clone()).collect());
+    let mut light = Light::new(fields.iter().map(|field| field.volume.clone()));
     let field = |volume: &ProbeVolume| fields.iter().find(|field| field.id() == volume.id);
-    let ordered: Vec<&Field> = light.volumes().iter().filter_map(field).collect();
+    let ordered: Vec<&Field> = light.volumes().filter_map(field).collect();
     let surfaces: Option<Vec<&Surfaces>> = ordered.iter().map(|f| f.surfaces.as_ref()).collect();
     let Some(surfaces) = surfaces else {
         fields.iter_mut().for_each(|field| field.volume.clone_from(&field.arriving));
@@ -226,7 +226,7 @@ pub(crate) fn publish(fields: &mut [Field], (rounds, steps): (u32, u32)) {
         .collect();
     let settings = FitSettings { rounds, steps, ..FitSettings::default() };
     fit(&mut light, &parts, &settings);
-    for volume in light.into_volumes() {
+    for volume in light.into_fields().into_iter().filter_map(lumencast_light::Field::into_volume) {
         if let Some(field) = fields.iter_mut().find(|field| field.id() == volume.id) {
             field.volume = volume;
         }

@@ -1,7 +1,7 @@
 //! How noisy light is, as it is shown.
 
 use glam::Vec3;
-use lumencast_light::LightField;
+use lumencast_light::Light;
 
 use crate::field::Field;
 
@@ -14,12 +14,10 @@ const WHITE: f32 = 0.99;
 /// of 0 to 255: v^(1/2.2) for surfaces alike, where the brightest hundredth is white. They are read on
 /// the surfaces that the fields know, or in all directions at their probes.
 pub(crate) fn shown(one: &[Field], other: &[Field]) -> f32 {
-    let of = |fields: &[Field]| {
-        LightField::new(fields.iter().map(|field| field.volume().clone()).collect())
-    };
+    let of = |fields: &[Field]| Light::new(fields.iter().map(|field| field.volume().clone()));
     let places: Vec<(Vec3, Vec3)> = one.iter().flat_map(Field::places).collect();
     let step = places.len().div_ceil(PLACES).max(1);
-    let read = |light: LightField| -> Vec<Vec3> {
+    let read = |light: Light| -> Vec<Vec3> {
         let irradiance =
             |&(at, normal): &(Vec3, Vec3)| light.irradiance(at, normal).max(Vec3::ZERO);
         places.iter().step_by(step).map(irradiance).collect()

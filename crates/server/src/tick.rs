@@ -9,7 +9,7 @@ use lumencast_codec::{
     limits,
 };
 use lumencast_gather::{Gather, Ticket};
-use lumencast_light::{LightField, ProbeVolume};
+use lumencast_light::{Light, ProbeVolume};
 use lumencast_scene::{Edit, FileRead, Scene, Script, Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
@@ -174,8 +174,8 @@ impl Tick {
     }
 
     /// The same as one field.
-    fn light(&self) -> LightField {
-        LightField::new(self.volumes().cloned().collect())
+    fn light(&self) -> Light {
+        Light::new(self.volumes().cloned())
     }
 
     /// The number of the next tick.

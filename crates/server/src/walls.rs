@@ -153,7 +153,7 @@ fn steps() -> impl Iterator<Item = IVec3> {
 #[cfg(test)]
 mod tests {
     use glam::{Quat, UVec3};
-    use lumencast_light::{Grid, Order, VolumeId};
+    use lumencast_light::{FieldId, Grid, Order};
 
     use super::*;
 
@@ -164,7 +164,7 @@ mod tests {
             size: resolution.as_vec3(),
             resolution,
         };
-        ProbeVolume::dark(VolumeId(0), grid, Order::L1)
+        ProbeVolume::dark(FieldId(0), grid, Order::L1)
     }
 
     /// Single-sided backs in so many of 16 directions, and light from the others.

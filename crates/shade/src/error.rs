@@ -39,9 +39,9 @@ pub enum ShadeError {
         /// The adapter's.
         limit: u32,
     },
-    /// A light field with more probes than the adapter's textures hold.
+    /// Light with more probes than the adapter's textures hold.
     #[error(
-        "the light field's {volumes} volumes do not fit a 3D texture of {limit} texels a side; give \
+        "the light's {volumes} volumes do not fit a 3D texture of {limit} texels a side; give \
          fewer or coarser volumes"
     )]
     Field {

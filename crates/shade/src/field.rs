@@ -1,11 +1,11 @@
-//! The light field on the device: all volumes in one 3D texture.
+//! The light on the device: all volumes in one 3D texture.
 //!
 //! A volume's atlas (`light::Atlas`) is deep and narrow, so volumes are stacked along z, and where the
 //! adapter's textures are not deep enough, in columns side by side. Reading clamps to the outermost
 //! probes, so that filtering never reaches a neighbour.
 
 use glam::{Affine3A, Mat3, UVec3, Vec3};
-use lumencast_light::{Atlas, Grid, LightField, ProbeVolume, ScaleRule, atlas_size, texels};
+use lumencast_light::{Atlas, Grid, Light, ProbeVolume, ScaleRule, atlas_size, texels};
 use lumencast_shaders::layout;
 
 use crate::ShadeError;
@@ -85,8 +85,8 @@ impl GpuField {
     }
 
     /// Takes in other light. Where the volumes are as large as before, the texture stays.
-    pub(crate) fn update(&mut self, gpu: &Gpu, light: &LightField) -> Result<(), ShadeError> {
-        let volumes = light.volumes();
+    pub(crate) fn update(&mut self, gpu: &Gpu, light: &Light) -> Result<(), ShadeError> {
+        let volumes: Vec<&ProbeVolume> = light.volumes().collect();
         let sizes: Vec<UVec3> =
             volumes.iter().map(|v| atlas_size(v.grid.resolution, v.order)).collect();
         if sizes != self.sizes {
@@ -210,7 +210,7 @@ fn group(
 mod tests {
     use super::*;
     use glam::{Quat, Vec4};
-    use lumencast_light::{Order, VolumeId};
+    use lumencast_light::{FieldId, Order};
 
     #[test]
     fn volumes_do_not_overlap() {
@@ -230,7 +230,7 @@ mod tests {
             size: Vec3::new(4.0, 2.0, 6.0),
             resolution: UVec3::new(4, 3, 5),
         };
-        let volume = of_volume(&ProbeVolume::dark(VolumeId(0), grid, Order::L3), UVec3::X, -3);
+        let volume = of_volume(&ProbeVolume::dark(FieldId(0), grid, Order::L3), UVec3::X, -3);
         for p in [Vec3::ZERO, Vec3::new(2.0, -1.5, 3.0)] {
             let h: Vec4 = p.extend(1.0);
             let cell = Vec3::from(volume.cell_from_world.map(|row| row.dot(h)));

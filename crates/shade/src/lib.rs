@@ -1,9 +1,9 @@
 //! The reference client: a forward renderer that draws direct light itself and takes indirect light
-//! from a light field (chapter 4.2 of the second paper). It is what one copies from to bring
+//! from fields (chapter 4.2 of the second paper). It is what one copies from to bring
 //! Lumencast to another engine, and the instrument that measures its quality.
 //!
 //! A [`Renderer`] is given a scene's [`Snapshot`](lumencast_scene::Snapshot) and a
-//! [`LightField`](lumencast_light::LightField) and draws [`View`](lumencast_scene::View)s of them, on
+//! [`Light`](lumencast_light::Light) and draws [`View`](lumencast_scene::View)s of them, on
 //! any adapter that wgpu knows, also without a window. Radiance is cd/m² throughout; before it is
 //! stored in half floats it is multiplied by one pre-exposure.
 //!

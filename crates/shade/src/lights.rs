@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use half::f16;
-use lumencast_scene::{Environment, HdrImage, Light, LightKind, PlacedLight, Snapshot};
+use lumencast_scene::{Environment, HdrImage, LightKind, PlacedLight, PunctualLight, Snapshot};
 use lumencast_shaders::layout::{self, light};
 
 use crate::bindings::{FILTERED, SAMPLER, STORAGE, UNIFORM, entry, texture};
@@ -167,7 +167,7 @@ fn elevation(zenith: Vec3, horizon: Vec3, ground: Vec3) -> layout::Environment {
 }
 
 fn of_light(placed: &PlacedLight, first_shadow: u32, shadow_count: u32) -> layout::Light {
-    let Light { kind, color, intensity, range } = placed.light;
+    let PunctualLight { kind, color, intensity, range } = placed.light;
     let (cone_scale, cone_offset) = match kind {
         LightKind::Spot { inner, outer, .. } => {
             let scale = 1.0 / (inner.cos() - outer.cos()).max(0.001);

@@ -4,7 +4,7 @@ use std::mem;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
-use lumencast_light::LightField;
+use lumencast_light::Light;
 use lumencast_scene::{Snapshot, View};
 use lumencast_shaders::layout;
 
@@ -30,7 +30,7 @@ const GOLDEN: f32 = 0.618_034;
 /// Draws pictures of a scene under the light of a field.
 ///
 /// ```no_run
-/// use lumencast_light::LightField;
+/// use lumencast_light::Light;
 /// use lumencast_scene::Scene;
 /// use lumencast_shade::{Gpu, Renderer, Settings};
 ///
@@ -38,7 +38,7 @@ const GOLDEN: f32 = 0.618_034;
 /// let settings = Settings::default();
 /// let mut renderer = Renderer::new(Gpu::new()?, &settings);
 /// renderer.set_scene(&scene.snapshot());
-/// renderer.set_light(&LightField::default())?;
+/// renderer.set_light(&Light::default())?;
 /// let view = scene.cameras()[0].view();
 /// let pictures = renderer.pictures(&[view], &settings)?;
 /// assert_eq!(pictures[0].len(), 1280 * 720);
@@ -143,7 +143,7 @@ impl Renderer {
     ///
     /// # Errors
     /// Where it does not fit the device's textures.
-    pub fn set_light(&mut self, light: &LightField) -> Result<(), ShadeError> {
+    pub fn set_light(&mut self, light: &Light) -> Result<(), ShadeError> {
         self.field.update(&self.gpu, light)
     }
 

@@ -258,12 +258,12 @@ fn around_sphere(light_from_world: &Mat4, cameras: &[Camera], from: f32, to: f32
 mod tests {
     use super::*;
     use glam::{UVec2, Vec2};
-    use lumencast_scene::{Light, NodeId, View};
+    use lumencast_scene::{NodeId, PunctualLight, View};
 
     fn placed(kind: LightKind, intensity: f32) -> PlacedLight {
         PlacedLight {
             node: NodeId(0),
-            light: Light { kind, color: Vec3::ONE, intensity, range: None },
+            light: PunctualLight { kind, color: Vec3::ONE, intensity, range: None },
             position: Vec3::new(0.0, 3.0, 0.0),
             direction: Vec3::new(0.3, -1.0, 0.2).normalize(),
         }

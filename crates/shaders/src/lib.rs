@@ -7,7 +7,7 @@
 //! its namesake.
 //!
 //! Bindings are grouped by lifetime: 0 the pass (its view, instances, and which of them it draws), 1
-//! the frame's light (punctual lights, shadow maps, environment), 2 the light field, 3 the material.
+//! the frame's light (punctual lights, shadow maps, environment), 2 the fields, 3 the material.
 //! Deforming and what is done with a picture have a group of their own.
 //!
 //! ```

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Vec3, Vec4};
 use lumencast_scene::{
-    Environment, Instance, Light, Material, MaterialId, Mesh, MeshId, NodeId, PlacedLight,
-    Primitive, Snapshot, Vertices,
+    Environment, Instance, Material, MaterialId, Mesh, MeshId, NodeId, PlacedLight, Primitive,
+    PunctualLight, Snapshot, Vertices,
 };
 
 /// A scene in the making. Every shape becomes a mesh and an instance of its own.
@@ -86,7 +86,7 @@ impl Stage {
     }
 
     /// Adds a light; `direction` need not be of unit length.
-    pub fn light(&mut self, light: Light, position: Vec3, direction: Vec3) -> &mut Self {
+    pub fn light(&mut self, light: PunctualLight, position: Vec3, direction: Vec3) -> &mut Self {
         let node = NodeId(1_000_000 + self.lights.len() as u32);
         let direction = direction.normalize();
         self.lights.push(PlacedLight { node, light, position, direction });

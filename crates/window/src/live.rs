@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use lumencast_client::{Replica, Session};
-use lumencast_light::LightField;
+use lumencast_light::Light;
 use lumencast_scene::{Aabb, NamedView, Scene, Snapshot};
 use lumencast_transport::ConnectionState;
 
@@ -77,8 +77,8 @@ impl World for Live {
         self.replica.snapshot()
     }
 
-    fn light(&mut self, _anew: bool, take: &mut dyn FnMut(&LightField)) {
-        self.session.light(self.now, |light| take(light.field));
+    fn light(&mut self, _anew: bool, take: &mut dyn FnMut(&Light)) {
+        self.session.light(self.now, |light| take(&light));
     }
 
     fn facts(&self) -> Vec<(&'static str, String)> {

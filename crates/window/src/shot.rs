@@ -76,7 +76,7 @@ mod tests {
     use std::sync::Arc;
 
     use glam::Vec3;
-    use lumencast_light::LightField;
+    use lumencast_light::Light;
     use lumencast_picture::ToneMap;
     use lumencast_scene::{Aabb, NamedView, Scene, Snapshot};
     use lumencast_shade::Settings;
@@ -106,7 +106,7 @@ mod tests {
             self.0.snapshot()
         }
 
-        fn light(&mut self, _anew: bool, _take: &mut dyn FnMut(&LightField)) {}
+        fn light(&mut self, _anew: bool, _take: &mut dyn FnMut(&Light)) {}
 
         fn facts(&self) -> Vec<(&'static str, String)> {
             Vec::new()

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumencast_light::LightField;
+use lumencast_light::Light;
 use lumencast_scene::{Aabb, NamedView, Scene, Snapshot};
 
 /// A scene and its light.
@@ -24,7 +24,7 @@ pub trait World {
     fn snapshot(&mut self) -> Arc<Snapshot>;
 
     /// Hands the light to `take` where it has changed since it was handed on last, or `anew`.
-    fn light(&mut self, anew: bool, take: &mut dyn FnMut(&LightField));
+    fn light(&mut self, anew: bool, take: &mut dyn FnMut(&Light));
 
     /// What there is to tell of the light: names and values.
     fn facts(&self) -> Vec<(&'static str, String)>;
@@ -47,7 +47,7 @@ pub trait World {
 pub struct Still {
     scene: Scene,
     views: Vec<NamedView>,
-    light: LightField,
+    light: Light,
     source: String,
     handed_on: bool,
     plays: bool,
@@ -56,7 +56,7 @@ pub struct Still {
 
 impl Still {
     /// A scene under a field; `source` says where that comes from.
-    pub fn new(scene: Scene, light: LightField, source: String) -> Self {
+    pub fn new(scene: Scene, light: Light, source: String) -> Self {
         let views = scene.views();
         let (handed_on, plays, last) = (false, true, None);
         Self { scene, views, light, source, handed_on, plays, last }
@@ -88,7 +88,7 @@ impl World for Still {
         self.scene.snapshot()
     }
 
-    fn light(&mut self, anew: bool, take: &mut dyn FnMut(&LightField)) {
+    fn light(&mut self, anew: bool, take: &mut dyn FnMut(&Light)) {
         if anew || !self.handed_on {
             take(&self.light);
             self.handed_on = true;
@@ -96,12 +96,12 @@ impl World for Still {
     }
 
     fn facts(&self) -> Vec<(&'static str, String)> {
-        let probes: usize = self.light.volumes().iter().map(|v| v.grid.probe_count()).sum();
+        let probes: usize = self.light.volumes().map(|v| v.grid.probe_count()).sum();
         vec![("light", self.source.clone()), ("probes", probes.to_string())]
     }
 
     fn notice(&self) -> Option<String> {
-        self.light.volumes().is_empty().then(|| "There is no indirect light.".to_owned())
+        self.light.volumes().next().is_none().then(|| "There is no indirect light.".to_owned())
     }
 
     fn is_settled(&self) -> bool {

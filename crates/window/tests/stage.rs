@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, pos2, vec2};
 use glam::{UVec2, Vec3};
-use lumencast_light::LightField;
+use lumencast_light::Light;
 use lumencast_picture::{Loaded, ToneMap};
 use lumencast_scene::Scene;
 use lumencast_shade::{Gpu, Lighting, Settings, wgpu};
@@ -51,7 +51,7 @@ impl Test {
         };
         let options = Options { size: SIZE, view: None, controls, screenshots: folder.clone() };
         let scene = Scene::open("cornell").unwrap();
-        let world = Still::new(scene, LightField::default(), "nowhere".into());
+        let world = Still::new(scene, Light::default(), "nowhere".into());
         let gpu = Gpu::new().unwrap();
         let onto = onto(&gpu);
         let stage = Stage::new(gpu, FORMAT, Box::new(world), &options);

@@ -33,7 +33,7 @@ samples than before. The noise told is the error that is left, from the differen
 of its samples.
 
 Field, direct, indirect and none are drawn as a client draws them, by a graphics adapter (in software
-where there is no other): direct light with shadow maps, indirect light from a light field. Without
+where there is no other): direct light with shadow maps, indirect light from fields. Without
 --light the field is computed first, with one bounce less than --bounces, since a probe sees light
 that has been scattered once where a camera sees it scattered twice.
 
@@ -100,7 +100,7 @@ pub(crate) struct Render {
 enum Lighting {
     /// By path tracing every pixel.
     Reference,
-    /// As a client does: direct light, and indirect light from a light field.
+    /// As a client does: direct light, and indirect light from fields.
     Field,
     /// Direct light alone.
     Direct,

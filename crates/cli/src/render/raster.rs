@@ -1,10 +1,10 @@
-//! Pictures as a client draws them: by a graphics adapter, under a light field.
+//! Pictures as a client draws them: by a graphics adapter, under light that was computed.
 
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
 use glam::{Affine3A, UVec2, Vec3};
-use lumencast_light::{LightField, ProbeVolume};
+use lumencast_light::{Light, ProbeVolume};
 use lumencast_picture::{Picture, exposure};
 use lumencast_scene::{Scene, View};
 use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadows, Transparency};
@@ -48,7 +48,7 @@ impl Render {
             let volumes = self.volumes(scene, light)?;
             probes = volumes.iter().map(|volume| volume.grid.probe_count()).sum();
             let (offset, window) = (self.raster.reading.offset, self.raster.window);
-            renderer.set_light(&LightField::new(volumes).seen(offset, window))?;
+            renderer.set_light(&Light::new(volumes).seen(offset, window))?;
         }
         let grid = self.raster.views.unwrap_or(UVec2::ONE);
         let views = views(&view, grid, self.raster.view_spacing);

@@ -14,7 +14,7 @@ use crate::values::{parse_occlusion, parse_positive};
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Pictures drawn by an adapter")]
 pub(crate) struct RasterArguments {
-    /// The light field: a file of `lumencast bake`, or the address of a server's scene. Computed where
+    /// The light: a file of `lumencast bake`, or the address of a server's scene. Computed where
     /// it is not given.
     #[arg(long, value_name = "FILE|URL")]
     pub(super) light: Option<String>,

@@ -3,7 +3,7 @@
 //! over time, as the gatherer's do.
 
 use glam::{UVec3, Vec3};
-use lumencast_light::{Grid, Order, ProbeVolume, VolumeId, sh};
+use lumencast_light::{FieldId, Grid, Order, ProbeVolume, sh};
 
 /// A small generator (PCG-XSH-RR), so that runs repeat.
 pub(crate) struct Random(u64);
@@ -120,5 +120,5 @@ pub(crate) fn volume(cells: u32, order: Order) -> ProbeVolume {
         size: 2.0 * HALF,
         resolution: UVec3::splat(cells),
     };
-    ProbeVolume::dark(VolumeId(0), grid, order)
+    ProbeVolume::dark(FieldId(0), grid, order)
 }

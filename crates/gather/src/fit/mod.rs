@@ -9,7 +9,7 @@
 //! Σₚ wₚ |Eₚ − Rₚ c|² + Σⱼ sⱼ/4π Σₖ A²ₖ |cⱼₖ − gⱼₖ|²
 //!
 //! - Eₚ is the irradiance at point p of a surface, and Rₚ reads it just as a client does: from all
-//!   volumes that [count](lumencast_light::LightField::shares) there, trilinear, off the surface by the
+//!   volumes that [count](lumencast_light::Light::shares) there, trilinear, off the surface by the
 //!   volume's [offset](lumencast_light::Offset), convolved by the cosine. The two sides of a wall are
 //!   read from other places and in other directions, so that even a wall within a cell keeps them apart.
 //! - Points are those that are [seen](Surroundings) from the probes themselves and from about the
@@ -30,10 +30,10 @@
 mod solve;
 
 use glam::Vec3;
-use lumencast_light::{LightField, ProbeVolume, sh};
+use lumencast_light::{Light, Place, ProbeVolume, sh};
 
 use crate::sampling::luminance;
-use crate::{Place, Receiver, Sums, SurfacePoint};
+use crate::{Place as At, Receiver, Sums, SurfacePoint};
 use solve::{Row, SIZE, System};
 
 /// Share of its directions in which a probe sees backs above which it counts as being inside of
@@ -101,26 +101,27 @@ impl Part<'_> {
     }
 }
 
-/// Fits all volumes of a field together, since clients read a point's light from all that count there.
+/// Fits all volumes of a light together, since clients read a point's light from all that count there.
 /// `light` holds what the fit begins from, such as the last one or the light that was gathered, and then
 /// the result; `parts` stand in the order of its volumes.
 ///
 /// Where no light arrives anywhere, the light is what was gathered.
-pub fn fit(light: &mut LightField, parts: &[Part<'_>], settings: &FitSettings) {
+pub fn fit(light: &mut Light, parts: &[Part<'_>], settings: &FitSettings) {
     let points: Vec<(SurfacePoint, Vec3)> = parts.iter().flat_map(Part::points).collect();
     let mean = points.iter().map(|(_, irradiance)| luminance(*irradiance)).sum::<f32>()
         / points.len() as f32;
     if !(mean > 0.0 && mean.is_finite()) {
-        for (volume, part) in light.volumes_mut().iter_mut().zip(parts) {
+        for (volume, part) in light.volumes_mut().zip(parts) {
             volume.coefficients.copy_from_slice(&part.gathered.coefficients);
         }
         return;
     }
     let stiffness = parts.iter().flat_map(|part| part.stiffness(mean, settings)).collect();
     let mut system = System::new(stiffness, parts.iter().flat_map(Part::free).collect());
-    let first = first_probes(light);
+    let volumes: Vec<&ProbeVolume> = light.volumes().collect();
+    let first = first_probes(&volumes);
     for (at, irradiance) in points {
-        let reads = read_at(light, &first, &at);
+        let reads = read_at(light, &volumes, &first, &at);
         let row = Row::new(at.normal, irradiance / mean);
         system.push(row.beside(higher_bands(parts, &first, &reads, at.normal) / mean), reads);
     }
@@ -131,7 +132,7 @@ pub fn fit(light: &mut LightField, parts: &[Part<'_>], settings: &FitSettings) {
         system.solve(&mut found, &gathered, settings.steps);
     }
     let mut found = found.chunks_exact(SIZE);
-    for (volume, part) in light.volumes_mut().iter_mut().zip(parts) {
+    for (volume, part) in light.volumes_mut().zip(parts) {
         let free = volume.order.coefficients().min(SIZE);
         for probe in 0..volume.grid.probe_count() {
             let result = volume.probe_mut(probe);
@@ -144,8 +145,8 @@ pub fn fit(light: &mut LightField, parts: &[Part<'_>], settings: &FitSettings) {
 }
 
 /// The number of each volume's first probe among those of all.
-fn first_probes(light: &LightField) -> Vec<u32> {
-    let counts = light.volumes().iter().map(|volume| volume.grid.probe_count() as u32);
+fn first_probes(volumes: &[&ProbeVolume]) -> Vec<u32> {
+    let counts = volumes.iter().map(|volume| volume.grid.probe_count() as u32);
     counts
         .scan(0, |next, count| {
             *next += count;
@@ -156,10 +157,15 @@ fn first_probes(light: &LightField) -> Vec<u32> {
 
 /// The probes that a client reads a point from, and how much each counts; none where the point lies
 /// half a cell outside of all volumes and more, whose outermost probes stand in for it.
-fn read_at(light: &LightField, first: &[u32], at: &SurfacePoint) -> Vec<(u32, f32)> {
+fn read_at(
+    light: &Light,
+    volumes: &[&ProbeVolume],
+    first: &[u32],
+    at: &SurfacePoint,
+) -> Vec<(u32, f32)> {
     let (mut reads, mut near) = (Vec::new(), false);
-    for (number, part) in light.shares(at.position, at.normal) {
-        let volume = &light.volumes()[number];
+    for (number, part) in light.shares(&Place::on_surface(at.position, at.normal)) {
+        let volume = volumes[number];
         let corners = volume.corners(at.position, at.normal);
         near |= volume.grid.reach(volume.grid.cell_from_world(at.position)) > 0.0;
         let probes = corners.probes.into_iter().zip(corners.shares);
@@ -243,7 +249,7 @@ impl Surroundings {
         let counting = self.points.iter().enumerate().filter(|(number, _)| self.counts(*number));
         counting.filter_map(move |(number, point)| {
             let SurfacePoint { position, normal, .. } = (*point)?;
-            let place = Place::Lumel { position, normal, footprint: [Vec3::ZERO; 2] };
+            let place = At::Lumel { position, normal, footprint: [Vec3::ZERO; 2] };
             Some((number, Receiver { place, samples }))
         })
     }

@@ -2,14 +2,14 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumencast_scene::{Environment, HdrImage, Light, LightKind, NodeId, PlacedLight};
+use lumencast_scene::{Environment, HdrImage, LightKind, NodeId, PlacedLight, PunctualLight};
 
 use super::environment::{Sky, SkyCache};
 use super::punctual::{Incident, Punctual, Source};
 use crate::bsdf::{Bsdf, Scatter, Substance};
 use crate::sampling::{Sampler, sphere};
 
-fn placed(light: Light, position: Vec3, direction: Vec3) -> PlacedLight {
+fn placed(light: PunctualLight, position: Vec3, direction: Vec3) -> PlacedLight {
     PlacedLight { node: NodeId(0), light, position, direction: direction.normalize() }
 }
 
@@ -18,8 +18,8 @@ fn incident(placed: &PlacedLight, at: Vec3) -> Option<Incident> {
     Source::new(placed).incident(at)
 }
 
-fn point(intensity: f32, range: Option<f32>) -> Light {
-    Light { kind: LightKind::Point { radius: 0.0 }, color: Vec3::ONE, intensity, range }
+fn point(intensity: f32, range: Option<f32>) -> PunctualLight {
+    PunctualLight { kind: LightKind::Point { radius: 0.0 }, color: Vec3::ONE, intensity, range }
 }
 
 #[test]
@@ -38,7 +38,8 @@ fn inverse_square_and_range_window() {
 #[test]
 fn spot_falls_off_as_khr_lights_punctual_says() {
     let (inner, outer) = (0.2f32, 0.5f32);
-    let spot = Light { kind: LightKind::Spot { inner, outer, radius: 0.0 }, ..point(1.0, None) };
+    let spot =
+        PunctualLight { kind: LightKind::Spot { inner, outer, radius: 0.0 }, ..point(1.0, None) };
     let spot = placed(spot, Vec3::ZERO, Vec3::NEG_Z);
     let at = |angle: f32| {
         incident(&spot, Vec3::new(angle.sin(), 0.0, -angle.cos())).map_or(0.0, |i| i.irradiance.x)
@@ -64,7 +65,8 @@ fn choosing_among_lights_is_unbiased() {
                     _ => LightKind::Directional { angle: 0.0 },
                 };
                 let color = Vec3::new(1.0, s.number(), s.number());
-                let light = Light { kind, color, intensity: 1.0 + 5.0 * s.number(), range: None };
+                let light =
+                    PunctualLight { kind, color, intensity: 1.0 + 5.0 * s.number(), range: None };
                 placed(light, position, -position)
             })
             .collect();
@@ -156,8 +158,11 @@ fn picture_samples_estimate_its_integral() {
 fn discs_keep_their_digits() {
     for half in [5e-7f32, 1e-4, 4.64e-3, 0.1, 1.0, PI / 2.0] {
         let kind = LightKind::Directional { angle: 2.0 * half };
-        let sun =
-            placed(Light { kind, ..point(1.0, None) }, Vec3::ZERO, Vec3::new(-3.0, -2.0, 1.0));
+        let sun = placed(
+            PunctualLight { kind, ..point(1.0, None) },
+            Vec3::ZERO,
+            Vec3::new(-3.0, -2.0, 1.0),
+        );
         let disc = incident(&sun, Vec3::ZERO).unwrap();
         let (mut inner, mut met, mut mean) = (0, 0, Vec3::ZERO);
         let n = 4096;
@@ -183,7 +188,8 @@ fn discs_keep_their_digits() {
 #[test]
 fn a_ray_meets_a_sphere_where_it_is() {
     let kind = LightKind::Point { radius: 0.5 };
-    let light = placed(Light { kind, ..point(1.0, None) }, Vec3::new(0.0, 3.0, 0.0), Vec3::X);
+    let light =
+        placed(PunctualLight { kind, ..point(1.0, None) }, Vec3::new(0.0, 3.0, 0.0), Vec3::X);
     let met = |at: Vec3, to: Vec3| incident(&light, at).unwrap().met((to - at).normalize());
     assert!((met(Vec3::ZERO, Vec3::Y).unwrap() - 2.5).abs() < 1e-6);
     let side = Vec3::new(0.3, 2.6, 0.0);
@@ -199,12 +205,12 @@ fn a_ray_meets_a_sphere_where_it_is() {
 fn both_ways_of_finding_a_disc_count_once() {
     let lights = [
         placed(
-            Light { kind: LightKind::Point { radius: 0.5 }, ..point(3.0, None) },
+            PunctualLight { kind: LightKind::Point { radius: 0.5 }, ..point(3.0, None) },
             Vec3::new(-1.2, 0.3, 1.5),
             Vec3::X,
         ),
         placed(
-            Light { kind: LightKind::Directional { angle: 0.5 }, ..point(1.0, None) },
+            PunctualLight { kind: LightKind::Directional { angle: 0.5 }, ..point(1.0, None) },
             Vec3::ZERO,
             Vec3::new(0.8, 0.1, -1.0),
         ),

@@ -21,7 +21,7 @@ use crate::accel::{Hit, Ray};
 use crate::bsdf::{Scatter, frame};
 use crate::lights::punctual::{LightPoint, Source};
 use crate::sampling::{Grid2, Sampler, luminance, power_heuristic};
-use crate::surface::{MaterialModel, Place};
+use crate::surface::{HitPoint, MaterialModel};
 use crate::world::{Itself, World, itself};
 
 /// Most cells along each side of the grid of densities.
@@ -143,7 +143,7 @@ impl Beam {
     /// What a ray of it has met; `None` where that scatters nothing.
     pub(super) fn lit(&self, world: &World, hit: &Hit, source: LightPoint) -> Option<Lit> {
         let surface = Scatterer::at(&world.point(hit, -source.direction)?, world.model)?;
-        let Place { position, normal, .. } = surface.place;
+        let HitPoint { position, normal, .. } = surface.place;
         let density = self.density(position, normal, source.direction);
         (density > 0.0).then_some(Lit { itself: itself(hit), surface, source, density })
     }
@@ -192,7 +192,7 @@ impl Lit {
         pdf: f32,
         model: MaterialModel,
     ) -> Option<Vec3> {
-        let Place { position, normal, .. } = self.surface.place;
+        let HitPoint { position, normal, .. } = self.surface.place;
         if direction.dot(normal) >= 0.0 {
             return None;
         }
@@ -234,7 +234,7 @@ mod tests {
     use super::*;
     use crate::accel::{Kernel, Stacks};
     use crate::world::{Passing, WorldCache};
-    use lumencast_scene::Light;
+    use lumencast_scene::PunctualLight;
     use lumencast_testkit::scenes::{Stage, lambert};
 
     /// A slanted square under a sun of some width.
@@ -243,7 +243,7 @@ mod tests {
         let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
         stage.quad(Vec3::new(-1.0, -0.5, 1.0), 2.0 * Vec3::X, Vec3::new(0.0, 1.0, -2.0), grey);
         let kind = LightKind::Directional { angle };
-        let light = Light { kind, color: Vec3::ONE, intensity: 2.0, range: None };
+        let light = PunctualLight { kind, color: Vec3::ONE, intensity: 2.0, range: None };
         stage.light(light, Vec3::ZERO, Vec3::new(0.3, -1.0, 0.2));
         let (kernel, cache) = (Kernel::detect(), &mut WorldCache::default());
         World::new(stage.snapshot(), MaterialModel::Full, kernel, cache)

@@ -4,7 +4,7 @@
 //! vertex, and then a loop over all of them computes it in vectors.
 
 use glam::Vec3;
-use lumencast_light::LightField;
+use lumencast_light::{Light, OnTriangle, Place};
 
 use super::beam::{Found, Lit};
 use super::columns::{Columns, GROUP};
@@ -15,7 +15,7 @@ use crate::bsdf::Scatter;
 use crate::lights::AreaSample;
 use crate::lights::punctual::{CANDIDATES, Candidate, Source};
 use crate::sampling::{Draw, Sampler, luminance, power_heuristic};
-use crate::surface::{Bump, Frames, Place, Spot, Triangle, interpolate};
+use crate::surface::{Bump, Frames, HitPoint, Spot, Triangle, interpolate};
 use crate::world::{Passing, World, itself};
 
 /// A surface that a path has met.
@@ -111,8 +111,8 @@ impl Shader<'_, '_> {
         if !is_last || previous.is_some() {
             self.find_scattering();
             self.reach_for_punctual(is_last);
-            if let Some(field) = previous.filter(|_| is_last) {
-                self.add_field(field);
+            if let Some(light) = previous.filter(|_| is_last) {
+                self.add_known(light);
             } else {
                 self.go_on();
             }
@@ -177,7 +177,7 @@ impl Shader<'_, '_> {
         }
         for vertex in 0..GROUP {
             let [u, v] = weights.get(vertex);
-            let place = Place::new(
+            let place = HitPoint::new(
                 &Frames::from_array(frames.get(vertex)),
                 bytemuck::cast(corners.get(vertex)),
                 Vec3::new(1.0 - u - v, u, v),
@@ -451,13 +451,13 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// Adds what the last surfaces scatter of a field's light, and ends the paths. Negative lobes of
-    /// the field are kept: cut off here, light would be added at every bounce.
+    /// Adds what the last surfaces scatter of light that is known, and ends the paths. Negative lobes
+    /// of fields are kept: cut off here, light would be added at every bounce.
     #[inline(always)]
-    fn add_field(&mut self, field: &LightField) {
+    fn add_known(&mut self, light: &Light) {
         let rays = self.choose_rays();
         for vertex in 0..self.group.met.len().min(GROUP) {
-            let Met { index, .. } = self.group.met[vertex];
+            let Met { index, hit, .. } = self.group.met[vertex];
             let Scattered { direction, weight, pdf, .. } = Scattered::from_array(rays.get(vertex));
             if !self.group.going[vertex] || pdf <= 0.0 {
                 continue;
@@ -466,11 +466,12 @@ impl Shader<'_, '_> {
             let normal = Vec3::from(vertices.normals.get(vertex));
             let side = normal * 1.0f32.copysign(normal.dot(direction));
             let at = vertices.place(vertex).position + self.world.origin();
-            let Some(arriving) = field.sample(at, side) else { continue };
+            let place = Place { position: at, normal: side, on: Some(on_triangle(&hit)) };
+            let Some(arriving) = light.sample(&place) else { continue };
             let path = &self.paths[index as usize];
-            let light = path.throughput * (weight * arriving.radiance(direction));
-            let light = self.limited(self.depth + 1, light);
-            self.paths[index as usize].seen.add(Part::Indirect, light);
+            let scattered = path.throughput * (weight * arriving.radiance(direction));
+            let scattered = self.limited(self.depth + 1, scattered);
+            self.paths[index as usize].seen.add(Part::Indirect, scattered);
         }
     }
 
@@ -518,6 +519,12 @@ impl Shader<'_, '_> {
             light * (self.limits.clamp / y)
         }
     }
+}
+
+/// Where on the scene a hit is.
+fn on_triangle(hit: &Hit) -> OnTriangle {
+    let Hit { instance, primitive, triangle, .. } = *hit;
+    OnTriangle { instance, primitive, triangle, weights: hit.weights() }
 }
 
 #[cfg(test)]

@@ -216,7 +216,7 @@ impl Path {
 
 #[cfg(all(test, target_arch = "x86_64"))]
 mod tests {
-    use lumencast_scene::{Light, LightKind, Material};
+    use lumencast_scene::{LightKind, Material, PunctualLight};
     use lumencast_testkit::scenes::{Stage, lambert};
 
     use super::super::beam::Beam;
@@ -244,7 +244,7 @@ mod tests {
                 1 => LightKind::Spot { inner: 0.3, outer: 1.2, radius },
                 _ => LightKind::Directional { angle: radius },
             };
-            let light = Light { kind, color: Vec3::ONE, intensity: 2.0, range: Some(9.0) };
+            let light = PunctualLight { kind, color: Vec3::ONE, intensity: 2.0, range: Some(9.0) };
             stage.light(light, sphere(Sampler::new(6, 0, n).square()), Vec3::NEG_Y);
         }
         stage

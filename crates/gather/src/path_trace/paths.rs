@@ -1,7 +1,7 @@
 //! What paths are: where they begin, how they stand, and what they have seen.
 
 use glam::Vec3;
-use lumencast_light::LightField;
+use lumencast_light::Light;
 
 use super::beam::{Beam, solid_angle};
 use crate::accel::{ItemBuffer, Ray};
@@ -22,7 +22,7 @@ pub(crate) struct Paths<'a> {
     pub(crate) roulette_from: u32,
     /// The light that the last surface of a path scatters, beside that of punctual lights; without
     /// it, that surface only shines itself.
-    pub(crate) previous: Option<&'a LightField>,
+    pub(crate) previous: Option<&'a Light>,
     /// The rays of a light that paths are connected to.
     pub(crate) beam: Option<&'a Beam>,
     /// What most paths' first rays meet.
@@ -67,7 +67,7 @@ pub(crate) struct Seen {
     /// Radiance, cd/m², of what a client that holds punctual lights draws by itself, had it a camera
     /// here: sources seen, and punctual lights scattered once.
     pub(crate) direct: Vec3,
-    /// The rest: all light that a light field would have to bring.
+    /// The rest: all light that fields would have to bring.
     pub(crate) indirect: Vec3,
     /// Metres to the first surface; infinite where there is none.
     pub(crate) distance: f32,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use lumencast_light::Order;
-use lumencast_scene::{Environment, HdrImage, Light, LightKind, Material, Scene, Snapshot};
+use lumencast_scene::{Environment, HdrImage, LightKind, Material, PunctualLight, Scene, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 use super::group::LOST;
@@ -145,7 +145,7 @@ fn point_light_falls_by_cosine_and_square() {
     let albedo = Vec3::splat(0.5);
     let mut stage = Stage::default();
     let at = floor(&mut stage, lambert(albedo, BLACK));
-    let light = Light {
+    let light = PunctualLight {
         kind: LightKind::Point { radius: 0.0 },
         color: Vec3::ONE,
         intensity: 20.0,
@@ -217,7 +217,7 @@ fn picture_of_a_sun_over_a_lambert_plane() {
 fn clamp_holds_scattered_light_and_leaves_the_rest() {
     let mut stage = Stage::default();
     floor(&mut stage, lambert(Vec3::ONE, Vec3::splat(100.0)));
-    let sun = Light {
+    let sun = PunctualLight {
         kind: LightKind::Directional { angle: 0.0 },
         color: Vec3::ONE,
         intensity: 1e5,
@@ -286,8 +286,13 @@ fn lit_room() -> Arc<Snapshot> {
     stage.snapshot()
 }
 
-fn lamp(radius: f32) -> Light {
-    Light { kind: LightKind::Point { radius }, color: Vec3::ONE, intensity: 3.0, range: None }
+fn lamp(radius: f32) -> PunctualLight {
+    PunctualLight {
+        kind: LightKind::Point { radius },
+        color: Vec3::ONE,
+        intensity: 3.0,
+        range: None,
+    }
 }
 
 /// Paths are followed many at a time, and each finds what it finds alone.

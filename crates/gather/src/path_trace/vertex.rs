@@ -5,12 +5,12 @@ use glam::{Mat3, Vec3};
 use super::columns::{Columns, GROUP};
 use crate::bsdf::{Bsdf, Chosen, Scatter, frame};
 use crate::sampling::Draw;
-use crate::surface::{MaterialModel, Place, Point};
+use crate::surface::{HitPoint, MaterialModel, Point};
 
 /// A point where a path's light is scattered.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Vertex {
-    pub(super) place: Place,
+    pub(super) place: HitPoint,
     /// Towards where the path came from, unit.
     pub(super) view: Vec3,
     /// Unit; of shading, on the side of `view`.
@@ -21,7 +21,7 @@ pub(super) struct Vertex {
 /// A point that scatters light, before it is known where to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scatterer {
-    pub(super) place: Place,
+    pub(super) place: HitPoint,
     /// Unit; of shading, before it is bent to face anything.
     unbent: Vec3,
     bsdf: Bsdf,
@@ -116,7 +116,7 @@ fn local(frame: &Mat3, world: Vec3) -> Vec3 {
 /// The vertices of a group.
 #[derive(Debug, Default)]
 pub(super) struct Vertices {
-    pub(super) places: Columns<{ Place::NUMBERS }>,
+    pub(super) places: Columns<{ HitPoint::NUMBERS }>,
     pub(super) views: Columns<3>,
     pub(super) normals: Columns<3>,
     pub(super) bsdfs: Columns<{ Bsdf::NUMBERS }>,
@@ -126,7 +126,7 @@ impl Vertices {
     #[inline(always)]
     pub(super) fn get(&self, vertex: usize) -> Vertex {
         Vertex {
-            place: Place::from_array(self.places.get(vertex)),
+            place: HitPoint::from_array(self.places.get(vertex)),
             view: self.views.get(vertex).into(),
             normal: self.normals.get(vertex).into(),
             bsdf: Bsdf::from_array(self.bsdfs.get(vertex)),
@@ -134,8 +134,8 @@ impl Vertices {
     }
 
     #[inline(always)]
-    pub(super) fn place(&self, vertex: usize) -> Place {
-        Place::from_array(self.places.get(vertex))
+    pub(super) fn place(&self, vertex: usize) -> HitPoint {
+        HitPoint::from_array(self.places.get(vertex))
     }
 
     /// Evaluates each vertex for a direction of its own, value and density.

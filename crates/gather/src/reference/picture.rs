@@ -28,7 +28,7 @@ pub enum Parts {
     /// What clients draw by themselves: light of punctual lights scattered once, emission and
     /// environment where the camera sees them.
     Direct,
-    /// What light fields hold: light of emissive surfaces and the environment, and all light
+    /// What fields hold: light of emissive surfaces and the environment, and all light
     /// scattered more than once.
     Indirect,
     /// Both.

@@ -1,7 +1,7 @@
 //! What a ray has met: position, normals and material at a hit.
 
 mod frames;
-mod place;
+mod hit_point;
 pub(crate) mod texture;
 mod triangle;
 
@@ -12,7 +12,7 @@ use crate::accel::Hit;
 use crate::bsdf::Bsdf;
 
 pub(crate) use frames::{Frames, gamma};
-pub(crate) use place::{Bump, Place, interpolate, scaled_cross};
+pub(crate) use hit_point::{Bump, HitPoint, interpolate, scaled_cross};
 pub(crate) use triangle::{Spot, Triangle};
 
 /// Which materials to believe.
@@ -28,7 +28,7 @@ pub enum MaterialModel {
 
 /// A point on a surface that a ray has met, looked at alone.
 pub(crate) struct Point<'a> {
-    pub(crate) place: Place,
+    pub(crate) place: HitPoint,
     pub(crate) spot: Spot<'a>,
     /// The vertex normal there, object space.
     vertex_normal: Vec3,
@@ -48,7 +48,7 @@ impl<'a> Point<'a> {
         direction: Vec3,
     ) -> Option<Self> {
         let weights = hit.weights();
-        let place = Place::new(frames, triangle.positions(), weights, direction);
+        let place = HitPoint::new(frames, triangle.positions(), weights, direction);
         let vertex_normal = interpolate(triangle.normals(), weights);
         let spot = triangle.at(material, weights);
         let point = Self { place, spot, vertex_normal, frames, view: -direction };

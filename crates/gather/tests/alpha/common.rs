@@ -8,8 +8,8 @@ use lumencast_gather::path_trace::{CpuPathTracer, Levels, Options};
 use lumencast_gather::reference::{Film, PictureSettings, Renderer};
 use lumencast_gather::{Gather, Job, Place, Receiver};
 use lumencast_scene::{
-    AlphaMode, Environment, Filter, HdrImage, Image, Light, LightKind, Material, MaterialId,
-    Primitive, Projection, Snapshot, TextureRef, Vertices, View, Wrap,
+    AlphaMode, Environment, Filter, HdrImage, Image, LightKind, Material, MaterialId, Primitive,
+    Projection, PunctualLight, Snapshot, TextureRef, Vertices, View, Wrap,
 };
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -154,8 +154,8 @@ pub(super) fn with_sheet(mut stage: Stage, height: f32, material: Material) -> S
     stage
 }
 
-pub(super) fn light(kind: LightKind, intensity: f32) -> Light {
-    Light { kind, color: Vec3::ONE, intensity, range: None }
+pub(super) fn light(kind: LightKind, intensity: f32) -> PunctualLight {
+    PunctualLight { kind, color: Vec3::ONE, intensity, range: None }
 }
 
 /// Form factor of a rectangle that is parallel to a surface, one metre from it, by its bounds in metres

@@ -5,7 +5,7 @@ use glam::{DMat4, DVec3, Quat, Vec3};
 use super::json;
 use crate::asset::{AssetNode, Camera, Projection, Skin};
 use crate::error::{At, Fault, invalid};
-use crate::light::{Light, LightKind};
+use crate::light::{LightKind, PunctualLight};
 use crate::limits;
 use crate::mesh::Mesh;
 use crate::trs::Trs;
@@ -13,7 +13,7 @@ use crate::trs::Trs;
 /// Reads the nodes and checks that they form trees.
 pub(super) fn read(
     root: &json::Root,
-    lights: &[Light],
+    lights: &[PunctualLight],
     warnings: &mut Vec<String>,
 ) -> Result<Vec<AssetNode>, Fault> {
     if root.nodes.len() > limits::NODES {
@@ -67,7 +67,11 @@ fn transform(json: &json::Node) -> Result<(Trs, bool), Fault> {
     }
 }
 
-fn references(root: &json::Root, json: &json::Node, lights: &[Light]) -> Result<AssetNode, Fault> {
+fn references(
+    root: &json::Root,
+    json: &json::Node,
+    lights: &[PunctualLight],
+) -> Result<AssetNode, Fault> {
     let check = |what: &str, index: Option<usize>, count: usize| match index {
         Some(i) if i >= count => Err(invalid(format!("{what} {i} of {count} does not exist"))),
         index => Ok(index.map(|i| i as u32)),
@@ -146,7 +150,10 @@ pub(super) fn roots(root: &json::Root, nodes: &[AssetNode]) -> Result<Vec<u32>, 
 }
 
 /// Reads KHR_lights_punctual.
-pub(super) fn lights(root: &json::Root, warnings: &mut Vec<String>) -> Result<Vec<Light>, Fault> {
+pub(super) fn lights(
+    root: &json::Root,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<PunctualLight>, Fault> {
     let Some(lights) = &root.extensions.lights else { return Ok(Vec::new()) };
     let read = |(index, json): (usize, &json::Light)| {
         read_light(index, json, warnings).at(|| format!("light {index}"))
@@ -158,7 +165,7 @@ fn read_light(
     index: usize,
     json: &json::Light,
     warnings: &mut Vec<String>,
-) -> Result<Light, Fault> {
+) -> Result<PunctualLight, Fault> {
     let mut kind = match json.kind.as_str() {
         "point" => LightKind::Point { radius: 0.0 },
         "directional" => LightKind::Directional { angle: 0.0 },
@@ -185,7 +192,7 @@ fn read_light(
         warnings.push(format!("light {index}: its range of 0 is taken for none"));
     }
     let range = json.range.filter(|range| *range != 0.0);
-    let light = Light { kind, color, intensity, range };
+    let light = PunctualLight { kind, color, intensity, range };
     light.check().map_err(invalid)?;
     Ok(light)
 }

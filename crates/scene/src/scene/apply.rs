@@ -15,8 +15,8 @@ use crate::gltf::source::shorten;
 use crate::limits;
 use crate::trs::{Trs, is_in_world, is_invertible};
 use crate::{
-    AlphaMode, AnimationId, Edit, Environment, InstanceSource, Light, LightKind, LightSpec,
-    Material, MaterialChange, MaterialId, MeshId, NodeId, NodeName, Playback, Transform,
+    AlphaMode, AnimationId, Edit, Environment, InstanceSource, LightKind, LightSpec, Material,
+    MaterialChange, MaterialId, MeshId, NodeId, NodeName, Playback, PunctualLight, Transform,
 };
 
 /// Why an edit is refused. The text is meant for the one who sent it.
@@ -286,7 +286,7 @@ impl Scene {
     fn add_light(
         &mut self,
         id: NodeId,
-        light: Light,
+        light: PunctualLight,
         parent: Option<NodeId>,
         transform: &Transform,
     ) -> Result<(), EditError> {
@@ -310,7 +310,7 @@ impl Scene {
         Ok(())
     }
 
-    fn light_mut(&mut self, id: NodeId) -> Result<&mut Light, EditError> {
+    fn light_mut(&mut self, id: NodeId) -> Result<&mut PunctualLight, EditError> {
         let described = self.describe(id);
         let node = self.nodes.get_mut(id).ok_or(EditError::UnknownNode(id))?;
         node.light.as_mut().ok_or(EditError::NoLight(described))
@@ -404,7 +404,10 @@ fn check_transform(transform: &Transform) -> Result<(), &'static str> {
     Ok(())
 }
 
-fn changed_light(mut light: Light, spec: &LightSpec) -> Result<Light, &'static str> {
+fn changed_light(
+    mut light: PunctualLight,
+    spec: &LightSpec,
+) -> Result<PunctualLight, &'static str> {
     light.color = spec.color.unwrap_or(light.color);
     light.intensity = spec.intensity.unwrap_or(light.intensity);
     light.range = spec.range.or(light.range);

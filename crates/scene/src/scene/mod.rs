@@ -26,8 +26,8 @@ use crate::gltf::source::Folder;
 use crate::limits::Taken;
 use crate::trs::Trs;
 use crate::{
-    Aabb, AnimationId, Environment, FileContents, Light, Material, Mesh, MeshId, NamedView, NodeId,
-    Snapshot, Transform, View, VolumeSpec,
+    Aabb, AnimationId, Environment, FileContents, Material, Mesh, MeshId, NamedView, NodeId,
+    PunctualLight, Snapshot, Transform, View, VolumeSpec,
 };
 
 /// A scene: what its file says, what edits have made of it, and its time.
@@ -90,7 +90,7 @@ pub struct NodeInfo<'a> {
     /// The mesh that it shows.
     pub mesh: Option<MeshId>,
     /// The light that it carries.
-    pub light: Option<Light>,
+    pub light: Option<PunctualLight>,
 }
 
 impl<'a> NodeInfo<'a> {

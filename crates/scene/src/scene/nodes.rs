@@ -7,7 +7,7 @@ use glam::{DAffine3, Vec3};
 
 use crate::asset::Skin;
 use crate::trs::{Trs, is_in_world};
-use crate::{Light, MeshId, NodeId};
+use crate::{MeshId, NodeId, PunctualLight};
 
 /// A node of the scene.
 #[derive(Clone, Debug, Default)]
@@ -20,7 +20,7 @@ pub(crate) struct Node {
     /// Where the mesh is shown, relative to the node; once, at the node, where absent.
     pub(crate) instances: Option<Arc<[DAffine3]>>,
     pub(crate) skin: Option<PlacedSkin>,
-    pub(crate) light: Option<Light>,
+    pub(crate) light: Option<PunctualLight>,
     /// Model and index of its camera.
     pub(crate) camera: Option<(usize, u32)>,
     /// It and all below it are neither drawn nor give light.

@@ -4,8 +4,8 @@ use super::nodes::Node;
 use super::{Model, Scene};
 use crate::trs::Trs;
 use crate::{
-    AlphaMode, AnimationId, Edit, InstanceSource, Light, LightKind, LightSpec, Material,
-    MaterialChange, MaterialId, NodeId, NodeName, Playback, Transform,
+    AlphaMode, AnimationId, Edit, InstanceSource, LightKind, LightSpec, Material, MaterialChange,
+    MaterialId, NodeId, NodeName, Playback, PunctualLight, Transform,
 };
 
 impl Scene {
@@ -137,7 +137,7 @@ impl Scene {
 }
 
 /// Stands for a light that has been removed, until the edit that removes it.
-const NO_LIGHT: Light = Light {
+const NO_LIGHT: PunctualLight = PunctualLight {
     kind: LightKind::Point { radius: 0.0 },
     color: glam::Vec3::ZERO,
     intensity: 0.0,
@@ -171,7 +171,7 @@ fn moved(node: NodeId, old: Trs, new: Trs) -> Option<Edit> {
     (transform != Transform::default()).then_some(Edit::MoveNode { node, transform })
 }
 
-fn light_change(node: NodeId, old: Light, new: Light) -> Edit {
+fn light_change(node: NodeId, old: PunctualLight, new: PunctualLight) -> Edit {
     let (old, new) = (parts(old), parts(new));
     let light = LightSpec {
         color: differing(old.color, new.color).flatten(),
@@ -186,8 +186,8 @@ fn light_change(node: NodeId, old: Light, new: Light) -> Edit {
 }
 
 /// All parts that a light has.
-fn parts(light: Light) -> LightSpec {
-    let Light { kind, color, intensity, range } = light;
+fn parts(light: PunctualLight) -> LightSpec {
+    let PunctualLight { kind, color, intensity, range } = light;
     let spec =
         LightSpec { color: Some(color), intensity: Some(intensity), range, ..LightSpec::default() };
     match kind {

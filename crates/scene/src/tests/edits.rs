@@ -5,8 +5,8 @@ use serde_json::json;
 
 use super::{assert_same, load, triangle};
 use crate::{
-    AlphaMode, AnimationId, Edit, Environment, InstanceSource, Light, LightKind, LightSpec,
-    MaterialChange, MaterialId, MeshId, NodeId, Playback, Scene, Transform,
+    AlphaMode, AnimationId, Edit, Environment, InstanceSource, LightKind, LightSpec,
+    MaterialChange, MaterialId, MeshId, NodeId, Playback, PunctualLight, Scene, Transform,
 };
 
 /// A triangle (node 0), a lamp (1), a spot light (2), a group (3) with a triangle (4) in it; a masked
@@ -29,8 +29,8 @@ fn scene() -> Scene {
     load(w)
 }
 
-fn light(kind: LightKind, intensity: f32) -> Light {
-    Light { kind, color: Vec3::ONE, intensity, range: None }
+fn light(kind: LightKind, intensity: f32) -> PunctualLight {
+    PunctualLight { kind, color: Vec3::ONE, intensity, range: None }
 }
 
 fn at(translation: Vec3) -> Transform {

@@ -6,8 +6,8 @@ use serde_json::json;
 use super::{Folder, assert_same, load, triangle};
 use crate::builtin::writer::Writer;
 use crate::{
-    AnimationId, Edit, Environment, InstanceSource, Light, LightKind, LightSpec, MaterialChange,
-    MaterialId, MeshId, NodeId, NodeName, Playback, Scene, Transform,
+    AnimationId, Edit, Environment, InstanceSource, LightKind, LightSpec, MaterialChange,
+    MaterialId, MeshId, NodeId, NodeName, Playback, PunctualLight, Scene, Transform,
 };
 
 /// What a late joiner makes of the file and the edits; they go through JSON, as on the wire.
@@ -76,7 +76,8 @@ impl Random {
                     1 => LightKind::Spot { inner: 0.1, outer: unit, radius: 0.0 },
                     _ => LightKind::Directional { angle: unit },
                 };
-                let light = Light { kind, color: vector, intensity: unit, range: Some(3.0) };
+                let light =
+                    PunctualLight { kind, color: vector, intensity: unit, range: Some(3.0) };
                 Edit::AddLight { node: None, name, light, parent, transform }
             }
             6 => Edit::RemoveNode { node },

@@ -2,8 +2,8 @@
 
 use crate::common::{SIZE, drawn, renderer};
 use glam::{Quat, UVec2, UVec3, Vec3};
-use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
-use lumencast_scene::{Environment, Light, LightKind, Scene, View};
+use lumencast_light::{FieldId, Grid, Light, Order, ProbeVolume};
+use lumencast_scene::{Environment, LightKind, PunctualLight, Scene, View};
 use lumencast_shade::{Gpu, Lighting, Renderer, Settings, ShadeError, Transparency};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -16,7 +16,7 @@ fn settings() -> Settings {
 }
 
 fn lit_by(
-    lights: impl IntoIterator<Item = (Light, Vec3)>,
+    lights: impl IntoIterator<Item = (PunctualLight, Vec3)>,
 ) -> std::sync::Arc<lumencast_scene::Snapshot> {
     let mut stage = Stage::default();
     let white = stage.material(lambert(Vec3::splat(0.8), Vec3::ZERO));
@@ -34,7 +34,7 @@ fn no_lights_and_five_hundred() {
     let light = |i: u32| {
         let at = Vec3::new((i % 25) as f32 * 0.2 - 2.5, 1.0, (i / 25) as f32 * 0.2 - 2.0);
         let kind = LightKind::Point { radius: 0.0 };
-        (Light { kind, color: Vec3::ONE, intensity: 1.0, range: None }, at)
+        (PunctualLight { kind, color: Vec3::ONE, intensity: 1.0, range: None }, at)
     };
     let scene = lit_by((0..500).map(light));
     let mut renderer = renderer(&scene, &settings());
@@ -48,7 +48,7 @@ fn no_lights_and_five_hundred() {
 #[test]
 fn a_sun_of_a_hundred_thousand_lux() {
     let kind = LightKind::Directional { angle: 0.009 };
-    let sun = Light { kind, color: Vec3::ONE, intensity: 1e5, range: None };
+    let sun = PunctualLight { kind, color: Vec3::ONE, intensity: 1e5, range: None };
     let scene = lit_by([(sun, Vec3::ZERO)]);
     let settings = Settings { pre_exposure: 1e-4, ..settings() };
     let picture = drawn(&scene, view(), &settings);
@@ -77,11 +77,11 @@ fn a_field_too_large_for_the_adapter_is_refused() {
         size: Vec3::ONE,
         resolution: UVec3::new(1, 1, 4000),
     };
-    let light = LightField::new(vec![ProbeVolume::dark(VolumeId(0), grid, Order::L4)]);
+    let light = Light::new(vec![ProbeVolume::dark(FieldId(0), grid, Order::L4)]);
     let mut renderer = renderer(&lit_by([]), &settings());
     let error = renderer.set_light(&light).unwrap_err();
     assert!(error.to_string().contains("fewer or coarser"), "{error}");
-    renderer.set_light(&LightField::default()).unwrap();
+    renderer.set_light(&Light::default()).unwrap();
 }
 
 #[test]
@@ -129,11 +129,11 @@ fn parts_add_up() {
         size: Vec3::splat(2.0),
         resolution: UVec3::splat(2),
     };
-    let mut volume = ProbeVolume::dark(VolumeId(0), grid, Order::L2);
+    let mut volume = ProbeVolume::dark(FieldId(0), grid, Order::L2);
     (0..8).for_each(|probe| volume.probe_mut(probe)[0] = Vec3::new(1.0, 2.0, 3.0));
     let view = scene.cameras()[0].view();
     let mut renderer = renderer(&scene.snapshot(), &settings());
-    renderer.set_light(&LightField::new(vec![volume])).unwrap();
+    renderer.set_light(&Light::new(vec![volume])).unwrap();
     let mut of = |lighting| {
         renderer.pictures(&[view], &Settings { lighting, ..settings() }).unwrap().remove(0)
     };

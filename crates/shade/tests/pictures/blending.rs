@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::common::{SIZE, direct, renderer, traced};
 use glam::{UVec2, Vec3};
 use lumencast_gather::reference::Parts;
-use lumencast_scene::{AlphaMode, Light, LightKind, Material, Snapshot, View};
+use lumencast_scene::{AlphaMode, LightKind, Material, PunctualLight, Snapshot, View};
 use lumencast_shade::{Settings, Shadows, Transparency};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -64,7 +64,7 @@ fn scene(panes: [Pane; 2]) -> Arc<Snapshot> {
         stage.quad(Vec3::new(x0, y0, pane.z), u, v, material);
     }
     let kind = LightKind::Directional { angle: 0.0 };
-    let sun = Light { kind, color: Vec3::ONE, intensity: 8.0, range: None };
+    let sun = PunctualLight { kind, color: Vec3::ONE, intensity: 8.0, range: None };
     stage.light(sun, Vec3::ZERO, Vec3::new(1.0, -0.25, -0.3));
     stage.snapshot()
 }

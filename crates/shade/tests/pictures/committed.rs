@@ -7,9 +7,11 @@ use std::sync::Arc;
 use crate::common::renderer;
 use glam::{Quat, UVec2, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
+use lumencast_light::{FieldId, Grid, Light, Order, ProbeVolume};
 use lumencast_picture::{Loaded, PIXELS_PER_DEGREE, Pair, Picture, ToneMap, flip};
-use lumencast_scene::{Environment, Light, LightKind, Material, Scene, Snapshot, View, VolumeSpec};
+use lumencast_scene::{
+    Environment, LightKind, Material, PunctualLight, Scene, Snapshot, View, VolumeSpec,
+};
 use lumencast_server::{Effort, GatherOptions, bake};
 use lumencast_shade::{Materials, Settings, Shading, Shadows};
 use lumencast_testkit::scenes::{Stage, lambert};
@@ -21,7 +23,7 @@ const TOLERANCE: f64 = 0.005;
 #[derive(Clone)]
 struct Drawn {
     scene: Arc<Snapshot>,
-    light: LightField,
+    light: Light,
     view: View,
     exposure: f32,
 }
@@ -87,7 +89,7 @@ fn cornell() -> Drawn {
     let options = GatherOptions::default();
     let effort = Effort::of_samples(1024);
     let light = bake(&snapshot, &[volume], &mut tracer, effort, options, |_| ()).unwrap();
-    Drawn { scene: snapshot, light: LightField::new(light.volumes), view, exposure: 2.0 }
+    Drawn { scene: snapshot, light: Light::new(light.volumes), view, exposure: 2.0 }
 }
 
 /// Two rows of balls, metal and plastic, smooth to rough, and a glass one, under a sun, a lamp and a
@@ -110,7 +112,7 @@ fn materials(roughness: impl Fn(f32) -> f32) -> Drawn {
     let glass = Material { transmission: 0.9, roughness: 0.1, ..plain() };
     let glass = stage.material(glass);
     stage.sphere(Vec3::new(0.6, 0.35, 1.9), 0.35, 24, glass);
-    let light = |kind, intensity| Light { kind, color: Vec3::ONE, intensity, range: None };
+    let light = |kind, intensity| PunctualLight { kind, color: Vec3::ONE, intensity, range: None };
     let sun = light(LightKind::Directional { angle: 0.15 }, 2000.0);
     stage.light(sun, Vec3::ZERO, Vec3::new(0.5, -1.0, -0.4));
     let lamp = light(LightKind::Point { radius: 0.3 }, 3000.0);
@@ -127,14 +129,14 @@ fn plain() -> Material {
 }
 
 /// Light that is brighter from above and from the left, and to the right of the scene.
-fn slanting() -> LightField {
+fn slanting() -> Light {
     let grid = Grid {
         center: Vec3::Y,
         rotation: Quat::IDENTITY,
         size: Vec3::new(8.0, 2.0, 6.0),
         resolution: UVec3::new(5, 2, 4),
     };
-    let mut volume = ProbeVolume::dark(VolumeId(0), grid, Order::L2);
+    let mut volume = ProbeVolume::dark(FieldId(0), grid, Order::L2);
     for probe in 0..grid.probe_count() {
         let at = grid.position(grid.cell(probe));
         let bright = (0.15 * at.x).exp2();
@@ -144,7 +146,7 @@ fn slanting() -> LightField {
         sh[3] = bright * Vec3::new(-500.0, -200.0, 0.0);
         sh[6] = bright * Vec3::splat(150.0);
     }
-    LightField::new(vec![volume])
+    Light::new(vec![volume])
 }
 
 #[test]
@@ -166,7 +168,7 @@ fn upside_down(mut drawn: Drawn) -> Drawn {
 }
 
 fn without_field(drawn: Drawn) -> Drawn {
-    Drawn { light: LightField::default(), ..drawn }
+    Drawn { light: Light::default(), ..drawn }
 }
 
 /// Faults that one makes: each shows by more than twice the tolerance.

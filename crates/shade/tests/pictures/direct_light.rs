@@ -7,13 +7,14 @@ use crate::common::{SIZE, difference, direct as settings, drawn, renderer, trace
 use glam::{Affine3A, Vec3, Vec4};
 use lumencast_gather::reference::Parts;
 use lumencast_scene::{
-    AlphaMode, Environment, Light, LightKind, Material, MeshId, Projection, Scene, Snapshot, View,
+    AlphaMode, Environment, LightKind, Material, MeshId, Projection, PunctualLight, Scene,
+    Snapshot, View,
 };
 use lumencast_shade::{Materials, Settings, Shadows};
 use lumencast_testkit::scenes::{Stage, lambert};
 
-fn light(kind: LightKind, intensity: f32) -> Light {
-    Light { kind, color: Vec3::new(1.0, 0.9, 0.7), intensity, range: None }
+fn light(kind: LightKind, intensity: f32) -> PunctualLight {
+    PunctualLight { kind, color: Vec3::new(1.0, 0.9, 0.7), intensity, range: None }
 }
 
 const POINT: LightKind = LightKind::Point { radius: 0.0 };

@@ -7,7 +7,7 @@ use crate::common::{Difference, difference, direct, renderer, traced};
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::reference::Parts;
-use lumencast_light::{Grid, LightField, Order};
+use lumencast_light::{Grid, Light, Order};
 use lumencast_scene::{Environment, HdrImage, Projection, Snapshot, View, VolumeSpec};
 use lumencast_server::{Effort, GatherOptions, bake};
 use lumencast_shade::{Lighting, Settings};
@@ -121,7 +121,7 @@ fn light_is_turned_as_the_tracers() {
         let light = bake(&alone, &[volume], &mut tracer, effort, GatherOptions::default(), |_| ());
         let scene = scene(alone.environment.clone(), true);
         let mut renderer = renderer(&scene, &settings);
-        renderer.set_light(&LightField::new(light.unwrap().volumes)).unwrap();
+        renderer.set_light(&Light::new(light.unwrap().volumes)).unwrap();
         let picture = renderer.pictures(&[view], &settings).unwrap().remove(0);
         difference(name, &picture, &reference, 0.03)
     };

@@ -1,7 +1,7 @@
 //! Rooms far from the world's origin are drawn as near it.
 
 use glam::{DVec3, Quat, UVec3, Vec3};
-use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
+use lumencast_light::{FieldId, Grid, Light, Order, ProbeVolume};
 use lumencast_scene::View;
 use lumencast_shade::{Gpu, Lighting, Renderer, Settings};
 use lumencast_testkit::rooms::{Placed, Rooms};
@@ -9,18 +9,18 @@ use lumencast_testkit::rooms::{Placed, Rooms};
 use crate::common::direct;
 
 /// Light that differs from probe to probe, about the rooms.
-fn light(rooms: &Rooms) -> LightField {
+fn light(rooms: &Rooms) -> Light {
     let grid = Grid {
         center: rooms.world(Vec3::new(0.0, 1.5, 0.0)),
         rotation: Quat::IDENTITY,
         size: Vec3::new(8.0, 3.0, 4.0),
         resolution: UVec3::new(6, 3, 4),
     };
-    let mut volume = ProbeVolume::dark(VolumeId(0), grid, Order::L1);
+    let mut volume = ProbeVolume::dark(FieldId(0), grid, Order::L1);
     for probe in 0..grid.probe_count() {
         volume.probe_mut(probe)[0] = Vec3::splat(1.0 + (7 * probe % 11) as f32);
     }
-    LightField::new(vec![volume])
+    Light::new(vec![volume])
 }
 
 /// What is seen of a point of the rooms.

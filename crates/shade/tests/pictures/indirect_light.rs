@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use crate::common::{SIZE, drawn, renderer};
 use glam::{Affine2, DVec3, Quat, UVec2, UVec3, Vec2, Vec3};
-use lumencast_light::{Grid, LightField, Offset, Order, ProbeVolume, Sh, VolumeId, sh::basis};
+use lumencast_light::{FieldId, Grid, Light, Offset, Order, ProbeVolume, Sh, sh::basis};
 use lumencast_scene::{
-    Filter, Image, Light, LightKind, Material, Snapshot, TextureRef, View, Wrap,
+    Filter, Image, LightKind, Material, PunctualLight, Snapshot, TextureRef, View, Wrap,
 };
 use lumencast_shade::{Lighting, Materials, Renderer, Settings};
 use lumencast_testkit::scenes::{Stage, lambert};
@@ -33,7 +33,7 @@ fn volume(id: u32, center: Vec3, turn: f32, cells: UVec3, order: Order) -> Probe
         size: Vec3::new(5.0, 2.0, 4.0),
         resolution: cells,
     };
-    let mut volume = ProbeVolume::dark(VolumeId(id), grid, order);
+    let mut volume = ProbeVolume::dark(FieldId(id), grid, order);
     for probe in 0..grid.probe_count() {
         let at = grid.position(grid.cell(probe));
         for (i, c) in volume.probe_mut(probe).iter_mut().enumerate() {
@@ -48,7 +48,7 @@ fn volume(id: u32, center: Vec3, turn: f32, cells: UVec3, order: Order) -> Probe
 
 /// What every pixel of the floor should show, read from the field on the processor; the largest
 /// difference from what the adapter draws, relative to the largest light.
-fn worst(drawn_light: &LightField, light: &LightField) -> f32 {
+fn worst(drawn_light: &Light, light: &Light) -> f32 {
     let albedo = Vec3::new(0.9, 0.6, 0.3);
     let scene = floor(lambert(albedo, Vec3::ZERO));
     let view = View::look_at(Vec3::new(1.0, 2.5, 3.0), Vec3::ZERO, 0.9).unwrap();
@@ -79,8 +79,7 @@ fn worst(drawn_light: &LightField, light: &LightField) -> f32 {
 fn read_as_on_the_processor() {
     const ORDERS: [Order; 4] = [Order::L1, Order::L2, Order::L3, Order::L4];
     for order in ORDERS {
-        let light =
-            LightField::new(vec![volume(0, Vec3::Y * 0.5, 0.4, UVec3::new(5, 3, 4), order)]);
+        let light = Light::new(vec![volume(0, Vec3::Y * 0.5, 0.4, UVec3::new(5, 3, 4), order)]);
         for offset in [Offset::NONE, Offset::HALF_CELL, Offset::Metres(0.3)] {
             let light = light.clone().read_at(offset);
             let worst = worst(&light, &light);
@@ -93,7 +92,7 @@ fn read_as_on_the_processor() {
 
 #[test]
 fn volumes_of_many_kinds_meet() {
-    let light = LightField::new(vec![
+    let light = Light::new(vec![
         volume(0, Vec3::new(0.0, 0.5, 0.0), 0.0, UVec3::new(3, 2, 3), Order::L1),
         volume(1, Vec3::new(1.5, 0.2, 0.5), 0.7, UVec3::new(8, 4, 7), Order::L3),
         volume(2, Vec3::new(-2.0, 0.4, -1.0), -0.3, UVec3::new(9, 3, 9), Order::L2),
@@ -101,24 +100,24 @@ fn volumes_of_many_kinds_meet() {
     let all = worst(&light, &light);
     assert!(all < 5e-3, "{all}");
     // What was read is really that of these volumes.
-    let fewer = LightField::new(light.volumes()[..2].to_vec());
+    let fewer = Light::new(light.volumes().take(2).cloned());
     assert!(worst(&fewer, &light) > 0.05, "a volume that is missing is noticed");
     let mut other = light.clone();
-    other.volumes_mut()[1].coefficients.iter_mut().for_each(|c| *c *= 1.1);
+    other.volumes_mut().nth(1).unwrap().coefficients.iter_mut().for_each(|c| *c *= 1.1);
     assert!(worst(&other, &light) > 0.01, "a tenth more light is noticed");
 }
 
 /// A field of one probe, which is the same everywhere.
-fn uniform(sh: &Sh) -> LightField {
+fn uniform(sh: &Sh) -> Light {
     let grid = Grid {
         center: Vec3::ZERO,
         rotation: Quat::IDENTITY,
         size: Vec3::splat(10.0),
         resolution: UVec3::ONE,
     };
-    let mut volume = ProbeVolume::dark(VolumeId(0), grid, sh.order);
+    let mut volume = ProbeVolume::dark(FieldId(0), grid, sh.order);
     volume.probe_mut(0).copy_from_slice(sh.values());
-    LightField::new(vec![volume])
+    Light::new(vec![volume])
 }
 
 /// Steps of quadrature, by the angle to the normal and around it.
@@ -364,7 +363,7 @@ fn occlusion_takes_from_indirect_light_alone() {
         let material = stage.material(material.clone());
         stage.quad(Vec3::new(-3.0, 0.0, 3.0), Vec3::X * 6.0, Vec3::NEG_Z * 6.0, material);
         let kind = LightKind::Point { radius: 0.0 };
-        let lamp = Light { kind, color: Vec3::ONE, intensity: 30.0, range: None };
+        let lamp = PunctualLight { kind, color: Vec3::ONE, intensity: 30.0, range: None };
         stage.light(lamp, Vec3::Y * 3.0, Vec3::NEG_Y);
         renderer.set_scene(&stage.snapshot());
         let picture = renderer.pictures(&[view], settings).unwrap().remove(0);

@@ -10,8 +10,8 @@ use glam::{Affine2, Affine3A, Mat2, Quat, Vec2, Vec3, Vec4};
 use lumencast_gather::reference::Parts;
 use lumencast_picture::linear_from_srgb;
 use lumencast_scene::{
-    Filter, Image, Light, LightKind, Material, Primitive, Snapshot, TextureRef, Vertices, View,
-    Wrap,
+    Filter, Image, LightKind, Material, Primitive, PunctualLight, Snapshot, TextureRef, Vertices,
+    View, Wrap,
 };
 use lumencast_shade::{Gpu, Materials, Renderer, Settings, Shadows};
 use lumencast_testkit::scenes::{Stage, lambert};
@@ -71,7 +71,8 @@ impl Panel {
         stage.material(self.material.clone());
         stage.primitive(self.primitive(), self.world_from_object);
         let kind = LightKind::Point { radius: 0.0 };
-        let lamp = Light { kind, color: Vec3::new(1.0, 0.9, 0.8), intensity: 12.0, range: None };
+        let lamp =
+            PunctualLight { kind, color: Vec3::new(1.0, 0.9, 0.8), intensity: 12.0, range: None };
         stage.light(lamp, Vec3::new(-0.5, 0.7, 1.8), Vec3::Y);
         stage.light(lamp, Vec3::new(0.4, -0.3, -1.5), Vec3::Y);
         stage.snapshot()

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use crate::common::renderer;
 use glam::{Quat, UVec2, UVec3, Vec3};
-use lumencast_light::{Grid, LightField, Order, ProbeVolume, VolumeId};
+use lumencast_light::{FieldId, Grid, Light, Order, ProbeVolume};
 use lumencast_scene::{
-    AlphaMode, Light, LightKind, Material, MaterialId, Projection, Snapshot, View,
+    AlphaMode, LightKind, Material, MaterialId, Projection, PunctualLight, Snapshot, View,
 };
 use lumencast_shade::{Lighting, Occlusion, Renderer, Settings, Shading};
 use lumencast_testkit::scenes::{Stage, lambert};
@@ -31,16 +31,16 @@ fn dark() -> Material {
 }
 
 /// The same light from everywhere.
-fn uniform() -> LightField {
+fn uniform() -> Light {
     let grid = Grid {
         center: Vec3::ZERO,
         rotation: Quat::IDENTITY,
         size: Vec3::splat(10.0),
         resolution: UVec3::ONE,
     };
-    let mut volume = ProbeVolume::dark(VolumeId(0), grid, Order::L1);
+    let mut volume = ProbeVolume::dark(FieldId(0), grid, Order::L1);
     volume.probe_mut(0)[0] = Vec3::splat(100.0);
-    LightField::new(vec![volume])
+    Light::new(vec![volume])
 }
 
 fn lit(scene: &Arc<Snapshot>, settings: &Settings) -> Renderer {
@@ -341,7 +341,7 @@ fn furnished() -> (Arc<Snapshot>, View) {
     block(&mut stage, Vec3::new(0.0, 0.2, 0.0), Vec3::splat(0.4), glossy);
     block(&mut stage, Vec3::new(0.5, 0.1, 0.2), Vec3::splat(0.2), lamp);
     let kind = LightKind::Point { radius: 0.0 };
-    let light = Light { kind, color: Vec3::ONE, intensity: 30.0, range: None };
+    let light = PunctualLight { kind, color: Vec3::ONE, intensity: 30.0, range: None };
     stage.light(light, Vec3::new(1.0, 2.0, 1.0), Vec3::NEG_Y);
     let view = View::look_at(Vec3::new(0.9, 1.1, 1.4), Vec3::ZERO, 0.8).unwrap();
     (stage.snapshot(), view)

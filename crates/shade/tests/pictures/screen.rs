@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use crate::common::{SIZE, renderer};
 use glam::{UVec2, Vec3};
-use lumencast_light::LightField;
+use lumencast_light::Light;
 use lumencast_picture::{Picture, ToneMap, luminance};
 use lumencast_scene::{
-    Deformation, Environment, Light, LightKind, MorphTarget, Scene, Snapshot, View,
+    Deformation, Environment, LightKind, MorphTarget, PunctualLight, Scene, Snapshot, View,
 };
 use lumencast_shade::{
     Gpu, Measured, Occlusion, Renderer, Screen, Settings, ShadeError, Show, wgpu,
@@ -105,7 +105,7 @@ fn codes_and_exposure_are_the_processors() {
     let view = scene.views()[0].view;
     let settings = Settings { size: SIZE, samples: 1, ..Settings::default() };
     let mut renderer = renderer(&scene.snapshot(), &settings);
-    renderer.set_light(&LightField::default()).unwrap();
+    renderer.set_light(&Light::default()).unwrap();
     let picture = renderer.pictures(&[view], &settings).unwrap().remove(0);
     let picture = Picture::new(SIZE.x, SIZE.y, picture).unwrap();
     let best = suited(&picture);
@@ -137,7 +137,7 @@ fn morphing() -> Arc<Snapshot> {
     let white = stage.material(lambert(Vec3::ONE, Vec3::ZERO));
     stage.quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0, white);
     let kind = LightKind::Point { radius: 0.0 };
-    let light = Light { kind, color: Vec3::ONE, intensity: 30.0, range: None };
+    let light = PunctualLight { kind, color: Vec3::ONE, intensity: 30.0, range: None };
     stage.light(light, Vec3::Y, Vec3::NEG_Y);
     let mut snapshot = (*stage.snapshot()).clone();
     let instance = &mut snapshot.instances[0];

@@ -9,8 +9,8 @@ use glam::{Affine2, UVec2, Vec3};
 use lumencast_gather::reference::Parts;
 use lumencast_picture::{Picture, ToneMap};
 use lumencast_scene::{
-    AlphaMode, Filter, Image, Light, LightKind, Material, MaterialId, Snapshot, TextureRef, View,
-    Wrap,
+    AlphaMode, Filter, Image, LightKind, Material, MaterialId, PunctualLight, Snapshot, TextureRef,
+    View, Wrap,
 };
 use lumencast_shade::{Settings, Shadows};
 use lumencast_testkit::scenes::{Stage, lambert};
@@ -104,8 +104,8 @@ fn count(name: &str, scene: &Arc<Snapshot>, view: View, settings: &Settings) -> 
     counted
 }
 
-fn light(kind: LightKind, intensity: f32) -> Light {
-    Light { kind, color: Vec3::ONE, intensity, range: None }
+fn light(kind: LightKind, intensity: f32) -> PunctualLight {
+    PunctualLight { kind, color: Vec3::ONE, intensity, range: None }
 }
 
 /// A box whose fronts face outwards, standing at `foot`.

@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumencast_scene::{Light, LightKind, NodeId, PlacedLight, View};
+use lumencast_scene::{LightKind, NodeId, PlacedLight, PunctualLight, View};
 use lumencast_shade::{Settings, Shadows};
 use lumencast_testkit::mapped::MappedFloor;
 
@@ -18,7 +18,7 @@ const SUN: f32 = 10.0;
 fn normal_maps_turn_with_their_coordinates() {
     let towards = Vec3::new(0.4, 1.0, 0.3).normalize();
     let kind = LightKind::Directional { angle: 0.0 };
-    let light = Light { kind, color: Vec3::ONE, intensity: SUN, range: None };
+    let light = PunctualLight { kind, color: Vec3::ONE, intensity: SUN, range: None };
     let (node, position) = (NodeId(7), Vec3::ZERO);
     let sun = PlacedLight { node, light, position, direction: -towards };
     let lit = |floor: &MappedFloor| {

@@ -1,6 +1,6 @@
 //! Blockwise multi-order feature regression (Koskela, Immonen, Mäkitalo, Foi, Viitanen, Jääskeläinen,
 //! Kultala and Takala 2019, ACM Transactions on Graphics 38, 5): a denoiser for real-time path tracing
-//! of one sample a pixel, to compare light fields with.
+//! of one sample a pixel, to compare fields with.
 //!
 //! Light is divided by the base colour of the surface that is seen first, averaged over frames, in
 //! every block of pixels replaced by what features of the surfaces explain of it, averaged again,

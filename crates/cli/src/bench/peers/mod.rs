@@ -11,7 +11,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
-use lumencast_light::LightField;
+use lumencast_light::Light;
 use lumencast_picture::{Picture, ToneMap};
 use lumencast_scene::{Scene, Snapshot, VolumeSpec};
 use lumencast_server::Effort;
@@ -159,19 +159,14 @@ impl BenchPeers {
         })
     }
 
-    fn light(
-        &self,
-        snapshot: &Arc<Snapshot>,
-        grid: VolumeSpec,
-        reading: Reading,
-    ) -> Result<LightField> {
+    fn light(&self, snapshot: &Arc<Snapshot>, grid: VolumeSpec, reading: Reading) -> Result<Light> {
         let materials = MaterialModel::Lambert;
         let tracing = Options { materials, threads: None, levels: Levels::One };
         let effort = Effort::of_samples(self.probe_samples);
         let (bounces, clamp) = (self.bounces, f32::INFINITY);
         let computed = Computed { effort, bounces, clamp, reading, tracing };
         let mut tracer = computed.tracer()?;
-        Ok(LightField::new(computed.volumes(snapshot, &[grid], &mut tracer)?.volumes))
+        Ok(Light::new(computed.volumes(snapshot, &[grid], &mut tracer)?.volumes))
     }
 
     fn write(&self, subject: &Subject, name: &str, picture: &Picture) -> Result<()> {

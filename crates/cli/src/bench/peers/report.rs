@@ -25,7 +25,7 @@ pub(super) struct Table {
     pub(super) fields: Vec<Field>,
 }
 
-/// Of a light field.
+/// Of light.
 #[derive(Serialize)]
 pub(super) struct Field {
     pub(super) grid: String,

@@ -1,4 +1,4 @@
-//! What light fields are compared with: one path a pixel and frame, as it is and denoised.
+//! What fields are compared with: one path a pixel and frame, as it is and denoised.
 
 use std::time::Instant;
 

@@ -1,9 +1,9 @@
-//! Light fields, and pictures drawn under them.
+//! Fields of light, and pictures drawn under them.
 
 use std::time::Instant;
 
 use anyhow::Result;
-use lumencast_light::LightField;
+use lumencast_light::Light;
 use lumencast_scene::{View, VolumeSpec};
 use lumencast_server::Effort;
 use lumencast_shade::{Lighting, Renderer, Settings};
@@ -21,7 +21,7 @@ pub(super) const UPDATE: u32 = 512;
 /// A field as it is measured.
 pub(super) struct Field {
     name: String,
-    light: LightField,
+    light: Light,
     probes: usize,
     /// Of so many samples a probe as an update has.
     update_seconds: f64,
@@ -43,7 +43,7 @@ impl BenchQuality {
         let mut tracer = computed.tracer()?;
         let start = Instant::now();
         let baked = computed.volumes(&subject.snapshot, &[spec], &mut tracer)?;
-        let light = LightField::new(baked.volumes);
+        let light = Light::new(baked.volumes);
         let seconds = start.elapsed().as_secs_f64();
         Ok(Field {
             name: format!("{} L{} {bounces} bounces{how}", cells(&spec), u8::from(spec.order)),

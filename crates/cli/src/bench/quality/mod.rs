@@ -31,7 +31,7 @@ use report::{AtResolution, Report, Table};
 /// Texels along the side of a shadow map.
 const SHADOW_RESOLUTION: u32 = 4096;
 
-/// Measures how near pictures drawn under light fields come to path-traced ones.
+/// Measures how near pictures drawn under fields come to path-traced ones.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

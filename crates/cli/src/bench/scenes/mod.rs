@@ -13,7 +13,7 @@ use clap::Args;
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
 use lumencast_gather::reference::{self, Film, Parts, PictureSettings};
-use lumencast_light::{LightField, ProbeVolume};
+use lumencast_light::{Light, ProbeVolume};
 use lumencast_picture::{Picture, ToneMap, exposure};
 use lumencast_scene::{Edit, Environment, Scene, Snapshot, View};
 use lumencast_server::Effort;
@@ -251,7 +251,7 @@ fn draw_light(
     view: View,
     settings: &Settings,
 ) -> Result<Picture> {
-    renderer.set_light(&LightField::new(volumes))?;
+    renderer.set_light(&Light::new(volumes))?;
     draw(renderer, view, settings, Lighting::INDIRECT)
 }
 

@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use glam::{Affine3A, Quat, Vec3};
-use lumencast_scene::{Light, LightKind, Material};
+use lumencast_scene::{LightKind, Material, PunctualLight};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 use super::{BLACK, check, down, look};
@@ -51,8 +51,8 @@ fn white_under(lamp: Vec3, point: Vec3) -> f32 {
     INTENSITY / PI * to.normalize().y / to.length_squared()
 }
 
-fn lamp(kind: LightKind) -> Light {
-    Light { kind, color: Vec3::ONE, intensity: INTENSITY, range: None }
+fn lamp(kind: LightKind) -> PunctualLight {
+    PunctualLight { kind, color: Vec3::ONE, intensity: INTENSITY, range: None }
 }
 
 /// The floor within 3 m of what is below a place.

@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
-use lumencast_scene::{Light, LightKind, Material};
+use lumencast_scene::{LightKind, Material, PunctualLight};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 use super::{BLACK, check, down, floor, look, look_down};
@@ -12,12 +12,12 @@ use crate::sampling::{Sampler, disc};
 
 const WHITE: Vec3 = Vec3::ONE;
 
-fn bulb(intensity: f32, radius: f32) -> Light {
-    Light { kind: LightKind::Point { radius }, color: WHITE, intensity, range: None }
+fn bulb(intensity: f32, radius: f32) -> PunctualLight {
+    PunctualLight { kind: LightKind::Point { radius }, color: WHITE, intensity, range: None }
 }
 
-fn sun(illuminance: f32, angle: f32) -> Light {
-    Light {
+fn sun(illuminance: f32, angle: f32) -> PunctualLight {
+    PunctualLight {
         kind: LightKind::Directional { angle },
         color: WHITE,
         intensity: illuminance,
@@ -117,7 +117,7 @@ fn a_small_sphere_is_a_point() {
     let place = Vec3::new(1.5, 2.0, -0.5);
     let glossy = Material { metallic: 1.0, roughness: 0.3, ..Material::default() };
     for material in [lambert(WHITE, BLACK), glossy] {
-        let lit_by = |light: Light| {
+        let lit_by = |light: PunctualLight| {
             let mut stage = Stage::default();
             floor(&mut stage, material.clone());
             stage.light(light, place, -place);

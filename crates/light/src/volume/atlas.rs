@@ -11,7 +11,8 @@ use glam::{UVec3, Vec3};
 use half::f16;
 use half::slice::{HalfBitsSliceExt, HalfFloatSliceExt};
 
-use crate::{Order, ProbeVolume};
+use super::ProbeVolume;
+use crate::Order;
 
 /// A volume's texture.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -99,7 +100,7 @@ fn finite(value: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Grid, VolumeId};
+    use crate::{FieldId, Grid};
     use glam::Quat;
 
     fn volume(order: Order) -> ProbeVolume {
@@ -109,7 +110,7 @@ mod tests {
             size: Vec3::ONE,
             resolution: UVec3::new(2, 3, 4),
         };
-        let mut volume = ProbeVolume::dark(VolumeId(0), grid, order);
+        let mut volume = ProbeVolume::dark(FieldId(0), grid, order);
         for (i, c) in volume.coefficients.iter_mut().enumerate() {
             *c = Vec3::new(i as f32, -0.5 * i as f32, 0.25);
         }

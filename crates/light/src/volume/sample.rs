@@ -2,91 +2,8 @@
 
 use glam::{UVec3, Vec3};
 
-use serde::{Deserialize, Serialize};
-
-use crate::{Grid, ProbeVolume, sh::Sh};
-
-/// How far along its normal a surface's point is moved before light is read, so that probes behind
-/// the surface count less. In JSON `{"cells": 0.5}` or `{"metres": 0.1}`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Offset {
-    /// Parts of the distance between probes, along each of the box's axes.
-    Cells(f32),
-    /// Metres.
-    Metres(f32),
-}
-
-impl Offset {
-    /// Not at all.
-    pub const NONE: Self = Self::Cells(0.0);
-    /// Half a cell: three.js's rule.
-    pub const HALF_CELL: Self = Self::Cells(0.5);
-
-    /// Along each of the box's axes, in cells, for a normal along that axis.
-    #[must_use]
-    pub fn in_cells(self, grid: &Grid) -> Vec3 {
-        match self {
-            Self::Cells(cells) => Vec3::splat(cells),
-            Self::Metres(metres) => metres / grid.spacing(),
-        }
-    }
-}
-
-impl Default for Offset {
-    fn default() -> Self {
-        Self::HALF_CELL
-    }
-}
-
-impl Grid {
-    /// Size of a cell along the box's axes, metres.
-    pub fn spacing(&self) -> Vec3 {
-        self.size / self.resolution.as_vec3()
-    }
-
-    /// A world position in cells: the first probe lies at 0, the next along x at (1, 0, 0).
-    pub fn cell_from_world(&self, position: Vec3) -> Vec3 {
-        let local = self.rotation.inverse() * (position - self.center);
-        (local / self.size + 0.5) * self.resolution.as_vec3() - 0.5
-    }
-
-    /// The inverse of [`Self::cell_from_world`].
-    pub fn world_from_cell(&self, cell: Vec3) -> Vec3 {
-        let unit = (cell + 0.5) / self.resolution.as_vec3() - 0.5;
-        self.center + self.rotation * (unit * self.size)
-    }
-
-    /// Distance of a world position from the box, metres; 0 inside.
-    pub fn distance(&self, position: Vec3) -> f32 {
-        self.beyond(self.cell_from_world(position))
-    }
-
-    /// Distance of a place in cells from the box, metres; 0 inside.
-    pub fn beyond(&self, cell: Vec3) -> f32 {
-        (self.outside(cell) * self.spacing()).length()
-    }
-
-    /// How much a place in cells belongs to the box: 1 inside the outermost probes' centres, falling
-    /// smoothly (3t² − 2t³) to 0 at the border, half a cell farther out.
-    pub fn weight(&self, cell: Vec3) -> f32 {
-        let to_border = (cell + 0.5).min(self.resolution.as_vec3() - 0.5 - cell);
-        // An axis of one cell reaches from border to border: half of it is half a cell.
-        let t = (2.0 * to_border).clamp(Vec3::ZERO, Vec3::ONE);
-        (t * t * (3.0 - 2.0 * t)).element_product()
-    }
-
-    /// How much of what no box claims belongs to this one: 1 inside and on the border, falling
-    /// linearly to 0 half a cell outside.
-    pub fn reach(&self, cell: Vec3) -> f32 {
-        (1.0 - 2.0 * self.outside(cell)).max(Vec3::ZERO).element_product()
-    }
-
-    /// By how many cells a place lies outside the box, along each axis.
-    fn outside(&self, cell: Vec3) -> Vec3 {
-        (-0.5 - cell).max(cell + 0.5 - self.resolution.as_vec3()).max(Vec3::ZERO)
-    }
-}
+use super::ProbeVolume;
+use crate::sh::Sh;
 
 /// The probes that light at a point is read from: trilinear between the eight about it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,7 +18,7 @@ impl ProbeVolume {
     /// Where a point of a surface counts as lying when volumes share it, in cells: moved along its
     /// world `normal` (zero in free space) as far as light is read, and half a cell at least. So the two
     /// sides of a wall in which volumes meet belong to the volumes that they face.
-    pub fn place(&self, position: Vec3, normal: Vec3) -> Vec3 {
+    pub fn counted_at(&self, position: Vec3, normal: Vec3) -> Vec3 {
         self.moved(position, normal, self.offset.in_cells(&self.grid).max(Vec3::splat(0.5)))
     }
 
@@ -149,7 +66,7 @@ impl ProbeVolume {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Order, VolumeId};
+    use crate::{FieldId, Grid, Offset, Order};
     use glam::Quat;
 
     /// A volume whose c0 is an affine function of world position, which trilinear sampling keeps.
@@ -160,7 +77,7 @@ mod tests {
             size: Vec3::new(4.0, 2.0, 6.0),
             resolution: UVec3::new(4, 3, 5),
         };
-        let mut volume = ProbeVolume::dark(VolumeId(0), grid, Order::L1);
+        let mut volume = ProbeVolume::dark(FieldId(0), grid, Order::L1);
         for i in 0..grid.probe_count() {
             volume.probe_mut(i)[0] = value(grid.position(grid.cell(i)));
         }
@@ -221,7 +138,7 @@ mod tests {
             size: Vec3::ONE,
             resolution: UVec3::ONE,
         };
-        let mut volume = ProbeVolume::dark(VolumeId(0), grid, Order::L1);
+        let mut volume = ProbeVolume::dark(FieldId(0), grid, Order::L1);
         volume.probe_mut(0)[0] = Vec3::ONE;
         for position in [Vec3::ZERO, Vec3::splat(7.0), Vec3::splat(-0.2)] {
             assert_eq!(volume.sample(position, Vec3::Y).coefficients[0], Vec3::ONE);

@@ -7,7 +7,7 @@ use crate::accel::Ray;
 
 /// Where on a surface a ray has arrived.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct HitPoint {
     /// World.
     pub(crate) position: Vec3,
     /// Unit normal of the triangle on the side that the ray came from; zero for triangles so thin that
@@ -19,7 +19,7 @@ pub(crate) struct Place {
     side: f32,
 }
 
-impl Place {
+impl HitPoint {
     pub(crate) const NUMBERS: usize = 8;
 
     /// The place on a triangle with these corners (object space) and weights; `direction` is the unit
