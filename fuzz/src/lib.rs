@@ -8,7 +8,9 @@ pub mod seeds;
 
 use glam::UVec3;
 use lumencast_cache::Cache;
-use lumencast_codec::{Catalog, ClientEdit, LightFile, ProbeDecoder, ProbeHeader, StateFrame};
+use lumencast_codec::{
+    Catalog, ClientEdit, LightFile, LightTrack, ProbeDecoder, ProbeHeader, StateFrame,
+};
 use lumencast_light::Order;
 use lumencast_scene::{Edit, Scene, Script};
 use lumencast_server::{Inbox, Limits, Verdict};
@@ -36,7 +38,7 @@ pub fn frames(data: &[u8]) {
         // Rotations are made of length 1, which may turn their last bits.
         let again = Catalog::decode(&catalog.encode()).expect("what was encoded");
         assert_eq!(again.fields.len(), catalog.fields.len());
-        Cache::new().catalog(data, 0.0).expect("what decodes is taken in");
+        Cache::new().add_catalog(data, 0.0).expect("what decodes is taken in");
     }
     if let Ok(frame) = StateFrame::decode(data) {
         assert_eq!(StateFrame::decode(&frame.encode()).as_ref(), Ok(&frame));
@@ -56,9 +58,12 @@ pub fn reader(mut data: &[u8]) {
         data = after;
         now += 0.04;
         match track {
-            b'c' => drop(cache.catalog(frame, now)),
-            b's' => drop(cache.state(frame, now)),
-            layer => drop(cache.probes(0, 0, layer % 4, frame, now)),
+            b'c' => drop(cache.add_catalog(frame, now)),
+            b's' => drop(cache.add_state(frame, now)),
+            layer => {
+                let track = LightTrack { field: 0, region: 0, layer: layer % 4 };
+                drop(cache.add_light(track, frame, now));
+            }
         }
         let light = cache.light(now);
         assert!(light.irradiance(glam::Vec3::ZERO, glam::Vec3::Y).is_finite());
@@ -77,7 +82,7 @@ pub fn packed(track: u8, frame: &[u8]) -> Vec<u8> {
 pub fn light_file(data: &[u8]) {
     if let Ok(file) = LightFile::read(data) {
         LightFile::read(&file.write()).expect("what was written");
-        drop(file.volumes());
+        drop(file.fields());
         drop(Cache::new().load(data, 0.0));
     }
 }

@@ -74,7 +74,7 @@ fn dark(size: UVec3, order: Order) -> LightFile {
     };
     let volume = ProbeVolume::dark(FieldId(0), grid, order);
     let scene = SceneInfo { name: "fuzz".into(), root: "fuzz.glb".into() };
-    LightFile::of_volumes(Epoch(1), scene, 0.04, "seed", [&volume], UpdateInfo::default())
+    LightFile::of_fields(Epoch(1), scene, 0.04, "seed", [&volume.into()], UpdateInfo::default())
 }
 
 /// All that a client reads of a server: catalog, state and light.

@@ -3,14 +3,16 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Deref;
 
-use lumencast_codec::{Catalog, ClientEdit, Epoch, Field, LightFile, ProbeHeader, StateFrame};
-use lumencast_light::{Light, Place, ProbeVolume};
+use lumencast_codec::{Catalog, ClientEdit, Epoch, FieldInfo, LightFile, LightTrack, StateFrame};
+use lumencast_light::Light;
 use lumencast_scene::Edit;
 
 use crate::CacheError;
 use crate::clock::ServerClock;
 use crate::edits::{Edits, SceneEvent};
-use crate::region::{Newest, RegionCache};
+use crate::field::FieldCache;
+use crate::newest::Newest;
+use crate::received::Received;
 
 /// Seconds that the scene's time may run on past the newest state frame.
 const LONGEST_RUN: f64 = 1.0;
@@ -29,21 +31,11 @@ pub struct Cache {
     catalog: Option<Catalog>,
     /// Whether the catalog is that of a file.
     saved: bool,
-    fields: BTreeMap<u32, BTreeMap<u32, RegionCache>>,
+    fields: BTreeMap<u32, FieldCache>,
     light: Light,
     clock: ServerClock,
     state: Option<StateFrame>,
     edits: Edits,
-}
-
-/// What became of a probe frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Received {
-    /// Its head.
-    pub header: ProbeHeader,
-    /// Whether it was newer than what its region had. Older ones are not shown, but later deltas
-    /// may build on them.
-    pub news: bool,
 }
 
 /// Light at a moment.
@@ -92,12 +84,15 @@ impl Cache {
     ///
     /// # Errors
     /// [`CacheError::Decode`].
-    pub fn catalog(&mut self, bytes: &[u8], _now: f64) -> Result<(), CacheError> {
-        self.set_catalog(Catalog::decode(bytes)?, false);
+    pub fn add_catalog(&mut self, bytes: &[u8], now: f64) -> Result<(), CacheError> {
+        let catalog = Catalog::decode(bytes)?;
+        // What it leaves of the light is what is to be seen now.
+        self.show(now);
+        self.set_catalog(catalog, false);
         Ok(())
     }
 
-    /// Starts from a saved field, before a server has been heard of.
+    /// Starts from saved light, before a server has been heard of.
     ///
     /// # Errors
     /// [`CacheError::Decode`]; [`CacheError::Connected`] once a server's catalog has come.
@@ -109,7 +104,8 @@ impl Cache {
         let mut loaded = Self::default();
         loaded.set_catalog(file.catalog, true);
         for frame in &file.frames {
-            match loaded.probes(frame.field, frame.region, 0, &frame.bytes, now) {
+            let track = LightTrack { field: frame.field, region: frame.region, layer: 0 };
+            match loaded.add_light(track, &frame.bytes, now) {
                 Ok(_) | Err(CacheError::UnknownField(_) | CacheError::UnknownRegion { .. }) => {}
                 Err(error) => return Err(error),
             }
@@ -128,24 +124,24 @@ impl Cache {
                 self.edits.restart();
             }
         }
-        let mut fields = BTreeMap::new();
-        let mut volumes = Vec::with_capacity(catalog.fields.len());
-        for field in &catalog.fields {
+        let mut caches = BTreeMap::new();
+        let mut shown = Vec::with_capacity(catalog.fields.len());
+        for info in &catalog.fields {
             let same = before.as_ref().and_then(|before| {
-                let old = before.field(field.id).filter(|old| old.has_shape_of(field))?;
+                let old = before.field(info.id).filter(|old| old.shape == info.shape)?;
                 Some(before.epoch_of(old))
             });
-            let known = self.light.volumes().find(|volume| volume.id.0 == field.id);
-            volumes.push(match known {
-                Some(volume) if same.is_some() => volume.clone(),
-                _ => lit_by(&self.light, field),
+            let known = self.light.fields().iter().find(|field| field.id().0 == info.id);
+            shown.push(match known {
+                Some(field) if same.is_some() => field.clone(),
+                _ => FieldCache::lit_by(&self.light, info),
             });
-            let goes_on = same == Some(catalog.epoch_of(field)) && !self.saved;
-            let regions = self.fields.remove(&field.id).filter(|_| goes_on);
-            fields.insert(field.id, regions.unwrap_or_default());
+            let goes_on = same == Some(catalog.epoch_of(info)) && !self.saved;
+            let cache = self.fields.remove(&info.id).filter(|_| goes_on);
+            caches.insert(info.id, cache.unwrap_or_else(|| FieldCache::new(info)));
         }
-        self.fields = fields;
-        self.light = Light::new(volumes);
+        self.fields = caches;
+        self.light = Light::new(shown);
         self.catalog = Some(catalog);
         self.saved = saved;
     }
@@ -155,7 +151,7 @@ impl Cache {
     ///
     /// # Errors
     /// [`CacheError::Decode`], [`CacheError::NoCatalog`].
-    pub fn state(&mut self, bytes: &[u8], now: f64) -> Result<bool, CacheError> {
+    pub fn add_state(&mut self, bytes: &[u8], now: f64) -> Result<bool, CacheError> {
         if self.catalog.is_none() || self.saved {
             return Err(CacheError::NoCatalog);
         }
@@ -169,52 +165,35 @@ impl Cache {
         Ok(news)
     }
 
-    /// Takes in a frame of the track of a layer of a region.
+    /// Takes in a frame of a track of light.
     ///
     /// # Errors
     /// Any [`CacheError`] but [`CacheError::Connected`]. A missing base
     /// ([`lumencast_codec::DecodeError::MissingBase`]) is no reason to worry: a later frame helps.
-    pub fn probes(
+    pub fn add_light(
         &mut self,
-        field: u32,
-        region: u32,
-        layer: u8,
+        track: LightTrack,
         bytes: &[u8],
         now: f64,
     ) -> Result<Received, CacheError> {
         let catalog = self.catalog.as_ref().ok_or(CacheError::NoCatalog)?;
-        let known = catalog.field(field).ok_or(CacheError::UnknownField(field))?;
-        let cells = known.region(region).ok_or(CacheError::UnknownRegion { field, region })?;
-        let header = ProbeHeader::read(bytes)?;
-        if header.info.layer() != layer {
-            return Err(CacheError::WrongLayer { update: header.info.update, layer });
-        }
-        let volume = self.light.volumes_mut().find(|volume| volume.id.0 == field);
-        let volume = volume.ok_or(CacheError::UnknownField(field))?;
-        let regions = self.fields.entry(field).or_default();
-        let news = regions
-            .entry(region)
-            .or_insert_with(|| RegionCache::new(cells, known.order))
-            .add(bytes, now, catalog.tick_seconds, volume)?;
-        Ok(Received { header, news })
+        let unknown = CacheError::UnknownField(track.field);
+        let cache = self.fields.get_mut(&track.field).ok_or(unknown.clone())?;
+        let shown = self.light.fields_mut().iter_mut().find(|field| field.id().0 == track.field);
+        cache.add(track, bytes, now, catalog.tick_seconds, shown.ok_or(unknown)?)
     }
 
     /// The light to be seen at `now`: every region on the way from its last update to its newest,
     /// which it reaches one measured interval after that one came. An update that is overdue leaves
     /// the newest standing.
     pub fn light(&mut self, now: f64) -> CurrentLight<'_> {
-        for volume in self.light.volumes_mut() {
-            for region in self.fields.get_mut(&volume.id.0).into_iter().flat_map(|r| r.values_mut())
-            {
-                region.show(now, volume);
-            }
-        }
+        self.show(now);
         let ages = || self.newest().filter_map(|(field, newest)| self.age(field, newest, now));
         // Ticks of another server count something else.
         let newest = self
             .newest()
             .filter(|(field, _)| self.is_own(field))
-            .map(|(_, newest)| newest.header.info)
+            .map(|(_, newest)| newest.info)
             .max_by_key(|info| info.tick);
         CurrentLight {
             light: &self.light,
@@ -225,27 +204,36 @@ impl Cache {
         }
     }
 
+    /// Brings the light to what is to be seen at `now`.
+    fn show(&mut self, now: f64) {
+        for field in self.light.fields_mut() {
+            if let Some(cache) = self.fields.get_mut(&field.id().0) {
+                cache.show(now, field);
+            }
+        }
+    }
+
     /// The newest light of every region that has any.
-    fn newest(&self) -> impl Iterator<Item = (&Field, &Newest)> {
+    fn newest(&self) -> impl Iterator<Item = (&FieldInfo, &Newest)> {
         let fields = self.catalog.iter().flat_map(|catalog| &catalog.fields);
         fields.flat_map(|field| {
-            let regions = self.fields.get(&field.id).into_iter().flat_map(|r| r.values());
-            regions.filter_map(move |region| Some((field, region.newest()?)))
+            let cache = self.fields.get(&field.id).into_iter();
+            cache.flat_map(FieldCache::newest).map(move |newest| (field, newest))
         })
     }
 
     /// Whether a field comes from the server whose clock and ticks the state track tells.
-    fn is_own(&self, field: &Field) -> bool {
+    fn is_own(&self, field: &FieldInfo) -> bool {
         self.catalog.as_ref().is_some_and(|catalog| catalog.epoch_of(field) == catalog.epoch)
     }
 
     /// Seconds since light was computed; since it came, where its server's clock is not known.
-    fn age(&self, field: &Field, light: &Newest, now: f64) -> Option<f64> {
+    fn age(&self, field: &FieldInfo, light: &Newest, now: f64) -> Option<f64> {
         if self.saved {
             return None;
         }
         let tick_seconds = self.catalog.as_ref()?.tick_seconds;
-        let computed = self.clock.of_tick(light.header.info.tick, tick_seconds);
+        let computed = self.clock.of_tick(light.info.tick, tick_seconds);
         let age = match (self.clock.at(now), computed) {
             (Some(time), Some(computed)) if self.is_own(field) => time - computed,
             _ => now - light.arrived,
@@ -258,13 +246,12 @@ impl Cache {
     /// do.
     pub fn has_reached(&self, tick: u64) -> bool {
         let Some(catalog) = self.catalog.as_ref().filter(|_| !self.saved) else { return false };
-        let newest = |field: &Field, region: u32| {
-            let newest = self.fields.get(&field.id)?.get(&region)?.newest()?;
-            Some(newest.header.info.tick)
+        let newest = |field: &FieldInfo, region: u32| {
+            Some(self.fields.get(&field.id)?.newest_of(region)?.info.tick)
         };
-        let is_lit = |field: &Field| {
+        let is_lit = |field: &FieldInfo| {
             let least = if self.is_own(field) { tick } else { 0 };
-            field.regions.iter().all(|region| newest(field, region.id) >= Some(least))
+            field.shape.regions().all(|region| newest(field, region) >= Some(least))
         };
         let state = self.state.as_ref().is_some_and(|state| state.tick >= tick);
         state && self.server_edits().is_some() && catalog.fields.iter().all(is_lit)
@@ -322,17 +309,4 @@ impl Cache {
         let passed = self.clock.at(now)? - state.clock;
         Some(state.time + passed.clamp(0.0, LONGEST_RUN))
     }
-}
-
-/// A field's volume with the light that was known there before.
-fn lit_by(light: &Light, field: &Field) -> ProbeVolume {
-    let mut volume = field.dark();
-    for probe in 0..volume.grid.probe_count() {
-        let position = volume.grid.position(volume.grid.cell(probe));
-        if let Some(before) = light.sample(&Place::in_space(position)) {
-            let n = field.order.coefficients();
-            volume.probe_mut(probe).copy_from_slice(&before.coefficients[..n]);
-        }
-    }
-    volume
 }

@@ -5,9 +5,9 @@
 //! use lumencast_cache::Cache;
 //! # use lumencast_codec::{Catalog, Epoch, SceneInfo};
 //! # let scene = SceneInfo { name: "room".into(), root: "room.glb".into() };
-//! # let catalog = Catalog { epoch: Epoch(1), scene, tick_seconds: 0.04, fields: vec![] }.encode();
+//! # let catalog = Catalog { epoch: Epoch(1), scene, tick_seconds: 0.04, fields: vec![], unknown: vec![] }.encode();
 //! let mut cache = Cache::of_client("me");
-//! cache.catalog(&catalog, 0.0)?; // bytes of the tracks, as they come, with the time
+//! cache.add_catalog(&catalog, 0.0)?; // bytes of the tracks, as they come, with the time
 //! let light = cache.light(0.02); // at any time
 //! assert_eq!(light.age, None); // nothing has come yet
 //! # Ok::<(), lumencast_cache::CacheError>(())
@@ -19,8 +19,13 @@ mod cache;
 mod clock;
 mod edits;
 mod error;
+mod field;
+mod newest;
+mod received;
 mod region;
+mod volume;
 
-pub use cache::{Cache, CurrentLight, Received};
+pub use cache::{Cache, CurrentLight};
 pub use edits::SceneEvent;
 pub use error::CacheError;
+pub use received::Received;

@@ -1,8 +1,10 @@
 //! One region: its decoder, and the passage from its last light to its newest.
 
 use glam::Vec3;
-use lumencast_codec::{DecodeError, ProbeDecoder, ProbeHeader, Region};
+use lumencast_codec::{DecodeError, ProbeDecoder, Region};
 use lumencast_light::{Order, ProbeVolume};
+
+use crate::newest::Newest;
 
 /// The passage from one update to the next takes at most so long, seconds, however rare they are.
 const LONGEST_PASSAGE: f64 = 0.5;
@@ -20,14 +22,6 @@ pub(crate) struct RegionCache {
     passage: f64,
     /// Whether the volume holds `to` already.
     settled: bool,
-}
-
-/// The newest update of a region.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Newest {
-    pub(crate) header: ProbeHeader,
-    /// When it came.
-    pub(crate) arrived: f64,
 }
 
 impl RegionCache {
@@ -59,7 +53,7 @@ impl RegionCache {
         volume: &mut ProbeVolume,
     ) -> Result<bool, DecodeError> {
         let light = self.decoder.decode(frame)?;
-        if self.newest.is_some_and(|n| n.header.info.update >= light.header.info.update) {
+        if self.newest.is_some_and(|n| n.info.update >= light.header.info.update) {
             return Ok(false);
         }
         if let Some(newest) = self.newest {
@@ -69,11 +63,11 @@ impl RegionCache {
                 self.from.extend_from_slice(volume.probe(probe));
             }
             let waited = now - newest.arrived;
-            let ticks = light.header.info.tick.saturating_sub(newest.header.info.tick);
+            let ticks = light.header.info.tick.saturating_sub(newest.info.tick);
             let made = ticks as f64 * tick_seconds;
             self.passage = waited.max(made).clamp(0.0, LONGEST_PASSAGE);
         }
-        self.newest = Some(Newest { header: light.header, arrived: now });
+        self.newest = Some(Newest { info: light.header.info, arrived: now });
         self.to = light.coefficients;
         self.settled = false;
         Ok(true)

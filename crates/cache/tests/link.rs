@@ -1,10 +1,10 @@
 //! A server's frames through a simulated link into a cache.
 
-use glam::{IVec3, Quat, UVec3, Vec3};
+use glam::{Quat, UVec3, Vec3};
 use lumencast_cache::{Cache, CacheError, SceneEvent};
 use lumencast_codec::{
-    AcceptedEdit, Catalog, ClientEdit, DecodeError, Epoch, Field, LightFile, ProbeEncoder,
-    RefusedEdit, SceneInfo, SceneState, StateFrame, UpdateInfo, Use,
+    AcceptedEdit, Catalog, ClientEdit, DecodeError, Epoch, FieldInfo, LightFile, LightTrack,
+    ProbeEncoder, RefusedEdit, SceneInfo, SceneState, Shape, StateFrame, UpdateInfo,
 };
 use lumencast_light::{FieldId, Grid, Order, ProbeVolume};
 use lumencast_scene::{Edit, NodeId};
@@ -17,7 +17,7 @@ const TICK: f64 = 0.04;
 enum Sent {
     Catalog(Vec<u8>),
     State(Vec<u8>),
-    Probes { field: u32, region: u32, layer: u8, bytes: Vec<u8> },
+    Light { track: LightTrack, bytes: Vec<u8> },
 }
 
 /// A server with one field whose light is the same number everywhere, set by the test.
@@ -44,20 +44,9 @@ impl Server {
             resolution: UVec3::new(12, 2, 2),
         };
         let encoder = ProbeEncoder::new(grid.resolution, Order::L1);
-        let field = Field {
-            id: FIELD,
-            order: Order::L1,
-            usage: Use::All,
-            grid,
-            offset: lumencast_light::Offset::default(),
-            cells_min: IVec3::ZERO,
-            regions: encoder.regions().collect(),
-            layers: 3,
-            scale_log2: None,
-            source: "a test".into(),
-            epoch: None,
-        };
-        assert_eq!(field.regions.len(), 2);
+        let volume = ProbeVolume::dark(FieldId(FIELD), grid, Order::L1);
+        let field = FieldInfo::of_volume(&volume, None, "a test");
+        assert_eq!(field.shape.regions().count(), 2);
         let scene = SceneInfo { name: "room".into(), root: "room.glb".into() };
         Self {
             catalog: Catalog {
@@ -65,9 +54,10 @@ impl Server {
                 scene,
                 tick_seconds: TICK,
                 fields: vec![field],
+                unknown: vec![],
             },
             encoder,
-            volume: ProbeVolume::dark(FieldId(FIELD), grid, Order::L1),
+            volume,
             tick: 0,
             ahead: 1000.0,
             scene: SceneState::default(),
@@ -103,12 +93,7 @@ impl Server {
             scene_version: 100 + self.tick,
         };
         let probes = self.encoder.encode(&self.volume, info, |_| true).into_iter().map(|frame| {
-            Sent::Probes {
-                field: FIELD,
-                region: frame.region,
-                layer: frame.layer,
-                bytes: frame.bytes,
-            }
+            Sent::Light { track: track(FIELD, frame.region, frame.layer), bytes: frame.bytes }
         });
         self.tick += 1;
         std::iter::once(Sent::State(state.encode())).chain(probes).collect()
@@ -119,13 +104,15 @@ impl Server {
     }
 }
 
+fn track(field: u32, region: u32, layer: u8) -> LightTrack {
+    LightTrack { field, region, layer }
+}
+
 fn take_in(cache: &mut Cache, sent: &Sent, now: f64) -> Result<(), CacheError> {
     match sent {
-        Sent::Catalog(bytes) => cache.catalog(bytes, now),
-        Sent::State(bytes) => cache.state(bytes, now).map(drop),
-        Sent::Probes { field, region, layer, bytes } => {
-            cache.probes(*field, *region, *layer, bytes, now).map(drop)
-        }
+        Sent::Catalog(bytes) => cache.add_catalog(bytes, now),
+        Sent::State(bytes) => cache.add_state(bytes, now).map(drop),
+        Sent::Light { track, bytes } => cache.add_light(*track, bytes, now).map(drop),
     }
 }
 
@@ -157,7 +144,7 @@ fn light_arrives_blended_with_its_age_and_version() {
     let mut server = Server::new(1);
     let mut cache = Cache::new();
     let mut link = Link::new(Conditions { delay: 0.1, ..Conditions::PERFECT }, 1);
-    cache.catalog(&server.catalog.encode(), 0.0).unwrap();
+    cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();
     let mut trace = Vec::new();
     for step in 0..400 {
         let now = f64::from(step) * TICK / 4.0;
@@ -206,14 +193,14 @@ fn a_tick_is_reached_once_everything_is() {
         }
         assert!(cache.has_reached(tick.into()) && !cache.has_reached(u64::from(tick) + 1));
     }
-    let other = Field { id: 8, epoch: Some(Epoch(5)), ..server.catalog.fields[0].clone() };
+    let other = FieldInfo { id: 8, epoch: Some(Epoch(5)), ..server.catalog.fields[0].clone() };
     server.catalog.fields.push(other);
     take_in(&mut cache, &server.catalog(), 0.2).unwrap();
     assert!(!cache.has_reached(2), "a field without light");
     let mut elsewhere = Server::new(5);
     for sent in elsewhere.tick(0.2) {
-        if let Sent::Probes { region, layer, bytes, .. } = sent {
-            cache.probes(8, region, layer, &bytes, 0.2).unwrap();
+        if let Sent::Light { track, bytes } = sent {
+            cache.add_light(LightTrack { field: 8, ..track }, &bytes, 0.2).unwrap();
         }
     }
     assert!(cache.has_reached(2), "its ticks are of another count");
@@ -237,7 +224,7 @@ fn a_tick_is_reached_once_everything_is() {
 fn passages_take_the_time_between_updates() {
     let mut server = Server::new(1);
     let mut cache = Cache::new();
-    cache.catalog(&server.catalog.encode(), 0.0).unwrap();
+    cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();
     let frames: Vec<Vec<Sent>> = (0..33u16)
         .map(|tick| {
             server.shine(1.0 + f32::from(tick / 4));
@@ -245,7 +232,7 @@ fn passages_take_the_time_between_updates() {
         })
         .collect();
     let of_layer = |sent: &Sent, most: u8| match sent {
-        Sent::Probes { layer, .. } => *layer <= most,
+        Sent::Light { track, .. } => track.layer <= most,
         _ => true,
     };
     let arrive = |cache: &mut Cache, tick: usize, most: u8, now: f64| {
@@ -271,7 +258,7 @@ fn passages_take_the_time_between_updates() {
 fn an_overdue_update_leaves_the_newest_standing() {
     let mut server = Server::new(1);
     let mut cache = Cache::new();
-    cache.catalog(&server.catalog.encode(), 0.0).unwrap();
+    cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();
     for tick in 0..10 {
         server.shine(1.0 + tick as f32);
         for sent in server.tick(tick as f64 * TICK) {
@@ -294,7 +281,7 @@ fn loss_jitter_and_doubling_break_nothing() {
         let mut cache = Cache::of_client("me");
         let bad = Conditions { delay: 0.05, jitter: 0.15, loss: 0.2, doubled: 0.1 };
         let mut link = Link::new(bad, seed);
-        cache.catalog(&server.catalog.encode(), 0.0).unwrap();
+        cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();
         let mut updates = 0;
         let mut last_tick = None;
         for tick in 0..1500 {
@@ -329,12 +316,12 @@ fn dropped_layers_lose_rate_and_nothing_else() {
     for kept in 0..3 {
         let mut server = Server::new(1);
         let mut cache = Cache::new();
-        cache.catalog(&server.catalog.encode(), 0.0).unwrap();
+        cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();
         for tick in 0..100 {
             let now = f64::from(tick) * TICK;
             server.shine(1.0 + tick as f32 * 0.1);
             for sent in server.tick(now) {
-                if matches!(sent, Sent::Probes { layer, .. } if layer > kept) {
+                if matches!(sent, Sent::Light { track, .. } if track.layer > kept) {
                     continue;
                 }
                 // Not even a missing base: lower layers need no higher ones.
@@ -397,7 +384,7 @@ fn a_field_s_own_epoch_tells_when_its_updates_begin_anew() {
         server.tick(now).iter().for_each(|sent| take_in(cache, sent, now).unwrap());
     };
     let mut server = computes(8);
-    cache.catalog(&server.catalog.encode(), 0.0).unwrap();
+    cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();
     server.shine(5.0);
     for tick in 0..50 {
         feed(&mut cache, &mut server, f64::from(tick) * TICK);
@@ -409,7 +396,7 @@ fn a_field_s_own_epoch_tells_when_its_updates_begin_anew() {
 
     // The catalog's server has restarted, the field's has not: its deltas go on.
     server.catalog.epoch = Epoch(2);
-    cache.catalog(&server.catalog.encode(), 3.0).unwrap();
+    cache.add_catalog(&server.catalog.encode(), 3.0).unwrap();
     assert_eq!(cache.server_time(3.0), None);
     assert!(cache.light(3.0).age.is_some());
     server.shine(2.0);
@@ -419,7 +406,7 @@ fn a_field_s_own_epoch_tells_when_its_updates_begin_anew() {
     // The field's server has restarted, the catalog's has not: update 0 is news again.
     let mut fresh = computes(9);
     fresh.catalog.epoch = Epoch(2);
-    cache.catalog(&fresh.catalog.encode(), 4.0).unwrap();
+    cache.add_catalog(&fresh.catalog.encode(), 4.0).unwrap();
     assert!(cache.server_time(4.0).is_some());
     assert_eq!(cache.light(4.0).age, None);
     assert!(near(shown(&mut cache, 4.0), 2.0), "the light stays until new light is there");
@@ -433,7 +420,7 @@ fn a_field_s_own_epoch_tells_when_its_updates_begin_anew() {
     fresh.catalog.fields[0].source = "another word".into();
     fresh.catalog.epoch = Epoch(9);
     fresh.catalog.fields[0].epoch = None;
-    cache.catalog(&fresh.catalog.encode(), 5.0).unwrap();
+    cache.add_catalog(&fresh.catalog.encode(), 5.0).unwrap();
     assert_eq!(cache.light(5.0).tick, Some(0));
 }
 
@@ -490,18 +477,24 @@ fn a_saved_field_shows_until_a_server_s_light_comes() {
     let mut server = Server::new(1);
     server.shine(4.0);
     let scene = server.catalog.scene.clone();
-    let file =
-        LightFile::of_volumes(Epoch(9), scene, TICK, "", [&server.volume], UpdateInfo::default());
+    let file = LightFile::of_fields(
+        Epoch(9),
+        scene,
+        TICK,
+        "",
+        [&server.volume.clone().into()],
+        UpdateInfo::default(),
+    );
     let mut cache = Cache::new();
     cache.load(&file.write(), 0.0).unwrap();
     assert!(near(shown(&mut cache, 0.0), 4.0));
     assert_eq!((cache.epoch(), cache.light(5.0).age), (None, None));
-    assert_eq!(cache.state(b"{}", 0.0), Err(CacheError::NoCatalog));
+    assert_eq!(cache.add_state(b"{}", 0.0), Err(CacheError::NoCatalog));
 
     // The server's volume is half as large; its probes read the saved light at their places.
-    let field = &mut server.catalog.fields[0];
-    field.grid.size *= 0.5;
-    cache.catalog(&server.catalog.encode(), 1.0).unwrap();
+    let Shape::Volume(shape) = &mut server.catalog.fields[0].shape;
+    shape.grid.size *= 0.5;
+    cache.add_catalog(&server.catalog.encode(), 1.0).unwrap();
     assert!(near(shown(&mut cache, 1.0), 4.0));
     server.shine(1.0);
     for sent in server.tick(1.0) {
@@ -516,24 +509,24 @@ fn fields_that_are_listed_no_longer_are_forgotten() {
     let mut server = Server::new(1);
     let mut cache = Cache::new();
     let mut catalog = server.catalog.clone();
-    catalog.fields.push(Field { id: 8, ..catalog.fields[0].clone() });
-    cache.catalog(&catalog.encode(), 0.0).unwrap();
+    catalog.fields.push(FieldInfo { id: 8, ..catalog.fields[0].clone() });
+    cache.add_catalog(&catalog.encode(), 0.0).unwrap();
     assert_eq!(cache.light(0.0).volumes().count(), 2);
     server.shine(3.0);
     let frames = server.tick(0.0);
     for sent in &frames {
         take_in(&mut cache, sent, 0.0).unwrap();
     }
-    cache.catalog(&server.catalog.encode(), 0.1).unwrap();
+    cache.add_catalog(&server.catalog.encode(), 0.1).unwrap();
     assert_eq!(cache.light(0.1).volumes().count(), 1);
     assert!(near(shown(&mut cache, 0.1), 3.0), "the other field keeps its light");
     assert_eq!(cache.light(0.1).tick, Some(0), "and its numbers");
-    let Some(Sent::Probes { bytes, .. }) = frames.last() else { panic!("no probe frames") };
-    assert_eq!(cache.probes(8, 0, 0, bytes, 0.2), Err(CacheError::UnknownField(8)));
+    let Some(Sent::Light { bytes, .. }) = frames.last() else { panic!("no probe frames") };
+    assert_eq!(cache.add_light(track(8, 0, 0), bytes, 0.2), Err(CacheError::UnknownField(8)));
     let unknown = CacheError::UnknownRegion { field: FIELD, region: 2 };
-    assert_eq!(cache.probes(FIELD, 2, 0, bytes, 0.2), Err(unknown));
+    assert_eq!(cache.add_light(track(FIELD, 2, 0), bytes, 0.2), Err(unknown));
     assert_eq!(
-        cache.probes(FIELD, 1, 1, bytes, 0.2),
+        cache.add_light(track(FIELD, 1, 1), bytes, 0.2),
         Err(CacheError::WrongLayer { update: 0, layer: 1 })
     );
 }
@@ -543,7 +536,7 @@ fn edits_are_seen_by_everyone_and_refusals_only_by_their_sender() {
     let mut server = Server::new(1);
     let mut caches = [Cache::of_client("me"), Cache::of_client("other")];
     for cache in &mut caches {
-        cache.catalog(&server.catalog.encode(), 0.0).unwrap();
+        cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();
     }
     let tick = |server: &mut Server, caches: &mut [Cache; 2]| {
         let now = server.tick as f64 * TICK;
@@ -592,8 +585,8 @@ fn edits_are_seen_by_everyone_and_refusals_only_by_their_sender() {
 fn rubbish_changes_nothing() {
     let mut server = Server::new(1);
     let mut cache = Cache::of_client("me");
-    assert_eq!(cache.probes(FIELD, 0, 0, b"", 0.0), Err(CacheError::NoCatalog));
-    cache.catalog(&server.catalog.encode(), 0.0).unwrap();
+    assert_eq!(cache.add_light(track(FIELD, 0, 0), b"", 0.0), Err(CacheError::NoCatalog));
+    cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();
     server.shine(3.0);
     let frames = server.tick(0.0);
     for sent in &frames {
@@ -612,7 +605,7 @@ fn rubbish_changes_nothing() {
         // A keyframe's number stays 0, so that even one that decodes is no news.
         let mut sent = frames[next() % frames.len()].clone();
         let bytes = match &mut sent {
-            Sent::Catalog(bytes) | Sent::State(bytes) | Sent::Probes { bytes, .. } => bytes,
+            Sent::Catalog(bytes) | Sent::State(bytes) | Sent::Light { bytes, .. } => bytes,
         };
         match next() % 3 {
             0 => bytes.truncate(next() % bytes.len()),
@@ -628,7 +621,7 @@ fn rubbish_changes_nothing() {
         if is_state && result.is_ok() {
             // Mutated JSON may well be a later tick; start over.
             cache = Cache::of_client("me");
-            cache.catalog(&server.catalog.encode(), 0.0).unwrap();
+            cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();
             for sent in &frames {
                 take_in(&mut cache, sent, 0.0).unwrap();
             }

@@ -7,6 +7,7 @@ use clap::Args;
 use lumencast_codec::{Epoch, LightFile, SavedFile, SceneInfo, UpdateInfo};
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::Levels;
+use lumencast_light::Field;
 use lumencast_scene::{FileContents, Scene};
 use lumencast_server::Baked;
 use serde_json::json;
@@ -62,7 +63,7 @@ impl Bake {
                 light_source::show(&bar, done);
             });
         bar.finish_and_clear();
-        let Baked { volumes: light, samples, noise } = baked?;
+        let Baked { fields, samples, noise } = baked?;
 
         let info = SceneInfo { name: scene.name().into(), root: scene.root_file().into() };
         let at = UpdateInfo {
@@ -71,15 +72,16 @@ impl Bake {
             ..UpdateInfo::default()
         };
         let source = format!("{}, baked, {samples} samples", source(&options));
-        let mut file = LightFile::of_volumes(Epoch(0), info, 1.0, &source, &light, at);
+        let mut file = LightFile::of_fields(Epoch(0), info, 1.0, &source, &fields, at);
         file.edits = scene.edits_since_load();
         file.files = named_files(&scene)?;
         let bytes = file.write();
         out_file::write(&self.output, &bytes)?;
-        let probes: usize = light.iter().map(|volume| volume.grid.probe_count()).sum();
+        let probes: usize =
+            fields.iter().filter_map(Field::as_volume).map(|v| v.grid.probe_count()).sum();
         if self.json {
             return output::json(&json!({
-                "file": self.output, "bytes": bytes.len(), "fields": light.len(),
+                "file": self.output, "bytes": bytes.len(), "fields": fields.len(),
                 "probes": probes, "samples": samples, "noise": noise,
             }));
         }
@@ -87,7 +89,7 @@ impl Bake {
         say!(
             "{}: fields: {}, probes: {probes}, {samples} samples a probe{noise}, {}",
             self.output.display(),
-            light.len(),
+            fields.len(),
             output::bytes(bytes.len() as u64)
         );
         Ok(())

@@ -6,8 +6,8 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use clap::Args;
 use glam::Vec3;
-use lumencast_codec::{Catalog, LightFile, SavedFile};
-use lumencast_light::ProbeVolume;
+use lumencast_codec::{Catalog, FieldInfo, LightFile, SavedFile, Shape, UnknownField};
+use lumencast_light::{Field, ProbeVolume};
 use lumencast_scene::{MeshId, NodeInfo, Scene};
 use serde_json::{Value, json};
 
@@ -40,11 +40,11 @@ impl Inspect {
         } else if let Some(bytes) = light_file(Path::new(&self.what))? {
             let read = || -> Result<_> {
                 let file = LightFile::read(&bytes)?;
-                let volumes = file.volumes()?;
-                Ok((file, volumes))
+                let fields = file.fields()?;
+                Ok((file, fields))
             };
-            let (file, volumes) = read().with_context(|| self.what.clone())?;
-            saved_report(&file, &volumes, bytes.len() as u64)
+            let (file, fields) = read().with_context(|| self.what.clone())?;
+            saved_report(&file, &fields, bytes.len() as u64)
         } else {
             scene_report(&mut Scene::open(&self.what)?)
         };
@@ -73,39 +73,39 @@ fn light_file(path: &Path) -> Result<Option<Vec<u8>>> {
     Ok(Some(bytes))
 }
 
-fn light_report(catalog: &Catalog, volumes: &[ProbeVolume], bytes: u64) -> Value {
-    let fields: Vec<Value> = catalog
-        .fields
-        .iter()
-        .map(|field| {
-            let volume = volumes.iter().find(|volume| volume.id.0 == field.id);
-            json!({
-                "id": field.id,
-                "source": Some(&field.source).filter(|source| !source.is_empty()),
-                "epoch": catalog.epoch_of(field),
-                "order": field.order,
-                "use": field.usage,
-                "grid": field.grid,
-                "probes": field.grid.probe_count(),
-                "regions": field.regions.len(),
-                "layers": field.layers,
-                "scale_log2": field.scale_log2,
-                "c0": volume.map(c0_statistics),
-            })
+fn light_report(catalog: &Catalog, fields: &[Field], bytes: u64) -> Value {
+    let report = |info: &FieldInfo| {
+        let Shape::Volume(shape) = &info.shape;
+        let field = fields.iter().find(|field| field.id().0 == info.id);
+        json!({
+            "id": info.id,
+            "kind": info.shape.kind(),
+            "source": Some(&info.source).filter(|source| !source.is_empty()),
+            "epoch": catalog.epoch_of(info),
+            "order": shape.order,
+            "use": info.usage,
+            "grid": shape.grid,
+            "probes": shape.grid.probe_count(),
+            "regions": shape.regions.len(),
+            "layers": shape.layers,
+            "scale_log2": info.scale_log2,
+            "c0": field.and_then(Field::as_volume).map(c0_statistics),
         })
-        .collect();
+    };
+    let unknown = |field: &UnknownField| json!({ "id": field.id, "kind": field.kind });
     json!({
         "epoch": catalog.epoch,
         "scene": catalog.scene,
         "tick_seconds": catalog.tick_seconds,
         "bytes": bytes,
-        "fields": fields,
+        "fields": catalog.fields.iter().map(report).collect::<Vec<_>>(),
+        "unknown_fields": catalog.unknown.iter().map(unknown).collect::<Vec<_>>(),
     })
 }
 
 /// A file's light, with what else it holds.
-fn saved_report(file: &LightFile, volumes: &[ProbeVolume], bytes: u64) -> Value {
-    let mut report = light_report(&file.catalog, volumes, bytes);
+fn saved_report(file: &LightFile, fields: &[Field], bytes: u64) -> Value {
+    let mut report = light_report(&file.catalog, fields, bytes);
     report["edits"] = file.edits.len().into();
     let kept = |file: &SavedFile| json!({ "name": file.name, "bytes": file.bytes.len() });
     report["files"] = file.files.iter().map(kept).collect();
@@ -114,7 +114,7 @@ fn saved_report(file: &LightFile, volumes: &[ProbeVolume], bytes: u64) -> Value 
 
 /// A server's light, with its state and the lights of its scene.
 fn server_report(seen: &Seen) -> Value {
-    let mut report = light_report(&seen.catalog, &seen.volumes, seen.bytes);
+    let mut report = light_report(&seen.catalog, &seen.fields, seen.bytes);
     let state = &seen.state;
     report["state"] = json!({
         "tick": state.tick,

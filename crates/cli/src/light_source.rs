@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 use lumencast_codec::{Catalog, DecodeError, LightFile};
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::ProbeVolume;
+use lumencast_light::Field;
 use lumencast_scene::{Edit, Scene, Snapshot, VolumeSpec};
 use lumencast_server::{Baked, Done, Effort};
 
@@ -28,7 +28,7 @@ pub(crate) struct Found {
     catalog: Catalog,
     /// Edits that turn the scene's file into the scene that the light is of, where they are known.
     pub(crate) edits: Vec<Edit>,
-    pub(crate) volumes: Vec<ProbeVolume>,
+    pub(crate) fields: Vec<Field>,
 }
 
 impl Found {
@@ -41,14 +41,14 @@ impl Found {
 /// The light of a file, or the newest of a server's scene.
 pub(crate) fn light(what: &str) -> Result<Found> {
     if is_address(what) {
-        let Seen { catalog, volumes, .. } = remote::look(what)?;
-        return Ok(Found { what: what.into(), catalog, edits: Vec::new(), volumes });
+        let Seen { catalog, fields, .. } = remote::look(what)?;
+        return Ok(Found { what: what.into(), catalog, edits: Vec::new(), fields });
     }
     let bytes = std::fs::read(Path::new(what)).with_context(|| format!("cannot read {what}"))?;
     let read = || {
         let file = LightFile::read(&bytes)?;
-        let volumes = file.volumes()?;
-        Ok(Found { what: what.into(), catalog: file.catalog, edits: file.edits, volumes })
+        let fields = file.fields()?;
+        Ok(Found { what: what.into(), catalog: file.catalog, edits: file.edits, fields })
     };
     let read: Result<_, DecodeError> = read();
     read.with_context(|| format!("{what} is no light file"))
@@ -62,7 +62,7 @@ pub(crate) fn check_fits(what: &str, catalog: &Catalog, scene: &Scene) {
     }
     let bounds = scene.bounds();
     let (middle, reach) = (0.5 * (bounds.min + bounds.max), 0.5 * bounds.min.distance(bounds.max));
-    if !catalog.fields.iter().any(|field| field.grid.distance(middle) <= reach) {
+    if !catalog.fields.iter().any(|field| field.shape.distance_from_all(middle) <= reach) {
         tell!("warning: {what} lights no part of this scene; is it another scene's?");
     }
 }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use lumencast_client::{Replica, Session, SessionOptions, current_tick, download};
 use lumencast_codec::{Catalog, StateFrame};
-use lumencast_light::ProbeVolume;
+use lumencast_light::Field;
 use lumencast_scene::Scene;
 use lumencast_transport::ConnectOptions;
 use tokio::runtime::Runtime;
@@ -28,7 +28,7 @@ const SETTLED: Duration = Duration::from_secs(3600);
 /// What there was to see.
 pub(crate) struct Seen {
     pub(crate) catalog: Catalog,
-    pub(crate) volumes: Vec<ProbeVolume>,
+    pub(crate) fields: Vec<Field>,
     /// Where it was asked for, and could be had.
     pub(crate) scene: Option<Scene>,
     pub(crate) state: StateFrame,
@@ -87,8 +87,7 @@ async fn read(url: &str) -> Result<(Session, Seen)> {
     let what = || format!("{url}: it has gone");
     let seen = Seen {
         catalog: session.catalog().with_context(what)?,
-        volumes: session
-            .light(Instant::now() + SETTLED, |light| light.volumes().cloned().collect()),
+        fields: session.light(Instant::now() + SETTLED, |light| light.fields().to_vec()),
         scene: None,
         state: session.state().with_context(what)?,
         edits: session.edits().map_or(0, |edits| edits.len()),

@@ -158,7 +158,7 @@ impl View {
         let light = light_source::light(&name)?;
         let scene = self.edited_scene(&light.edits)?;
         light.check_fits(&scene);
-        Ok(Box::new(Still::new(scene, Light::new(light.volumes), name)))
+        Ok(Box::new(Still::new(scene, Light::new(light.fields), name)))
     }
 
     /// A scene from here under a server's light.

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use common::{PATIENCE, Serving, run};
 use lumencast_cache::Cache;
-use lumencast_codec::{ClientEdit, StateFrame};
+use lumencast_codec::{ClientEdit, LightTrack, StateFrame};
 use lumencast_scene::{Edit, InstanceSource, LightSpec, NodeId, Scene, Transform};
 use lumencast_transport::{
     Broadcast, Client, ConnectOptions, Frame, ReadOptions, TrackReader, TrackWriter,
@@ -31,6 +31,9 @@ fn limited(test: impl Future<Output = ()>) {
     });
     runtime.shutdown_timeout(Duration::from_secs(1));
 }
+
+/// The track that is read.
+const LIGHT: LightTrack = LightTrack { field: 0, region: 0, layer: 0 };
 
 /// A client as a program would write one: the transport's tracks into the cache.
 struct Follower {
@@ -60,7 +63,7 @@ impl Follower {
         let all = ReadOptions::default().with_max_age(Duration::from_secs(5));
         let catalog = read("catalog", ReadOptions::default());
         let state = read("state", all);
-        let light = read("f0/r0/l0", ReadOptions::default());
+        let light = read(&LIGHT.to_string(), ReadOptions::default());
         let cache = Cache::new();
         Self { client, cache, catalog, state, light, began: Instant::now() }
     }
@@ -77,20 +80,20 @@ impl Follower {
         tokio::select! {
             frame = self.catalog.next() => {
                 let now = self.now();
-                self.cache.catalog(&next(frame), now).expect("a catalog");
+                self.cache.add_catalog(&next(frame), now).expect("a catalog");
                 Came::Catalog
             }
             frame = self.state.next() => {
                 let bytes = next(frame);
                 let now = self.now();
-                match self.cache.state(&bytes, now) {
+                match self.cache.add_state(&bytes, now) {
                     Ok(_) => Came::State(StateFrame::decode(&bytes).expect("a state frame")),
                     Err(_) => Came::Nothing,
                 }
             }
             frame = self.light.next() => {
                 let now = self.now();
-                match self.cache.probes(0, 0, 0, &next(frame), now) {
+                match self.cache.add_light(LIGHT, &next(frame), now) {
                     Ok(_) => Came::Light,
                     Err(_) => Came::Nothing,
                 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use lumencast_cache::{Cache, CurrentLight, SceneEvent};
-use lumencast_codec::{Catalog, StateFrame, limits};
+use lumencast_codec::{Catalog, LightTrack, StateFrame, limits, tracks};
 use lumencast_scene::Edit;
 use lumencast_transport::{
     Client, ConnectOptions, ConnectionState, Error, Frame, ReadOptions, TrackReader,
@@ -15,7 +15,7 @@ use tokio::sync::watch;
 use tokio::task::{AbortHandle, JoinSet};
 
 use crate::error::ClientError;
-use crate::plan::{CATALOG_PRIORITY, LightTrack, STATE_PRIORITY, plan};
+use crate::plan::plan;
 use crate::statistics::{Meter, Statistics};
 
 /// State frames count for so long: every one of them tells something.
@@ -224,9 +224,10 @@ async fn next(reader: &mut TrackReader) -> Option<Frame> {
 }
 
 async fn read_catalog(client: Arc<Client>, shared: Arc<Shared>) {
-    let mut reader = client.subscribe(client.scene(), "catalog", options(CATALOG_PRIORITY));
+    let mut reader =
+        client.subscribe(client.scene(), tracks::CATALOG, options(tracks::CATALOG_PRIORITY));
     while let Some(frame) = next(&mut reader).await {
-        if shared.take(&frame, |cache, now| cache.catalog(&frame.bytes, now)) {
+        if shared.take(&frame, |cache, now| cache.add_catalog(&frame.bytes, now)) {
             shared.catalogs.send_modify(|count| *count += 1);
         }
     }
@@ -238,10 +239,10 @@ async fn read_state(client: Arc<Client>, shared: Arc<Shared>) {
     if catalogs.wait_for(|count| *count > 0).await.is_err() {
         return;
     }
-    let options = options(STATE_PRIORITY).with_max_age(STATE_AGE);
-    let mut reader = client.subscribe(client.scene(), "state", options);
+    let options = options(tracks::STATE_PRIORITY).with_max_age(STATE_AGE);
+    let mut reader = client.subscribe(client.scene(), tracks::STATE, options);
     while let Some(frame) = next(&mut reader).await {
-        if shared.take(&frame, |cache, now| cache.state(&frame.bytes, now).map(|_| ())) {
+        if shared.take(&frame, |cache, now| cache.add_state(&frame.bytes, now).map(|_| ())) {
             let now = shared.seconds(Instant::now());
             shared.lock().meter.ticks.add(1.0, now);
         }
@@ -297,7 +298,7 @@ async fn read_region(
     mut priority: watch::Receiver<u8>,
 ) {
     let options = options(*priority.borrow_and_update());
-    let mut reader = client.subscribe(client.scene(), &track.name(), options);
+    let mut reader = client.subscribe(client.scene(), &track.to_string(), options);
     loop {
         let frame = tokio::select! {
             frame = next(&mut reader) => frame,
@@ -310,10 +311,8 @@ async fn read_region(
             }
         };
         let Some(frame) = frame else { return };
-        let LightTrack { field, region, layer } = track;
-        let taken = shared.take(&frame, |cache, now| {
-            cache.probes(field, region, layer, &frame.bytes, now).map(|_| ())
-        });
+        let taken =
+            shared.take(&frame, |cache, now| cache.add_light(track, &frame.bytes, now).map(|_| ()));
         if taken {
             let now = shared.seconds(Instant::now());
             shared.lock().meter.frames.add(1.0, now);

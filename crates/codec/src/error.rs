@@ -69,3 +69,8 @@ impl DecodeError {
         Ok(())
     }
 }
+
+/// A JSON error as ours.
+pub(crate) fn json<T>(result: serde_json::Result<T>) -> Result<T, DecodeError> {
+    result.map_err(|error| DecodeError::Json(error.to_string()))
+}

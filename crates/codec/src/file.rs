@@ -2,14 +2,14 @@
 
 use std::collections::HashMap;
 
-use lumencast_light::ProbeVolume;
+use lumencast_light::Field;
 use lumencast_scene::Edit;
 
 use crate::bytes::{Reader, put_varint};
 use crate::state::{read_edits, write_edits};
 use crate::{
-    Catalog, DecodeError, Epoch, Field, ProbeDecoder, ProbeEncoder, ProbeHeader, SceneInfo,
-    UpdateInfo, Use, limits,
+    Catalog, DecodeError, Epoch, FieldInfo, ProbeDecoder, ProbeEncoder, ProbeHeader, SceneInfo,
+    Shape, UpdateInfo, limits,
 };
 
 const MAGIC: &[u8; 8] = b"LUMENCST";
@@ -33,7 +33,8 @@ pub struct LightFile {
     pub edits: Vec<Edit>,
     /// Files that the edits name.
     pub files: Vec<SavedFile>,
-    /// Keyframes of regions; those of fields or regions that the catalog lacks are to be passed over.
+    /// Keyframes of regions of the catalog's fields; those of regions that it lacks are to be passed
+    /// over.
     pub frames: Vec<SavedFrame>,
 }
 
@@ -58,41 +59,34 @@ pub struct SavedFrame {
 }
 
 impl LightFile {
-    /// Encodes volumes; `source` says what computed them ([`Field::source`]), `info` when and from
+    /// Encodes fields; `source` says what computed them ([`FieldInfo::source`]), `info` when and from
     /// which scene (its `update` becomes 0).
-    pub fn of_volumes<'a>(
+    pub fn of_fields<'a>(
         epoch: Epoch,
         scene: SceneInfo,
         tick_seconds: f64,
         source: &str,
-        volumes: impl IntoIterator<Item = &'a ProbeVolume>,
+        fields: impl IntoIterator<Item = &'a Field>,
         info: UpdateInfo,
     ) -> Self {
-        let mut fields = Vec::new();
+        let info = UpdateInfo { update: 0, ..info };
+        let mut infos = Vec::new();
         let mut frames = Vec::new();
-        for volume in volumes {
-            let mut encoder = ProbeEncoder::new(volume.grid.resolution, volume.order);
-            let encoded = encoder.encode(volume, UpdateInfo { update: 0, ..info }, |_| true);
-            fields.push(Field {
-                id: volume.id.0,
-                order: volume.order,
-                usage: Use::All,
-                grid: volume.grid,
-                offset: volume.offset,
-                cells_min: glam::IVec3::ZERO,
-                regions: encoder.regions().collect(),
-                layers: 3,
-                scale_log2: encoder.scale_log2(),
-                source: source.to_owned(),
-                epoch: None,
-            });
-            frames.extend(encoded.into_iter().map(|frame| SavedFrame {
-                field: volume.id.0,
-                region: frame.region,
-                bytes: frame.bytes,
-            }));
+        for field in fields {
+            match field {
+                Field::Volume(volume) => {
+                    let mut encoder = ProbeEncoder::new(volume.grid.resolution, volume.order);
+                    let encoded = encoder.encode(volume, info, |_| true);
+                    infos.push(FieldInfo::of_volume(volume, encoder.scale_log2(), source));
+                    frames.extend(encoded.into_iter().map(|frame| SavedFrame {
+                        field: volume.id.0,
+                        region: frame.region,
+                        bytes: frame.bytes,
+                    }));
+                }
+            }
         }
-        let catalog = Catalog { epoch, scene, tick_seconds, fields };
+        let catalog = Catalog { epoch, scene, tick_seconds, fields: infos, unknown: Vec::new() };
         Self { catalog, edits: Vec::new(), files: Vec::new(), frames }
     }
 
@@ -148,7 +142,7 @@ impl LightFile {
         while !reader.0.is_empty() {
             let (kind, mut body) = record(&mut reader)?;
             match kind {
-                kind::KEYFRAME => read.frames.push(SavedFrame::read(body)?),
+                kind::KEYFRAME => read.frames.extend(SavedFrame::read(body, &read.catalog)?),
                 kind::EDITS => read.edits = read_edits(body.0)?,
                 kind::FILE => {
                     let length = usize::try_from(body.varint()?);
@@ -162,35 +156,43 @@ impl LightFile {
         Ok(read)
     }
 
-    /// Decodes the volumes; probes of regions that the file lacks are dark.
+    /// Decodes the fields; regions that the file lacks are dark.
     ///
     /// # Errors
     /// [`DecodeError`] when a frame cannot be decoded or does not fit the catalog.
-    pub fn volumes(&self) -> Result<Vec<ProbeVolume>, DecodeError> {
-        let mut volumes: HashMap<u32, ProbeVolume> = HashMap::new();
+    pub fn fields(&self) -> Result<Vec<Field>, DecodeError> {
+        let mut fields: HashMap<u32, Field> = HashMap::new();
         for frame in &self.frames {
-            let Some(field) = self.catalog.field(frame.field) else { continue };
-            let Some(region) = field.region(frame.region) else { continue };
-            let light = ProbeDecoder::new(region.size, field.order).decode(&frame.bytes)?;
-            let volume = volumes.entry(field.id).or_insert_with(|| field.dark());
-            let n = field.order.coefficients();
-            for (probe, values) in
-                region.probes(field.grid.resolution).zip(light.coefficients.chunks(n))
-            {
-                volume.probe_mut(probe).copy_from_slice(values);
+            let Some(info) = self.catalog.field(frame.field) else { continue };
+            let dark = || info.dark();
+            match (&info.shape, fields.entry(info.id)) {
+                (Shape::Volume(shape), entry) => {
+                    let Some(region) = shape.region(frame.region) else { continue };
+                    let light = ProbeDecoder::new(region.size, shape.order).decode(&frame.bytes)?;
+                    let Field::Volume(volume) = entry.or_insert_with(dark);
+                    let n = shape.order.coefficients();
+                    let probes = region.probes(shape.grid.resolution);
+                    for (probe, values) in probes.zip(light.coefficients.chunks(n)) {
+                        volume.probe_mut(probe).copy_from_slice(values);
+                    }
+                }
             }
         }
-        Ok(self.catalog.fields.iter().filter_map(|field| volumes.remove(&field.id)).collect())
+        Ok(self.catalog.fields.iter().filter_map(|field| fields.remove(&field.id)).collect())
     }
 }
 
 impl SavedFrame {
-    fn read(mut body: Reader<'_>) -> Result<Self, DecodeError> {
+    /// Reads a record; nothing where its field is none of the catalog, or of an unknown kind.
+    fn read(mut body: Reader<'_>, catalog: &Catalog) -> Result<Option<Self>, DecodeError> {
         let (field, region) = (number(&mut body)?, number(&mut body)?);
-        if ProbeHeader::read(body.0)?.base.is_some() {
-            return Err(DecodeError::Malformed("a delta in a light file"));
+        let Some(info) = catalog.field(field) else { return Ok(None) };
+        match info.shape {
+            Shape::Volume(_) if ProbeHeader::read(body.0)?.base.is_some() => {
+                Err(DecodeError::Malformed("a delta in a light file"))
+            }
+            Shape::Volume(_) => Ok(Some(Self { field, region, bytes: body.0.to_vec() })),
         }
-        Ok(Self { field, region, bytes: body.0.to_vec() })
     }
 }
 
@@ -220,7 +222,7 @@ fn number(reader: &mut Reader<'_>) -> Result<u32, DecodeError> {
 mod tests {
     use super::*;
     use glam::{Quat, UVec3, Vec3};
-    use lumencast_light::{FieldId, Grid, Offset, Order};
+    use lumencast_light::{FieldId, Grid, Light, Offset, Order, ProbeVolume};
 
     fn file() -> (Vec<ProbeVolume>, LightFile) {
         let volumes: Vec<ProbeVolume> = [(7, UVec3::new(12, 2, 3)), (2, UVec3::ONE)]
@@ -241,8 +243,9 @@ mod tests {
             })
             .collect();
         let scene = SceneInfo { name: "a".into(), root: "a.glb".into() };
+        let fields: Vec<Field> = volumes.iter().cloned().map(Field::from).collect();
         let file =
-            LightFile::of_volumes(Epoch(1), scene, 0.04, "a test", &volumes, UpdateInfo::default());
+            LightFile::of_fields(Epoch(1), scene, 0.04, "a test", &fields, UpdateInfo::default());
         (volumes, file)
     }
 
@@ -251,9 +254,9 @@ mod tests {
         let (volumes, file) = file();
         let read = LightFile::read(&file.write()).unwrap();
         assert_eq!(read, file);
-        let decoded = read.volumes().unwrap();
-        assert_eq!(decoded.len(), 2);
-        for (volume, decoded) in volumes.iter().zip(&decoded) {
+        let decoded = Light::new(read.fields().unwrap());
+        assert_eq!(decoded.fields().len(), 2);
+        for (volume, decoded) in volumes.iter().zip(decoded.volumes()) {
             assert_eq!(
                 (volume.id, volume.order, volume.grid.resolution, volume.offset),
                 (decoded.id, decoded.order, decoded.grid.resolution, decoded.offset)
@@ -275,6 +278,7 @@ mod tests {
         file.files = vec![SavedFile { name: "sky/a b.hdr".into(), bytes: vec![7; 300] }];
         let mut bytes = file.write();
         put_record(&mut bytes, 99, &[b"of a later version"]);
+        put_record(&mut bytes, kind::KEYFRAME, &[&[99, 0], b"of a field of a later kind"]);
         assert_eq!(LightFile::read(&bytes), Ok(file.clone()));
 
         let mut edits = Vec::new();

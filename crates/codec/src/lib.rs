@@ -8,21 +8,29 @@
 
 mod bytes;
 mod catalog;
+mod epoch;
 mod error;
+mod field_info;
 mod file;
 pub mod limits;
 mod probe;
 mod range_coder;
 mod state;
+pub mod tracks;
+mod volume_shape;
 
-pub use catalog::{Catalog, Epoch, Field, SceneInfo, Use};
+pub use catalog::{Catalog, SceneInfo};
+pub use epoch::Epoch;
 pub use error::DecodeError;
+pub use field_info::{FieldInfo, Shape, UnknownField, Use};
 pub use file::{LightFile, SavedFile, SavedFrame};
 pub use probe::{
     EncodedRegion, ProbeDecoder, ProbeEncoder, ProbeHeader, Region, RegionLight, UpdateInfo,
     regions,
 };
 pub use state::{AcceptedEdit, ClientEdit, RefusedEdit, SceneState, StateFrame};
+pub use tracks::LightTrack;
+pub use volume_shape::{Basis, VolumeShape};
 
 /// The version of the wire format and of files, `lumencast` in a catalog.
 pub const VERSION: u64 = 1;

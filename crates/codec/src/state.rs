@@ -6,7 +6,7 @@ use lumencast_scene::Edit;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::catalog::json as checked;
+use crate::error::json as checked;
 use crate::{DecodeError, limits};
 
 /// What happened in a tick, and, now and then, what all ticks so far come to.

@@ -268,12 +268,12 @@ fn no_bytes_make_a_decoder_panic() {
         frames.push(encoder.encode(&volume, update(u), |_| true).remove(0).bytes);
         decoder.decode(&frames[u as usize]).unwrap();
     }
-    let file = LightFile::of_volumes(
+    let file = LightFile::of_fields(
         lumencast_codec::Epoch(1),
         lumencast_codec::SceneInfo { name: "a".into(), root: "b".into() },
         0.04,
         "a test",
-        [&volume],
+        [&volume.clone().into()],
         UpdateInfo::default(),
     );
     frames.extend([file.write(), file.catalog.encode(), StateFrame::default().encode()]);
@@ -305,7 +305,7 @@ fn no_bytes_make_a_decoder_panic() {
         drop(ClientEdit::decode(&bytes));
         drop(Catalog::decode(&bytes));
         if let Ok(file) = LightFile::read(&bytes) {
-            drop(file.volumes());
+            drop(file.fields());
         }
     }
     assert!(accepted > 100, "mutations that leave a frame decodable are tried too: {accepted}");

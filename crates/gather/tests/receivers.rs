@@ -229,7 +229,8 @@ fn bounces_add_up_from_job_to_job() {
             let job = Job { bounces: 0, seed, ..Job::new(stage.snapshot(), probes.clone()) };
             field(size, &gather(Job { previous: Some(before), ..job }))
         });
-        let found = light.sample(&lumencast_light::Place::in_space(BLACK)).unwrap().coefficients[0].x;
+        let found =
+            light.sample(&lumencast_light::Place::in_space(BLACK)).unwrap().coefficients[0].x;
         check(found, C0 * first / (1.0 - albedo), C0 * first * (1.0 + albedo), 5e-3);
     }
 }

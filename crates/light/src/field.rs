@@ -3,9 +3,9 @@
 use crate::field_id::FieldId;
 use crate::volume::ProbeVolume;
 
-/// A part of a scene's light, of one kind.
+/// A part of a scene's light, of one kind. Matches on it name every kind, so that the compiler shows
+/// what a new one needs.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Field {
     /// Probes in the cells of a box.
     Volume(ProbeVolume),

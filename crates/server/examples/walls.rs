@@ -66,7 +66,7 @@ fn main() {
             let options = GatherOptions { blend, fit, offset, ..GatherOptions::default() };
             let effort = Effort::of_samples(16_384);
             let baked = bake(&scene, &[volume], tracer, effort, options, |_| ()).expect("light");
-            let light = Light::new(baked.volumes);
+            let light = Light::new(baked.fields);
             100.0 * floor(&light, wall, 1.0) / floor(&light, wall, -1.0)
         };
         let gathered = leaked(None, Offset::HALF_CELL, &mut tracer);

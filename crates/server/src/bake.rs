@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lumencast_gather::Gather;
 use lumencast_gather::blend::BlendSettings;
-use lumencast_light::ProbeVolume;
+use lumencast_light as light;
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::ServerError;
@@ -60,7 +60,7 @@ pub struct Done {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Baked {
     /// In the order in which they were asked for; pieces of a volume follow one another.
-    pub volumes: Vec<ProbeVolume>,
+    pub fields: Vec<light::Field>,
     /// Samples of a probe.
     pub samples: u32,
     /// As in [`Effort::noise`], where that was asked for.
@@ -129,6 +129,6 @@ pub fn bake(
     }
     publish(&mut fields, FIT_EFFORT);
     progress(Done { share: 1.0, ..done });
-    let volumes = fields.into_iter().map(Field::into_volume).collect();
-    Ok(Baked { volumes, samples, noise: done.noise })
+    let fields = fields.into_iter().map(|field| field.into_volume().into()).collect();
+    Ok(Baked { fields, samples, noise: done.noise })
 }

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use lumencast_codec::limits;
+use lumencast_codec::{limits, tracks};
 use lumencast_transport::{
     Announcement, Announcements, Error, Rarely, ReadOptions, RemoteBroadcast,
 };
@@ -136,7 +136,7 @@ async fn read(
 ) -> bool {
     tracing::debug!(client, "edits the scene");
     let options = ReadOptions::default().with_max_age(MAX_AGE).with_max_frame(limits::EDIT_BYTES);
-    let mut track = broadcast.subscribe("edits", options);
+    let mut track = broadcast.subscribe(tracks::EDITS, options);
     loop {
         let frame = match track.next().await {
             Ok(Some(frame)) => frame.bytes,

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use glam::{IVec3, Vec3};
-use lumencast_codec::{self as codec, EncodedRegion, ProbeEncoder, UpdateInfo, limits};
+use glam::Vec3;
+use lumencast_codec::{EncodedRegion, FieldInfo, ProbeEncoder, UpdateInfo, limits, regions};
 use lumencast_gather::blend::History;
 use lumencast_gather::fit::{FitSettings, Part, fit};
 use lumencast_gather::{Gathered, Job, Receiver};
@@ -92,20 +92,8 @@ impl Field {
     }
 
     /// The field as the catalog lists it.
-    pub(crate) fn describe(&self, source: &str) -> codec::Field {
-        codec::Field {
-            id: self.volume.id.0,
-            order: self.volume.order,
-            usage: codec::Use::All,
-            grid: self.volume.grid,
-            offset: self.volume.offset,
-            cells_min: IVec3::ZERO,
-            regions: self.encoder.regions().collect(),
-            layers: 3,
-            scale_log2: self.scale_log2(),
-            source: source.to_owned(),
-            epoch: None,
-        }
+    pub(crate) fn describe(&self, source: &str) -> FieldInfo {
+        FieldInfo::of_volume(&self.volume, self.scale_log2(), source)
     }
 
     /// log2 of its scale as of the last update; none before there was any light.
@@ -248,7 +236,7 @@ fn pieces(volumes: &[VolumeSpec]) -> Result<Vec<VolumeSpec>, ServerError> {
         most(total, "probes with those before it", limits::CATALOG_PROBES)?;
         for piece in spec.split() {
             most(piece.grid.probe_count(), "probes", limits::FIELD_PROBES)?;
-            most(codec::regions(piece.grid.resolution).len(), "regions", limits::REGIONS)?;
+            most(regions(piece.grid.resolution).len(), "regions", limits::REGIONS)?;
             pieces.push(piece);
         }
     }

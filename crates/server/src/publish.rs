@@ -1,8 +1,10 @@
 //! Frames onto their tracks.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bytes::Bytes;
+use lumencast_codec::tracks::{self, LightTrack};
 use lumencast_codec::{Catalog, EncodedRegion};
 use lumencast_transport::{Broadcast, TrackWriter};
 
@@ -13,26 +15,21 @@ pub trait Outlet {
     /// Whether anyone reads this region of this field: what nobody reads is not encoded.
     fn is_watched(&self, field: u32, region: u32) -> bool;
     /// Takes a catalog that replaces the one before.
-    fn catalog(&mut self, frame: Vec<u8>);
+    fn catalog(&mut self, catalog: &Catalog);
     /// Takes a state frame; it begins a group where it is a snapshot.
     fn state(&mut self, frame: Vec<u8>, new_group: bool);
     /// Takes a region's light.
-    fn probes(&mut self, field: u32, frame: EncodedRegion);
+    fn light(&mut self, field: u32, frame: EncodedRegion);
 }
 
-/// Priorities of the tracks among themselves (docs/wire.md); clients grade regions on their own.
-const CATALOG_PRIORITY: u8 = 255;
-const STATE_PRIORITY: u8 = 254;
-const LAYER_PRIORITY: [u8; 3] = [2, 1, 0];
-
-/// The tracks of a scene's broadcast.
+/// The tracks of a scene's broadcast. Those of light follow the catalog: they come and go with its
+/// fields.
 pub(crate) struct Publisher {
     /// Ends for its readers when it is dropped.
-    _broadcast: Broadcast,
+    broadcast: Broadcast,
     catalog: TrackWriter,
     state: TrackWriter,
-    /// By field, region and layer.
-    probes: Vec<Vec<[TrackWriter; 3]>>,
+    light: BTreeMap<LightTrack, TrackWriter>,
     shared: Arc<Shared>,
 }
 
@@ -43,50 +40,53 @@ impl Publisher {
         catalog: &Catalog,
         shared: Arc<Shared>,
     ) -> lumencast_transport::Result<Self> {
-        let frame = catalog.encode();
-        let mut catalog_track = broadcast.track("catalog", CATALOG_PRIORITY)?;
-        shared.metrics.sent("catalog", frame.len());
-        catalog_track.write(frame.into(), true)?;
-        let state = broadcast.track("state", STATE_PRIORITY)?;
-
-        let mut probes = Vec::with_capacity(catalog.fields.len());
-        for field in &catalog.fields {
-            let mut tracks = Vec::with_capacity(field.regions.len());
-            for region in &field.regions {
-                let track = |layer: usize| {
-                    let name = format!("f{}/r{}/l{layer}", field.id, region.id);
-                    broadcast.track(&name, LAYER_PRIORITY[layer])
-                };
-                tracks.push([track(0)?, track(1)?, track(2)?]);
-            }
-            probes.push(tracks);
-        }
-        broadcast.announce()?;
-        Ok(Self { _broadcast: broadcast, catalog: catalog_track, state, probes, shared })
+        let catalog_track = broadcast.track(tracks::CATALOG, tracks::CATALOG_PRIORITY)?;
+        let state = broadcast.track(tracks::STATE, tracks::STATE_PRIORITY)?;
+        let light = BTreeMap::new();
+        let mut publisher = Self { broadcast, catalog: catalog_track, state, light, shared };
+        publisher.catalog(catalog);
+        publisher.broadcast.announce()?;
+        Ok(publisher)
     }
 
-    fn tracks(&self, field: u32, region: u32) -> Option<&[TrackWriter; 3]> {
-        self.probes.get(field as usize)?.get(region as usize)
+    /// Makes the tracks that a catalog lists and there are not yet, and ends those that it lacks.
+    fn follow(&mut self, catalog: &Catalog) {
+        let mut known = std::mem::take(&mut self.light);
+        for track in LightTrack::of_catalog(catalog) {
+            let kept = known.remove(&track).map(Ok);
+            let made = || self.broadcast.track(&track.to_string(), track.server_priority());
+            match kept.unwrap_or_else(made) {
+                Ok(writer) => drop(self.light.insert(track, writer)),
+                Err(error) => tracing::warn!(%track, %error, "a track cannot be made"),
+            }
+        }
+        for (track, writer) in known {
+            if let Err(error) = writer.finish() {
+                tracing::debug!(%track, %error, "a track ended before its last frame");
+            }
+        }
     }
 }
 
 impl Outlet for Publisher {
     fn is_watched(&self, field: u32, region: u32) -> bool {
-        self.tracks(field, region).is_some_and(|layers| layers.iter().any(TrackWriter::is_used))
+        let layer = |layer| self.light.get(&LightTrack { field, region, layer });
+        (0..tracks::LAYERS).filter_map(layer).any(TrackWriter::is_used)
     }
 
-    fn catalog(&mut self, frame: Vec<u8>) {
-        write(&mut self.catalog, frame, true, &self.shared);
+    fn catalog(&mut self, catalog: &Catalog) {
+        // Tracks come first, so that readers of the catalog find them.
+        self.follow(catalog);
+        write(&mut self.catalog, catalog.encode(), true, &self.shared);
     }
 
     fn state(&mut self, frame: Vec<u8>, new_group: bool) {
         write(&mut self.state, frame, new_group, &self.shared);
     }
 
-    fn probes(&mut self, field: u32, frame: EncodedRegion) {
-        let tracks = self.probes.get_mut(field as usize);
-        let layers = tracks.and_then(|tracks| tracks.get_mut(frame.region as usize));
-        if let Some(track) = layers.and_then(|layers| layers.get_mut(usize::from(frame.layer))) {
+    fn light(&mut self, field: u32, frame: EncodedRegion) {
+        let track = LightTrack { field, region: frame.region, layer: frame.layer };
+        if let Some(track) = self.light.get_mut(&track) {
             write(track, frame.bytes, frame.new_group, &self.shared);
         }
     }

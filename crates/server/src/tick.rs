@@ -38,7 +38,7 @@ pub struct TickOptions {
     pub volumes: Vec<VolumeSpec>,
     /// Edits at set times.
     pub script: Option<Script>,
-    /// What computes the light, for the catalog ([`lumencast_codec::Field::source`]).
+    /// What computes the light, for the catalog ([`lumencast_codec::FieldInfo::source`]).
     pub source: String,
 }
 
@@ -155,6 +155,7 @@ impl Tick {
             },
             tick_seconds: self.options.period,
             fields: self.fields.iter().map(|f| f.describe(&self.options.source)).collect(),
+            unknown: Vec::new(),
         }
     }
 
@@ -226,10 +227,10 @@ impl Tick {
 
         let watched = !frames.is_empty();
         if self.scales_are_news() {
-            outlet.catalog(self.catalog().encode());
+            outlet.catalog(&self.catalog());
         }
         for (field, frame) in frames {
-            outlet.probes(field, frame);
+            outlet.light(field, frame);
         }
         report.seconds[Stage::Publish as usize] += watch.lap();
 

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
-use lumencast_codec::{EncodedRegion, Epoch};
+use lumencast_codec::{Catalog, EncodedRegion, Epoch};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Grid, Order, ProbeVolume};
 use lumencast_scene::{
@@ -25,9 +25,9 @@ impl Outlet for Nowhere {
     fn is_watched(&self, _: u32, _: u32) -> bool {
         false
     }
-    fn catalog(&mut self, _: Vec<u8>) {}
+    fn catalog(&mut self, _: &Catalog) {}
     fn state(&mut self, _: Vec<u8>, _: bool) {}
-    fn probes(&mut self, _: u32, _: EncodedRegion) {}
+    fn light(&mut self, _: u32, _: EncodedRegion) {}
 }
 
 fn tracer() -> CpuPathTracer {
@@ -52,7 +52,7 @@ fn baked(scene: &mut Scene, fit: Option<FitOptions>) -> ProbeVolume {
     let snapshot: Arc<_> = scene.snapshot();
     let effort = Effort::of_samples(4096);
     let light = bake(&snapshot, &volumes(), &mut tracer(), effort, gather(fit), |_| ());
-    light.expect("a volume").volumes.remove(0)
+    light.expect("a volume").fields.remove(0).into_volume().expect("a volume")
 }
 
 /// Root of the mean square of the differences of irradiance on the floor and three walls, over the
@@ -167,7 +167,7 @@ fn what_stands_on_the_border_is_lit_from_outside() {
         let volume = VolumeSpec { grid, order: Order::L2 };
         let (effort, gather) = (Effort::of_samples(1024), gather(Some(FIT)));
         let light = bake(&stage.snapshot(), &[volume], &mut tracer(), effort, gather, |_| ());
-        let light = light.expect("a volume").volumes.remove(0);
+        let light = light.expect("a volume").fields.remove(0).into_volume().expect("a volume");
         for normal in Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
             let (u, v) = normal.any_orthonormal_pair();
             for (x, y) in [(0.0, 0.0), (0.8, 0.3), (-0.5, 0.9)] {

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use glam::{DVec3, Vec3};
-use lumencast_codec::{Catalog, EncodedRegion, Epoch, ProbeDecoder, StateFrame};
+use lumencast_codec::{Catalog, EncodedRegion, Epoch, ProbeDecoder, StateFrame, VolumeShape};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Gathered, Job, Progress, Ticket};
 use lumencast_light::ProbeVolume;
@@ -33,8 +33,8 @@ impl Outlet for Kept {
         !self.unwatched
     }
 
-    fn catalog(&mut self, frame: Vec<u8>) {
-        self.catalogs.push(Catalog::decode(&frame).expect("a catalog"));
+    fn catalog(&mut self, catalog: &Catalog) {
+        self.catalogs.push(Catalog::decode(&catalog.encode()).expect("a catalog"));
     }
 
     fn state(&mut self, frame: Vec<u8>, new_group: bool) {
@@ -43,9 +43,14 @@ impl Outlet for Kept {
         self.states.push(state);
     }
 
-    fn probes(&mut self, field: u32, frame: EncodedRegion) {
+    fn light(&mut self, field: u32, frame: EncodedRegion) {
         self.frames.push((field, frame));
     }
+}
+
+/// The shape of a catalog's volume.
+fn shape(catalog: &Catalog, field: usize) -> VolumeShape {
+    catalog.fields[field].shape.as_volume().expect("a volume").clone()
 }
 
 /// A cornell with few probes, and the kept frames.
@@ -218,7 +223,7 @@ fn far_rooms_are_lit_as_near_ones() {
                 let sum: Vec3 = (0..volume.grid.probe_count()).map(|i| volume.probe(i)[0]).sum();
                 sum.x / volume.grid.probe_count() as f32
             };
-            let center = stepped.tick.catalog().fields[1].grid.center;
+            let center = shape(&stepped.tick.catalog(), 1).grid.center;
             assert_eq!(center, rooms.world(Vec3::new(2.0, 1.5, 0.0)), "clients know the world's");
             stepped.tick.volumes().map(mean).collect::<Vec<f32>>()
         });
@@ -493,8 +498,7 @@ fn a_late_tick_takes_fewer_samples_next_time() {
 fn what_is_sent_decodes_to_the_light() {
     let mut stepped = Stepped::new(options());
     stepped.steps(9);
-    let catalog = stepped.tick.catalog();
-    let field = &catalog.fields[0];
+    let field = shape(&stepped.tick.catalog(), 0);
     let mut decoders: Vec<ProbeDecoder> =
         field.regions.iter().map(|r| ProbeDecoder::new(r.size, field.order)).collect();
     let mut last = None;
@@ -607,7 +611,11 @@ fn a_volume_too_deep_for_clients_is_sent_in_pieces() {
     let whole = deep.volumes[0].grid;
     let mut stepped = Stepped::new(deep);
     let catalog = Catalog::decode(&stepped.tick.catalog().encode()).expect("a catalog");
-    let fields: Vec<_> = catalog.fields.iter().map(|f| (f.id, f.grid.resolution.z)).collect();
+    let fields: Vec<_> = catalog
+        .fields
+        .iter()
+        .map(|f| (f.id, f.shape.as_volume().unwrap().grid.resolution.z))
+        .collect();
     assert_eq!(fields, [(0, 20), (1, 20)]);
     stepped.steps(1);
     let sent: BTreeSet<u32> = stepped.kept.frames.iter().map(|(field, _)| *field).collect();
@@ -664,7 +672,7 @@ fn the_catalog_is_sent_again_when_a_scale_changes() {
     stepped.steps(100);
     let last = stepped.kept.catalogs.last().expect("catalogs");
     assert_eq!(last, &stepped.tick.catalog(), "the last is true in the end");
-    assert!(stepped.kept.catalogs.iter().all(|c| c.fields[0].has_shape_of(&last.fields[0])));
+    assert!(stepped.kept.catalogs.iter().all(|c| c.fields[0].shape == last.fields[0].shape));
 }
 
 /// The material of the ceiling light.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use clap::Args;
-use lumencast_codec::{EncodedRegion, Epoch, ProbeHeader};
+use lumencast_codec::{Catalog, EncodedRegion, Epoch, ProbeHeader};
 use lumencast_gather::path_trace::Levels;
 use lumencast_server::{Mail, Outlet, Report, Stage, Tick};
 use serde_json::{Value, json};
@@ -156,15 +156,15 @@ impl Outlet for Sent {
         true
     }
 
-    fn catalog(&mut self, frame: Vec<u8>) {
-        self.catalog += frame.len() as u64;
+    fn catalog(&mut self, catalog: &Catalog) {
+        self.catalog += catalog.encode().len() as u64;
     }
 
     fn state(&mut self, frame: Vec<u8>, _: bool) {
         self.state += frame.len() as u64;
     }
 
-    fn probes(&mut self, field: u32, frame: EncodedRegion) {
+    fn light(&mut self, field: u32, frame: EncodedRegion) {
         *self.probes.entry((field, frame.layer)).or_default() += frame.bytes.len() as u64;
         let probes = ProbeHeader::read(&frame.bytes).map_or(0, |header| header.probes()) as f64;
         self.squared_error += f64::from(frame.error).powi(2) * probes;

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::{Result, ensure};
 use glam::{Affine3A, UVec2, Vec3};
-use lumencast_light::{Light, ProbeVolume};
+use lumencast_light::{Field, Light};
 use lumencast_picture::{Picture, exposure};
 use lumencast_scene::{Scene, View};
 use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadows, Transparency};
@@ -45,10 +45,10 @@ impl Render {
         renderer.set_scene(&snapshot);
         let mut probes = 0;
         if settings.lighting.indirect {
-            let volumes = self.volumes(scene, light)?;
-            probes = volumes.iter().map(|volume| volume.grid.probe_count()).sum();
+            let light = Light::new(self.fields(scene, light)?);
+            probes = light.volumes().map(|volume| volume.grid.probe_count()).sum();
             let (offset, window) = (self.raster.reading.offset, self.raster.window);
-            renderer.set_light(&Light::new(volumes).seen(offset, window))?;
+            renderer.set_light(&light.seen(offset, window))?;
         }
         let grid = self.raster.views.unwrap_or(UVec2::ONE);
         let views = views(&view, grid, self.raster.view_spacing);
@@ -100,11 +100,11 @@ impl Render {
         }
     }
 
-    /// The field given, or else one computed for this picture.
-    fn volumes(&self, scene: &mut Scene, light: Option<Found>) -> Result<Vec<ProbeVolume>> {
+    /// The fields given, or else those computed for this picture.
+    fn fields(&self, scene: &mut Scene, light: Option<Found>) -> Result<Vec<Field>> {
         if let Some(light) = light {
             light.check_fits(scene);
-            return Ok(light.volumes);
+            return Ok(light.fields);
         }
         let computed = Computed {
             effort: self.raster.effort.with(self.raster.probe_samples),
@@ -115,7 +115,7 @@ impl Render {
         };
         let mut tracer = computed.tracer()?;
         let specs = self.scene.volumes(scene, &mut tracer)?;
-        Ok(computed.volumes(&scene.snapshot(), &specs, &mut tracer)?.volumes)
+        Ok(computed.volumes(&scene.snapshot(), &specs, &mut tracer)?.fields)
     }
 
     fn report_drawn(

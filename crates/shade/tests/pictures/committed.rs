@@ -89,7 +89,7 @@ fn cornell() -> Drawn {
     let options = GatherOptions::default();
     let effort = Effort::of_samples(1024);
     let light = bake(&snapshot, &[volume], &mut tracer, effort, options, |_| ()).unwrap();
-    Drawn { scene: snapshot, light: Light::new(light.volumes), view, exposure: 2.0 }
+    Drawn { scene: snapshot, light: Light::new(light.fields), view, exposure: 2.0 }
 }
 
 /// Two rows of balls, metal and plastic, smooth to rough, and a glass one, under a sun, a lamp and a

@@ -121,7 +121,7 @@ fn light_is_turned_as_the_tracers() {
         let light = bake(&alone, &[volume], &mut tracer, effort, GatherOptions::default(), |_| ());
         let scene = scene(alone.environment.clone(), true);
         let mut renderer = renderer(&scene, &settings);
-        renderer.set_light(&Light::new(light.unwrap().volumes)).unwrap();
+        renderer.set_light(&Light::new(light.unwrap().fields)).unwrap();
         let picture = renderer.pictures(&[view], &settings).unwrap().remove(0);
         difference(name, &picture, &reference, 0.03)
     };

@@ -166,7 +166,7 @@ impl BenchPeers {
         let (bounces, clamp) = (self.bounces, f32::INFINITY);
         let computed = Computed { effort, bounces, clamp, reading, tracing };
         let mut tracer = computed.tracer()?;
-        Ok(Light::new(computed.volumes(snapshot, &[grid], &mut tracer)?.volumes))
+        Ok(Light::new(computed.volumes(snapshot, &[grid], &mut tracer)?.fields))
     }
 
     fn write(&self, subject: &Subject, name: &str, picture: &Picture) -> Result<()> {

@@ -43,7 +43,7 @@ impl BenchQuality {
         let mut tracer = computed.tracer()?;
         let start = Instant::now();
         let baked = computed.volumes(&subject.snapshot, &[spec], &mut tracer)?;
-        let light = Light::new(baked.volumes);
+        let light = Light::new(baked.fields);
         let seconds = start.elapsed().as_secs_f64();
         Ok(Field {
             name: format!("{} L{} {bounces} bounces{how}", cells(&spec), u8::from(spec.order)),

@@ -1,9 +1,9 @@
 //! The same scene's light as a server casts it, some seconds after it began.
 
 use anyhow::Result;
-use lumencast_codec::{EncodedRegion, Epoch};
+use lumencast_codec::{Catalog, EncodedRegion, Epoch};
 use lumencast_gather::path_trace::CpuPathTracer;
-use lumencast_light::ProbeVolume;
+use lumencast_light::Field;
 use lumencast_scene::{Scene, VolumeSpec};
 use lumencast_server::{GatherOptions, Mail, Outlet, SampleRange, Tick, TickOptions};
 
@@ -18,7 +18,7 @@ pub(super) fn light(
     gather: GatherOptions,
     samples: u32,
     seconds: f64,
-) -> Result<Vec<ProbeVolume>> {
+) -> Result<Vec<Field>> {
     let options = TickOptions {
         samples: SampleRange::fixed(samples),
         gather,
@@ -33,7 +33,7 @@ pub(super) fn light(
         bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(tick.volumes().cloned().collect())
+    Ok(tick.volumes().cloned().map(Field::from).collect())
 }
 
 /// Takes nothing.
@@ -44,9 +44,9 @@ impl Outlet for Nobody {
         false
     }
 
-    fn catalog(&mut self, _: Vec<u8>) {}
+    fn catalog(&mut self, _: &Catalog) {}
 
     fn state(&mut self, _: Vec<u8>, _: bool) {}
 
-    fn probes(&mut self, _: u32, _: EncodedRegion) {}
+    fn light(&mut self, _: u32, _: EncodedRegion) {}
 }

@@ -13,7 +13,7 @@ use clap::Args;
 use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
 use lumencast_gather::reference::{self, Film, Parts, PictureSettings};
-use lumencast_light::{Light, ProbeVolume};
+use lumencast_light::{Field, Light};
 use lumencast_picture::{Picture, ToneMap, exposure};
 use lumencast_scene::{Edit, Environment, Scene, Snapshot, View};
 use lumencast_server::Effort;
@@ -171,8 +171,8 @@ impl BenchScenes {
         let mut bake = |computed: Computed| computed.volumes(&snapshot, &specs, &mut tracer);
         let baked = bake(usual)?;
         let mut picture_of =
-            |volumes: Vec<ProbeVolume>| draw_light(renderer, volumes, subject.view, &settings);
-        let picture = picture_of(baked.volumes)?;
+            |fields: Vec<Field>| draw_light(renderer, fields, subject.view, &settings);
+        let picture = picture_of(baked.fields)?;
         let mut judge;
         loop {
             judge = Judge::new(film.picture()?, covered.clone(), exposure)?;
@@ -198,7 +198,7 @@ impl BenchScenes {
             let more = bake(computed(drawn, effort))?;
             beside.push(Beside {
                 what: format!("{times} times the samples"),
-                psnr: judge.psnr(&picture_of(more.volumes)?)?,
+                psnr: judge.psnr(&picture_of(more.fields)?)?,
             });
         }
         if let Some(seconds) = self.live {
@@ -207,7 +207,7 @@ impl BenchScenes {
             let converged = bake(computed(served, effort))?;
             beside.push(Beside {
                 what: "as served, converged".to_owned(),
-                psnr: judge.psnr(&picture_of(converged.volumes)?)?,
+                psnr: judge.psnr(&picture_of(converged.fields)?)?,
             });
             let gather = served.gathered(BOUNCES - 1, f32::INFINITY, BlendSettings::default());
             let samples = self.live_samples;
@@ -247,11 +247,11 @@ fn computed(reading: Reading, effort: Effort) -> Computed {
 /// Its indirect part.
 fn draw_light(
     renderer: &mut Renderer,
-    volumes: Vec<ProbeVolume>,
+    fields: Vec<Field>,
     view: View,
     settings: &Settings,
 ) -> Result<Picture> {
-    renderer.set_light(&Light::new(volumes))?;
+    renderer.set_light(&Light::new(fields))?;
     draw(renderer, view, settings, Lighting::INDIRECT)
 }
 
