@@ -189,7 +189,8 @@ fn strangers() -> Value {
         let light = server.light(1.0);
         steps.frame(0.0, FIELD, &light[0], refused("no_catalog"));
         let mut catalog = server.catalog();
-        let hologram = json!({ "id": 8, "kind": "hologram", "use": "all", "shape": { "layers": 3 } });
+        let hologram =
+            json!({ "id": 8, "kind": "hologram", "use": "all", "shape": { "layers": 3 } });
         catalog["fields"].as_array_mut().expect("a list").push(hologram);
         steps.catalog(0.0, catalog);
         steps.frame(0.0, 8, &light[0], refused("unknown"));

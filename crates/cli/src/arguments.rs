@@ -8,14 +8,16 @@ use anyhow::{Context, Result, ensure};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::{Quat, UVec3, Vec3};
+use lumencast_codec::check_volumes;
 use lumencast_gather::Gather;
-use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Levels, MaterialModel, Options};
 use lumencast_light::{Grid, Offset, Order};
 use lumencast_scene::{Edit, FileContents, Scene, Script, VolumeSpec};
-use lumencast_server::{Effort, FitOptions, GatherOptions, SampleRange, Survey, TickOptions};
+use lumencast_server::{SampleRange, TickOptions};
 #[cfg(feature = "gpu")]
 use lumencast_shade::Occlusion;
+use lumencast_solve::blend::BlendSettings;
+use lumencast_solve::{Effort, FitOptions, GatherOptions, Survey};
 
 use crate::environment::EnvironmentArgument;
 use crate::output::tell;
@@ -120,11 +122,11 @@ impl SceneArguments {
             volumes.push(volume.in_scene(scene).context("--volume")?);
         }
         if volumes.is_empty() {
-            volumes = lumencast_server::volumes(scene, gatherer)?;
+            volumes = lumencast_solve::volumes(scene, gatherer)?;
         }
         for (number, volume) in volumes.iter_mut().enumerate() {
             volume.order = self.order.unwrap_or(volume.order);
-            let survey = lumencast_server::survey(&scene.snapshot(), volume, gatherer)?;
+            let survey = lumencast_solve::survey(&scene.snapshot(), volume, gatherer)?;
             if survey.is_mostly_useless() {
                 let Survey { probes, buried, lost } = survey;
                 tell!(
@@ -134,6 +136,8 @@ impl SceneArguments {
                 );
             }
         }
+        // Light that nobody can be sent, or save, need not be computed.
+        check_volumes(&volumes)?;
         Ok(volumes)
     }
 }

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 use lumencast_codec::{Epoch, LightFile, SavedFile, SceneInfo, UpdateInfo};
-use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::Levels;
 use lumencast_light::Field;
 use lumencast_scene::{FileContents, Scene};
-use lumencast_server::Baked;
+use lumencast_solve::Baked;
+use lumencast_solve::blend::BlendSettings;
 use serde_json::json;
 
 use crate::arguments::{EffortArguments, GatherArguments, MOST_SAMPLES, SceneArguments, source};
@@ -59,7 +59,7 @@ impl Bake {
         let bar = output::share_bar("Computing light");
         let effort = self.effort.with(self.samples);
         let baked =
-            lumencast_server::bake(&snapshot, &volumes, &mut *gatherer, effort, options, |done| {
+            lumencast_solve::bake(&snapshot, &volumes, &mut *gatherer, effort, options, |done| {
                 light_source::show(&bar, done);
             });
         bar.finish_and_clear();

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use lumencast_codec::{Catalog, DecodeError, LightFile};
-use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::Field;
 use lumencast_scene::{Edit, Scene, Snapshot, VolumeSpec};
-use lumencast_server::{Baked, Done, Effort};
+use lumencast_solve::blend::BlendSettings;
+use lumencast_solve::{Baked, Done, Effort};
 
 use crate::arguments::Reading;
 use crate::output::{self, tell};
@@ -94,7 +94,7 @@ impl Computed {
     ) -> Result<Baked> {
         let gather = self.reading.gathered(self.bounces, self.clamp, BlendSettings::default());
         let bar = output::share_bar("Computing light");
-        let light = lumencast_server::bake(scene, volumes, tracer, self.effort, gather, |done| {
+        let light = lumencast_solve::bake(scene, volumes, tracer, self.effort, gather, |done| {
             show(&bar, done);
         });
         bar.finish_and_clear();

@@ -103,7 +103,8 @@ impl FieldInfo {
 impl Shape {
     /// Whether an entry of a catalog is of a kind, and in a basis, that this program knows.
     fn is_known(entry: &Value) -> bool {
-        entry["kind"] == "volume" && entry["shape"]["basis"] == "sh"
+        let is_other = entry["shape"].is_object() && entry["shape"]["basis"] != "sh";
+        entry["kind"] == "volume" && !is_other
     }
 
     fn validated(self) -> Result<Self, DecodeError> {

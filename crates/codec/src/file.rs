@@ -8,8 +8,8 @@ use lumencast_scene::Edit;
 use crate::bytes::{Reader, put_varint};
 use crate::state::{read_edits, write_edits};
 use crate::{
-    Catalog, DecodeError, Epoch, FieldInfo, ProbeDecoder, ProbeEncoder, ProbeHeader, SceneInfo,
-    Shape, UpdateInfo, limits,
+    Catalog, DecodeError, Epoch, FieldEncoder, ProbeDecoder, ProbeHeader, SceneInfo, Shape,
+    UpdateInfo, limits,
 };
 
 const MAGIC: &[u8; 8] = b"LUMENCST";
@@ -59,7 +59,7 @@ pub struct SavedFrame {
 }
 
 impl LightFile {
-    /// Encodes fields; `source` says what computed them ([`FieldInfo::source`]), `info` when and from
+    /// Encodes fields; `source` says what computed them ([`crate::FieldInfo::source`]), `info` when and from
     /// which scene (its `update` becomes 0).
     pub fn of_fields<'a>(
         epoch: Epoch,
@@ -73,18 +73,14 @@ impl LightFile {
         let mut infos = Vec::new();
         let mut frames = Vec::new();
         for field in fields {
-            match field {
-                Field::Volume(volume) => {
-                    let mut encoder = ProbeEncoder::new(volume.grid.resolution, volume.order);
-                    let encoded = encoder.encode(volume, info, |_| true);
-                    infos.push(FieldInfo::of_volume(volume, encoder.scale_log2(), source));
-                    frames.extend(encoded.into_iter().map(|frame| SavedFrame {
-                        field: volume.id.0,
-                        region: frame.region,
-                        bytes: frame.bytes,
-                    }));
-                }
-            }
+            let mut encoder = FieldEncoder::new(field);
+            let encoded = encoder.encode(field, info, |_| true);
+            infos.push(encoder.describe(field, source));
+            frames.extend(encoded.into_iter().map(|frame| SavedFrame {
+                field: field.id().0,
+                region: frame.region,
+                bytes: frame.bytes,
+            }));
         }
         let catalog = Catalog { epoch, scene, tick_seconds, fields: infos, unknown: Vec::new() };
         Self { catalog, edits: Vec::new(), files: Vec::new(), frames }

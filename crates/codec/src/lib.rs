@@ -10,6 +10,7 @@ mod bytes;
 mod catalog;
 mod epoch;
 mod error;
+mod field_encoder;
 mod field_info;
 mod file;
 pub mod limits;
@@ -18,10 +19,12 @@ mod range_coder;
 mod state;
 pub mod tracks;
 mod volume_shape;
+mod volumes;
 
 pub use catalog::{Catalog, SceneInfo};
 pub use epoch::Epoch;
 pub use error::DecodeError;
+pub use field_encoder::FieldEncoder;
 pub use field_info::{FieldInfo, Shape, UnknownField, Use};
 pub use file::{LightFile, SavedFile, SavedFrame};
 pub use probe::{
@@ -31,6 +34,7 @@ pub use probe::{
 pub use state::{AcceptedEdit, ClientEdit, RefusedEdit, SceneState, StateFrame};
 pub use tracks::LightTrack;
 pub use volume_shape::{Basis, VolumeShape};
+pub use volumes::{VolumesError, check_volumes};
 
 /// The version of the wire format and of files, `lumencast` in a catalog.
 pub const VERSION: u64 = 1;

@@ -4,9 +4,7 @@
 //! volumes or lightmaps. It works on its own threads; the caller submits and polls.
 
 mod accel;
-pub mod blend;
 mod bsdf;
-pub mod fit;
 mod lights;
 pub mod measure;
 pub mod path_trace;

@@ -10,6 +10,7 @@
 mod field;
 mod field_id;
 mod light;
+mod luminance;
 mod place;
 mod scale;
 pub mod sh;
@@ -19,6 +20,7 @@ pub mod zh;
 pub use field::Field;
 pub use field_id::FieldId;
 pub use light::Light;
+pub use luminance::luminance;
 pub use place::{OnTriangle, Place};
 pub use scale::ScaleRule;
 pub use sh::{Order, Sh};

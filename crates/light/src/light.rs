@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::sh::{Sh, convolve};
 use crate::zh::{self, Bands};
-use crate::{Field, Offset, Order, Place, ProbeVolume};
+use crate::{Field, FieldId, Offset, Order, Place, ProbeVolume};
 
 /// The light of a scene: fields, of which the finer volumes are laid over the coarser.
 ///
@@ -53,6 +53,11 @@ impl Light {
     /// The fields, to give them other light.
     pub fn fields_mut(&mut self) -> &mut [Field] {
         &mut self.fields
+    }
+
+    /// The field of a number.
+    pub fn field(&self, id: FieldId) -> Option<&Field> {
+        self.fields.iter().find(|field| field.id() == id)
     }
 
     /// The fields as they are.
@@ -158,7 +163,7 @@ fn layer(field: &Field) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FieldId, Grid, Order};
+    use crate::Grid;
     use glam::{Quat, UVec3};
 
     fn uniform(id: u32, center: Vec3, size: f32, cells: u32, value: f32) -> ProbeVolume {

@@ -2,36 +2,26 @@
 
 use std::path::PathBuf;
 
+use lumencast_codec::VolumesError;
+use lumencast_solve::SolveError;
 use thiserror::Error;
 
 /// What keeps a server from running.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ServerError {
-    /// A volume of probes that the wire format cannot carry.
-    #[error("volume {volume}: {reason}")]
-    Volume {
-        /// Its number among the scene's volumes.
-        volume: u32,
-        /// What is wrong with it, and what to do.
-        reason: String,
-    },
-    /// More fields than a catalog holds.
-    #[error(
-        "{0} fields; a catalog holds at most {max}: give fewer volumes, or fewer cells along z, of \
-         which 34 make a field",
-        max = lumencast_codec::limits::FIELDS
-    )]
-    TooManyFields(usize),
+    /// Volumes of probes that the wire format cannot carry.
+    #[error(transparent)]
+    Volumes(#[from] VolumesError),
     /// A source that does not fit a catalog.
     #[error(
         "source {0:?}: at most {max} bytes of text, no control characters",
         max = lumencast_codec::limits::SOURCE_BYTES
     )]
     Source(String),
-    /// Light that was being computed is not coming.
-    #[error("the gatherer gave up a job; its log says why")]
-    Gather,
+    /// Light that cannot be computed.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
     /// The folder of the page cannot be read.
     #[error("cannot read the page in {folder}: {error}")]
     Page {

@@ -7,40 +7,31 @@
 
 #![forbid(unsafe_code)]
 
-mod bake;
 mod contents;
 mod edits;
 mod error;
-mod field;
 mod files;
-mod gather_options;
 mod http;
 mod inbox;
 mod loader;
 mod media_type;
 mod metrics;
 mod names;
-mod noise;
 mod open_file;
 mod pace;
 mod page;
-mod placement;
 mod publish;
+mod published;
 mod report;
 mod server;
-mod surfaces;
 mod temporary;
 mod tick;
-mod walls;
 
-pub use bake::{Baked, Done, Effort, bake};
 pub use error::ServerError;
-pub use gather_options::{FitOptions, GatherOptions};
 pub use inbox::{Inbox, Limits, Mail, Received, Verdict};
 pub use metrics::Metrics;
 pub use pace::{Beat, Budget, SampleRange};
 pub use page::is_embedded as page_is_embedded;
-pub use placement::{Survey, default_volume, survey, volumes};
 pub use publish::Outlet;
 pub use report::{Report, Stage};
 pub use server::{Server, ServerConfig};

@@ -5,20 +5,19 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use lumencast_codec::{
-    AcceptedEdit, Catalog, EncodedRegion, Epoch, RefusedEdit, SceneInfo, SceneState, StateFrame,
-    limits,
+    AcceptedEdit, Catalog, EncodedRegion, Epoch, FieldInfo, RefusedEdit, SceneInfo, SceneState,
+    StateFrame, check_volumes, limits,
 };
-use lumencast_gather::{Gather, Ticket};
-use lumencast_light::{Light, ProbeVolume};
+use lumencast_gather::{Gather, Gathered, Ticket};
+use lumencast_light::Light;
 use lumencast_scene::{Edit, FileRead, Scene, Script, Snapshot, VolumeSpec};
+use lumencast_solve::{Asked, FitEffort, GatherOptions, Request, Solver, volumes};
 
 use crate::error::ServerError;
-use crate::field::{Brought, Field, Moment, publish};
-use crate::gather_options::GatherOptions;
 use crate::inbox::{Mail, Received, refusal};
 use crate::pace::{Budget, SampleRange};
-use crate::placement;
 use crate::publish::Outlet;
+use crate::published::{Moment, Published};
 use crate::report::{Report, Stage, Stopwatch};
 use crate::temporary::Temporary;
 
@@ -58,7 +57,7 @@ impl Default for TickOptions {
 }
 
 /// Rounds and steps of a tick's fit, which goes on from the last one's.
-const FIT_EFFORT: (u32, u32) = (1, 4);
+const FIT_EFFORT: FitEffort = FitEffort { rounds: 1, steps: 4 };
 /// A snapshot of the scene goes out at least every so many ticks, for those who join.
 const SNAPSHOT_EVERY: u64 = 64;
 /// Ticks from one catalog to the next at least: light that flickers is not to fill slow links with
@@ -78,7 +77,9 @@ const LONGEST_STEP: f64 = 0.5;
 pub struct Tick {
     scene: Scene,
     gatherer: Box<dyn Gather>,
-    fields: Vec<Field>,
+    solver: Solver,
+    /// The solver's fields, in its order.
+    published: Vec<Published>,
     options: TickOptions,
     budget: Budget,
     epoch: Epoch,
@@ -91,10 +92,6 @@ pub struct Tick {
     snapshot_bytes: usize,
     /// The tick in which that was measured last.
     measured: Option<u64>,
-    /// Of each field, the moment that its light shows; none before there is any.
-    shown: Vec<Option<Moment>>,
-    /// Of each field, how many of its jobs have failed.
-    failures: Vec<u64>,
     last_now: Option<f64>,
     temporary: Temporary,
     last: Report,
@@ -116,19 +113,22 @@ impl Tick {
             return Err(ServerError::Source(source.clone()));
         }
         let volumes = if options.volumes.is_empty() {
-            placement::volumes(&mut scene, &mut *gatherer)?
+            volumes(&mut scene, &mut *gatherer)?
         } else {
             options.volumes.clone()
         };
-        let fields = Field::all(&volumes, &options.gather)?;
-        let told_scales = fields.iter().map(Field::scale_log2).collect();
+        check_volumes(&volumes)?;
+        let solver = Solver::new(&volumes, options.gather)?;
+        let fields = solver.ids().filter_map(|id| solver.light().field(id));
+        let published: Vec<Published> = fields.map(Published::new).collect();
+        let told_scales = vec![None; published.len()];
         let budget = Budget::new(options.period, options.samples);
         let last = Report::default();
-        let (shown, failures) = (vec![None; fields.len()], vec![0; fields.len()]);
         Ok(Self {
             scene,
             gatherer,
-            fields,
+            solver,
+            published,
             options,
             budget,
             epoch,
@@ -137,8 +137,6 @@ impl Tick {
             next_catalog: 0,
             snapshot_bytes: 0,
             measured: None,
-            shown,
-            failures,
             last_now: None,
             temporary: Temporary::default(),
             last,
@@ -154,7 +152,7 @@ impl Tick {
                 root: self.scene.root_file().to_owned(),
             },
             tick_seconds: self.options.period,
-            fields: self.fields.iter().map(|f| f.describe(&self.options.source)).collect(),
+            fields: self.describe(),
             unknown: Vec::new(),
         }
     }
@@ -169,14 +167,18 @@ impl Tick {
         self.scene.take_in(file);
     }
 
-    /// The light as it was last published, a volume each.
-    pub fn volumes(&self) -> impl Iterator<Item = &ProbeVolume> {
-        self.fields.iter().map(Field::volume)
+    /// The fields as the catalog lists them.
+    fn describe(&self) -> Vec<FieldInfo> {
+        let describe = |published: &Published| {
+            let field = self.solver.light().field(published.id)?;
+            Some(published.describe(field, &self.options.source))
+        };
+        self.published.iter().filter_map(describe).collect()
     }
 
-    /// The same as one field.
-    fn light(&self) -> Light {
-        Light::new(self.volumes().cloned())
+    /// The light as it was last published.
+    pub fn light(&self) -> &Light {
+        self.solver.light()
     }
 
     /// The number of the next tick.
@@ -199,7 +201,7 @@ impl Tick {
 
         let edits = self.apply_edits(elapsed, mail);
         if !edits.accepted.is_empty() {
-            self.fields.iter_mut().for_each(Field::expect_change);
+            self.solver.expect_change();
         }
         report.seconds[Stage::Edits as usize] = watch.lap();
 
@@ -212,14 +214,14 @@ impl Tick {
         outlet.state(state, is_snapshot);
         report.seconds[Stage::Publish as usize] = watch.lap();
 
-        let gathered = self.gather(&scene);
-        let build_seconds = gathered.iter().flatten().map(|g| g.gathered.build_seconds);
+        let brought = self.gather(&scene);
+        let build_seconds = brought.iter().filter_map(Brought::build_seconds);
         let build = build_seconds.fold(0.0, f64::max);
         let gathering = watch.lap();
         report.seconds[Stage::Accelerate as usize] = build.min(gathering);
         report.seconds[Stage::Gather as usize] = gathering - build.min(gathering);
 
-        self.blend(&scene, &gathered);
+        self.blend(&scene, &brought);
         report.seconds[Stage::Blend as usize] = watch.lap();
 
         let frames = self.encode(outlet);
@@ -234,7 +236,7 @@ impl Tick {
         }
         report.seconds[Stage::Publish as usize] += watch.lap();
 
-        self.finish(now, &scene, &edits, &gathered, watched, report)
+        self.finish(now, &scene, &edits, &brought, watched, report)
     }
 
     /// Applies the script's edits that are due and then the clients', each whole or not at all.
@@ -295,69 +297,59 @@ impl Tick {
         self.snapshot_bytes <= room
     }
 
-    /// Light for every field, all fields' jobs under way at once; none where a job has failed.
-    fn gather(&mut self, scene: &Arc<Snapshot>) -> Vec<Option<Brought>> {
-        for field in look(&mut self.fields, &mut *self.gatherer, scene) {
-            self.note_failure(field, "its surfaces are those of an earlier moment");
+    /// Sums for every field, all fields' jobs under way at once.
+    fn gather(&mut self, scene: &Arc<Snapshot>) -> Vec<Brought> {
+        for Brought { asked, gathered } in self.wait(self.solver.looks(scene)) {
+            match gathered {
+                Some(found) => self.solver.take(&asked, &found),
+                None => self.published[asked.field]
+                    .note_failure("its surfaces are those of an earlier moment"),
+            }
         }
-        let samples = self.budget.samples();
-        let previous = self.options.feedback.then(|| Arc::new(self.light()));
-        let tickets: Vec<(Ticket, Vec<usize>)> = self
-            .fields
-            .iter_mut()
-            .map(|field| {
-                let seed = self.number << 8 | u64::from(field.id().0);
-                let (job, points) =
-                    field.job(scene.clone(), previous.clone(), samples, self.options.gather, seed);
-                (self.gatherer.submit(job), points)
-            })
-            .collect();
-        let bring = |(ticket, points)| {
-            let gathered = self.gatherer.wait(ticket)?;
-            Some(Brought { gathered, points })
-        };
+        let previous = self.options.feedback.then(|| Arc::new(self.light().clone()));
+        let (samples, pass) = (self.budget.samples(), self.number);
+        let requests = self.solver.jobs(scene, previous, samples, pass).collect();
+        self.wait(requests)
+    }
+
+    /// Submits all requests and waits for what they bring.
+    fn wait(&mut self, requests: Vec<Request>) -> Vec<Brought> {
+        let submit = |Request { job, asked }| (self.gatherer.submit(job), asked);
+        let tickets: Vec<(Ticket, Asked)> = requests.into_iter().map(submit).collect();
+        let bring = |(ticket, asked)| Brought { asked, gathered: self.gatherer.wait(ticket) };
         tickets.into_iter().map(bring).collect()
     }
 
     /// Takes in what was gathered; a field whose job has failed keeps its light.
-    fn blend(&mut self, scene: &Snapshot, gathered: &[Option<Brought>]) {
-        for (number, brought) in gathered.iter().enumerate() {
-            let Some(brought) = brought else {
-                self.note_failure(number, "it keeps its light");
+    fn blend(&mut self, scene: &Snapshot, brought: &[Brought]) {
+        for Brought { asked, gathered } in brought {
+            let published = &mut self.published[asked.field];
+            let Some(gathered) = gathered else {
+                published.note_failure("it keeps its light");
                 continue;
             };
-            self.fields[number].blend(brought);
+            self.solver.take(asked, gathered);
             let (tick, time, version) = (self.number, scene.time, scene.version);
-            self.shown[number] = Some(Moment { tick, time, version });
+            published.shown = Some(Moment { tick, time, version });
         }
-        publish(&mut self.fields, FIT_EFFORT);
-    }
-
-    /// Tells that a field's job has failed: the first time, and each time that it has failed twice as
-    /// often.
-    fn note_failure(&mut self, number: usize, outcome: &str) {
-        let (field, failures) = (self.fields[number].id().0, &mut self.failures[number]);
-        *failures += 1;
-        if failures.is_power_of_two() {
-            tracing::warn!(field, failures = *failures, "gathering light has failed: {outcome}");
-        }
+        self.solver.solve(FIT_EFFORT);
     }
 
     /// Frames of every field that has light, for the regions that somebody watches.
     fn encode(&mut self, outlet: &dyn Outlet) -> Vec<(u32, EncodedRegion)> {
         let mut frames = Vec::new();
-        for (field, shown) in self.fields.iter_mut().zip(&self.shown) {
-            let Some(moment) = *shown else { continue };
-            let id = field.id().0;
-            let encoded = field.encode(moment, |region| outlet.is_watched(id, region));
-            frames.extend(encoded.into_iter().map(|frame| (id, frame)));
+        for published in &mut self.published {
+            let id = published.id;
+            let Some(field) = self.solver.light().field(id) else { continue };
+            let encoded = published.encode(field, |region| outlet.is_watched(id.0, region));
+            frames.extend(encoded.into_iter().map(|frame| (id.0, frame)));
         }
         frames
     }
 
     /// Whether clients are to be told of another scale now; they count as told then.
     fn scales_are_news(&mut self) -> bool {
-        let scales: Vec<_> = self.fields.iter().map(Field::scale_log2).collect();
+        let scales: Vec<_> = self.published.iter().map(Published::scale_log2).collect();
         if scales == self.told_scales || self.number < self.next_catalog {
             return false;
         }
@@ -391,15 +383,15 @@ impl Tick {
         now: f64,
         scene: &Snapshot,
         edits: &Edits,
-        gathered: &[Option<Brought>],
+        brought: &[Brought],
         watched: bool,
         mut report: Report,
     ) -> Report {
-        let probes: usize = self.fields.iter().map(Field::probe_count).sum();
-        let buried: usize = self.fields.iter().map(Field::buried_count).sum();
+        let probes = self.solver.probe_count();
+        let buried = self.solver.buried_count();
         report.samples_a_probe = self.budget.samples();
         report.samples = probes as u64 * u64::from(report.samples_a_probe);
-        report.rays = gathered.iter().flatten().map(|g| g.gathered.rays).sum();
+        report.rays = brought.iter().filter_map(|b| b.gathered.as_ref()).map(|g| g.rays).sum();
         report.accepted = edits.accepted.len() as u64;
         report.refused = edits.refused.len() as u64;
         report.probes = probes as u64;
@@ -422,24 +414,16 @@ impl Tick {
     }
 }
 
-/// Lets the fields that want to know find the scene's surfaces; returns the numbers of those whose job
-/// has failed, which know what they knew.
-pub(crate) fn look(
-    fields: &mut [Field],
-    gatherer: &mut dyn Gather,
-    scene: &Arc<Snapshot>,
-) -> Vec<usize> {
-    let tickets: Vec<_> =
-        fields.iter().map(|field| Some(gatherer.submit(field.look(scene)?))).collect();
-    let mut failed = Vec::new();
-    for (number, ticket) in tickets.into_iter().enumerate() {
-        let Some(ticket) = ticket else { continue };
-        match gatherer.wait(ticket) {
-            Some(found) => fields[number].found(&found),
-            None => failed.push(number),
-        }
+/// What became of a request; nothing was gathered where its job has failed.
+struct Brought {
+    asked: Asked,
+    gathered: Option<Gathered>,
+}
+
+impl Brought {
+    fn build_seconds(&self) -> Option<f64> {
+        self.gathered.as_ref().map(|gathered| gathered.build_seconds)
     }
-    failed
 }
 
 /// Cuts reasons where many edits are refused, so that a frame holds all refusals.

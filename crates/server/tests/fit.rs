@@ -1,20 +1,14 @@
 //! Probes fitted to surfaces, tick by tick.
 
-use std::f32::consts::PI;
 use std::sync::Arc;
 
-use glam::{Quat, UVec3, Vec3};
+use glam::{UVec3, Vec3};
 use lumencast_codec::{Catalog, EncodedRegion, Epoch};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::{Grid, Order, ProbeVolume};
-use lumencast_scene::{
-    Edit, Environment, LightSpec, Material, NodeId, Scene, Transform, VolumeSpec,
-};
-use lumencast_server::{
-    Done, Effort, FitOptions, GatherOptions, Mail, Outlet, Received, SampleRange, Tick,
-    TickOptions, bake,
-};
-use lumencast_testkit::scenes::{Stage, lambert};
+use lumencast_light::ProbeVolume;
+use lumencast_scene::{Edit, LightSpec, NodeId, Scene, Transform, VolumeSpec};
+use lumencast_server::{Mail, Outlet, Received, SampleRange, Tick, TickOptions};
+use lumencast_solve::{Effort, FitOptions, GatherOptions, bake};
 
 const FIT: FitOptions = FitOptions { points: 16 };
 
@@ -110,7 +104,7 @@ impl Stepped {
     }
 
     fn light(&self) -> &ProbeVolume {
-        self.tick.volumes().next().expect("a volume")
+        self.tick.light().volumes().next().expect("a volume")
     }
 }
 
@@ -122,60 +116,6 @@ fn ticks_come_to_what_is_baked() {
     let plain = baked(&mut scene(), None);
     let [near, far] = [&fitted, &plain].map(|light| difference(stepped.light(), light));
     assert!(near < 0.12 && far > 3.0 * near, "{near} {far}");
-}
-
-/// Light goes on until its noise is as low as asked for, or to the samples allowed; and what it tells of
-/// its noise is true.
-#[test]
-fn baking_ends_by_its_noise() {
-    let snapshot = scene().snapshot();
-    for fit in [None, Some(FIT)] {
-        let light = |effort: Effort, told: &mut Vec<Done>| {
-            let progress = |done| told.push(done);
-            bake(&snapshot, &volumes(), &mut tracer(), effort, gather(fit), progress)
-                .expect("light")
-        };
-        let mut told = Vec::new();
-        let rough = light(Effort { samples: 1 << 20, noise: Some(4.0) }, &mut told);
-        assert!(rough.samples < 1 << 18 && rough.noise.is_some_and(|noise| noise <= 4.0));
-        assert_eq!(told.last().map(|done| (done.share, done.noise)), Some((1.0, rough.noise)));
-        assert!(told.windows(2).all(|pair| pair[0].share <= 1.0));
-        let noise = |samples| {
-            light(Effort { samples, noise: Some(1e-6) }, &mut Vec::new()).noise.expect("noise")
-        };
-        let ratio = noise(1024) / noise(16_384);
-        assert!(ratio > 2.0, "16 times the samples, a quarter of the noise at most: {ratio}");
-    }
-    let off =
-        bake(&snapshot, &volumes(), &mut tracer(), Effort::of_samples(300), gather(None), |_| ())
-            .expect("light");
-    assert_eq!((off.samples, off.noise), (300, None));
-}
-
-/// A closed box that its volume spans to the millimetre, under an even sky: all probes are within, and
-/// its faces, which none of them sees, are as bright as the sky.
-#[test]
-fn what_stands_on_the_border_is_lit_from_outside() {
-    for double_sided in [false, true] {
-        let mut stage = Stage::default();
-        let grey = Material { double_sided, ..lambert(Vec3::splat(0.5), Vec3::ZERO) };
-        let grey = stage.material(grey);
-        stage.room(Vec3::ZERO, Vec3::splat(-2.0), grey);
-        stage.environment(Environment::Constant { radiance: Vec3::ONE });
-        let (size, resolution) = (Vec3::splat(2.0), UVec3::splat(4));
-        let grid = Grid { center: Vec3::ZERO, rotation: Quat::IDENTITY, size, resolution };
-        let volume = VolumeSpec { grid, order: Order::L2 };
-        let (effort, gather) = (Effort::of_samples(1024), gather(Some(FIT)));
-        let light = bake(&stage.snapshot(), &[volume], &mut tracer(), effort, gather, |_| ());
-        let light = light.expect("a volume").fields.remove(0).into_volume().expect("a volume");
-        for normal in Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
-            let (u, v) = normal.any_orthonormal_pair();
-            for (x, y) in [(0.0, 0.0), (0.8, 0.3), (-0.5, 0.9)] {
-                let read = light.sample(normal + x * u + y * v, normal).irradiance(normal).y;
-                assert!((read / PI - 1.0).abs() < 0.1, "{read} at {x} {y} of {normal}");
-            }
-        }
-    }
 }
 
 /// A lamp four times as bright, and a box that stands elsewhere: light of the old scene is gone soon,

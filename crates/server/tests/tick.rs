@@ -13,8 +13,9 @@ use lumencast_scene::{
     Edit, InstanceSource, LightSpec, NodeId, Scene, Script, Transform, VolumeSpec,
 };
 use lumencast_server::{
-    GatherOptions, Inbox, Limits, Mail, Outlet, Received, Report, SampleRange, Tick, TickOptions,
+    Inbox, Limits, Mail, Outlet, Received, Report, SampleRange, Tick, TickOptions,
 };
+use lumencast_solve::GatherOptions;
 use lumencast_testkit::rooms::{Placed, Rooms};
 
 const PERIOD: f64 = 0.04;
@@ -46,6 +47,13 @@ impl Outlet for Kept {
     fn light(&mut self, field: u32, frame: EncodedRegion) {
         self.frames.push((field, frame));
     }
+}
+
+/// The volumes in the order in which they were asked for.
+fn volumes(stepped: &Stepped) -> Vec<ProbeVolume> {
+    let mut volumes: Vec<ProbeVolume> = stepped.tick.light().volumes().cloned().collect();
+    volumes.sort_by_key(|volume| volume.id);
+    volumes
 }
 
 /// The shape of a catalog's volume.
@@ -89,7 +97,7 @@ impl Stepped {
     }
 
     fn volume(&self) -> &ProbeVolume {
-        self.tick.volumes().next().expect("a volume")
+        self.tick.light().volumes().next().expect("a volume")
     }
 
     fn mean_c0(&self) -> f32 {
@@ -204,7 +212,7 @@ fn a_refused_edit_changes_nothing() {
 fn far_rooms_are_lit_as_near_ones() {
     let rooms = Rooms { at: DVec3::ZERO, placed: Placed::Flat, emission: 0.0 };
     let far = DVec3::new(1e6 + 0.37, 120.3, -1.3e6);
-    for fit in [None, Some(lumencast_server::FitOptions { points: 16 })] {
+    for fit in [None, Some(lumencast_solve::FitOptions { points: 16 })] {
         let [near, far] = [DVec3::ZERO, far].map(|at| {
             let rooms = Rooms { at, ..rooms };
             let volume = |x: f32| {
@@ -225,7 +233,7 @@ fn far_rooms_are_lit_as_near_ones() {
             };
             let center = shape(&stepped.tick.catalog(), 1).grid.center;
             assert_eq!(center, rooms.world(Vec3::new(2.0, 1.5, 0.0)), "clients know the world's");
-            stepped.tick.volumes().map(mean).collect::<Vec<f32>>()
+            volumes(&stepped).iter().map(mean).collect::<Vec<f32>>()
         });
         assert!((far[0] / near[0] - 1.0).abs() < 0.05, "{fit:?}: {far:?} {near:?}");
         // Fitting is precise to its last step only.
@@ -353,7 +361,6 @@ fn three_fields() -> TickOptions {
 
 #[test]
 fn a_field_whose_job_fails_keeps_its_light() {
-    let volumes = |stepped: &Stepped| stepped.tick.volumes().cloned().collect::<Vec<_>>();
     let [mut sound, mut losing] = [0, 1].map(|n| {
         // Of the third tick the first field's job, of the fourth the second's.
         let loses: fn(u64) -> bool = if n == 0 { |_| false } else { |n| n == 6 || n == 10 };
@@ -395,7 +402,7 @@ fn a_field_whose_job_fails_keeps_its_light() {
 /// Surfaces that could not be looked for are looked for again.
 #[test]
 fn a_field_whose_look_fails_looks_again() {
-    let fit = Some(lumencast_server::FitOptions { points: 8 });
+    let fit = Some(lumencast_solve::FitOptions { points: 8 });
     let with = |loses| {
         let mut options = three_fields();
         options.gather.fit = fit;
@@ -406,7 +413,6 @@ fn a_field_whose_look_fails_looks_again() {
     let (mut sound, mut losing) = (with(|_| false), with(|n| n == 0));
     sound.steps(1);
     losing.steps(1);
-    let volumes = |stepped: &Stepped| stepped.tick.volumes().cloned().collect::<Vec<_>>();
     assert_ne!(volumes(&losing)[0], volumes(&sound)[0], "fitted to nothing");
     // Volumes are fitted together: the other one's light is another as well, but light.
     assert!(
@@ -620,7 +626,7 @@ fn a_volume_too_deep_for_clients_is_sent_in_pieces() {
     stepped.steps(1);
     let sent: BTreeSet<u32> = stepped.kept.frames.iter().map(|(field, _)| *field).collect();
     assert_eq!(sent, BTreeSet::from([0, 1]));
-    let probes = stepped.tick.volumes().flat_map(|volume| volume.grid.positions());
+    let probes = stepped.tick.light().volumes().flat_map(|volume| volume.grid.positions());
     for (probe, of_whole) in probes.zip(whole.positions()) {
         assert!(probe.distance(of_whole) < 1e-5, "{probe} {of_whole}");
     }

@@ -85,6 +85,7 @@ impl BenchTick {
         };
         let in_time = reports.iter().filter(|r| !r.late).count();
         let fields: Vec<Value> = tick
+            .light()
             .volumes()
             .map(|volume| {
                 let id = volume.id.0;

@@ -8,18 +8,13 @@ mod table;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use glam::{Vec2, Vec3};
+pub(crate) use lumencast_light::luminance;
 
 pub(crate) use sobol::{Draw, Sampler};
 pub(crate) use table::{Grid2, Table};
 
 /// The largest f32 below 1.
 pub(crate) const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
-
-/// Rec. 709 luminance.
-#[inline(always)]
-pub(crate) fn luminance(c: Vec3) -> f32 {
-    c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
-}
 
 /// A well-mixed function of its input (the finaliser of splitmix64).
 #[inline]

@@ -12,8 +12,8 @@ use lumencast_picture::{Loaded, PIXELS_PER_DEGREE, Pair, Picture, ToneMap, flip}
 use lumencast_scene::{
     Environment, LightKind, Material, PunctualLight, Scene, Snapshot, View, VolumeSpec,
 };
-use lumencast_server::{Effort, GatherOptions, bake};
 use lumencast_shade::{Materials, Settings, Shading, Shadows};
+use lumencast_solve::{Effort, GatherOptions, bake};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 /// Mean FLIP that adapters may differ by: rounding, and samples at other places.

@@ -9,8 +9,8 @@ use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::reference::Parts;
 use lumencast_light::{Grid, Light, Order};
 use lumencast_scene::{Environment, HdrImage, Projection, Snapshot, View, VolumeSpec};
-use lumencast_server::{Effort, GatherOptions, bake};
 use lumencast_shade::{Lighting, Settings};
+use lumencast_solve::{Effort, GatherOptions, bake};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 /// A turn that is no symmetry of the picture.

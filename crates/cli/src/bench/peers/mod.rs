@@ -14,8 +14,8 @@ use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
 use lumencast_light::Light;
 use lumencast_picture::{Picture, ToneMap};
 use lumencast_scene::{Scene, Snapshot, VolumeSpec};
-use lumencast_server::Effort;
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading};
+use lumencast_solve::Effort;
 
 use super::drawing::{cells, draw};
 use super::judge::{Judge, covered};

@@ -5,8 +5,8 @@ use std::time::Instant;
 use anyhow::Result;
 use lumencast_light::Light;
 use lumencast_scene::{View, VolumeSpec};
-use lumencast_server::Effort;
 use lumencast_shade::{Lighting, Renderer, Settings};
+use lumencast_solve::Effort;
 
 use super::reference::Judge;
 use super::report::{Errors, Row};

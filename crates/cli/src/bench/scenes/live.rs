@@ -5,7 +5,8 @@ use lumencast_codec::{Catalog, EncodedRegion, Epoch};
 use lumencast_gather::path_trace::CpuPathTracer;
 use lumencast_light::Field;
 use lumencast_scene::{Scene, VolumeSpec};
-use lumencast_server::{GatherOptions, Mail, Outlet, SampleRange, Tick, TickOptions};
+use lumencast_server::{Mail, Outlet, SampleRange, Tick, TickOptions};
+use lumencast_solve::GatherOptions;
 
 use crate::output;
 
@@ -33,7 +34,7 @@ pub(super) fn light(
         bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(tick.volumes().cloned().map(Field::from).collect())
+    Ok(tick.light().fields().to_vec())
 }
 
 /// Takes nothing.

@@ -10,14 +10,14 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
 use lumencast_gather::reference::{self, Film, Parts, PictureSettings};
 use lumencast_light::{Field, Light};
 use lumencast_picture::{Picture, ToneMap, exposure};
 use lumencast_scene::{Edit, Environment, Scene, Snapshot, View};
-use lumencast_server::Effort;
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading, Shadows};
+use lumencast_solve::Effort;
+use lumencast_solve::blend::BlendSettings;
 
 use super::drawing::{cells, draw, sum};
 use super::judge::{Judge, covered};
@@ -166,7 +166,7 @@ impl BenchScenes {
         let drawn = self.reading.drawn();
         let usual = computed(drawn, self.effort.with(self.probe_samples));
         let mut tracer = usual.tracer()?;
-        let specs = lumencast_server::volumes(&mut subject.scene, &mut tracer)?;
+        let specs = lumencast_solve::volumes(&mut subject.scene, &mut tracer)?;
         let snapshot = subject.snapshot.clone();
         let mut bake = |computed: Computed| computed.volumes(&snapshot, &specs, &mut tracer);
         let baked = bake(usual)?;

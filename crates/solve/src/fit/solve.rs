@@ -194,7 +194,7 @@ fn ratio(a: DVec3, b: DVec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::{mix, unit};
+    use crate::random::{mix, unit};
 
     const PROBES: usize = 3;
     const UNKNOWNS: usize = PROBES * SIZE;

@@ -33,8 +33,8 @@
 
 use glam::Vec3;
 
-use crate::Sums;
-use crate::sampling::luminance;
+use lumencast_gather::Sums;
+use lumencast_light::luminance;
 
 /// The least weights of the quick means.
 const QUICK: [f32; 3] = [0.5, 0.125, 1.0 / 32.0];
@@ -302,7 +302,7 @@ impl Noise {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::{mix, unit};
+    use crate::random::{mix, unit};
 
     /// Noise of standard deviation 1, about normal.
     fn normal(seed: u64) -> f32 {

@@ -1,17 +1,17 @@
 //! How blended probes of a scene settle while nothing changes, with and without following changes:
 //! what following costs in accuracy where the light is noisy.
 //!
-//! `cargo run --release -p lumencast-gather --example still -- door`
+//! `cargo run --release -p lumencast-solve --example still -- door`
 //!
 //! Error: of a probe's c₀ relative to a converged one, over all probes of the first volume.
 #![expect(clippy::print_stdout, reason = "a program for the terminal")]
 
 use glam::Vec3;
-use lumencast_gather::blend::{BlendSettings, History};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Receiver, Sums};
 use lumencast_light::Order;
 use lumencast_scene::Scene;
+use lumencast_solve::blend::{BlendSettings, History};
 
 const UPDATES: u64 = 600;
 const SHOWN: [u64; 6] = [10, 50, 100, 200, 400, 600];

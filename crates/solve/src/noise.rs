@@ -3,7 +3,7 @@
 use glam::Vec3;
 use lumencast_light::Light;
 
-use crate::field::Field;
+use crate::solver::Solver;
 
 /// Points of surfaces, or directions at probes, that are looked at, about so many at most.
 const PLACES: usize = 1 << 16;
@@ -13,16 +13,15 @@ const WHITE: f32 = 0.99;
 /// Root of the mean square by which two states of the same fields differ where they are read, in codes
 /// of 0 to 255: v^(1/2.2) for surfaces alike, where the brightest hundredth is white. They are read on
 /// the surfaces that the fields know, or in all directions at their probes.
-pub(crate) fn shown(one: &[Field], other: &[Field]) -> f32 {
-    let of = |fields: &[Field]| Light::new(fields.iter().map(|field| field.volume().clone()));
-    let places: Vec<(Vec3, Vec3)> = one.iter().flat_map(Field::places).collect();
+pub(crate) fn shown(one: &Solver, other: &Solver) -> f32 {
+    let places = one.places();
     let step = places.len().div_ceil(PLACES).max(1);
-    let read = |light: Light| -> Vec<Vec3> {
+    let read = |light: &Light| -> Vec<Vec3> {
         let irradiance =
             |&(at, normal): &(Vec3, Vec3)| light.irradiance(at, normal).max(Vec3::ZERO);
         places.iter().step_by(step).map(irradiance).collect()
     };
-    let [one, other] = [one, other].map(|fields| read(of(fields)));
+    let [one, other] = [one, other].map(|solver| read(solver.light()));
     let white = white(&one);
     if white <= 0.0 {
         return 0.0;

@@ -11,7 +11,7 @@ use lumencast_gather::{Gather, Job, Receiver, Sums};
 use lumencast_light::{Grid, Order};
 use lumencast_scene::{Aabb, Scene, Snapshot, VolumeSpec};
 
-use crate::error::ServerError;
+use crate::error::SolveError;
 use crate::walls::BURIED_ABOVE;
 
 /// Places that are tried, about.
@@ -69,7 +69,7 @@ enum Use {
 pub fn volumes(
     scene: &mut Scene,
     gatherer: &mut dyn Gather,
-) -> Result<Vec<VolumeSpec>, ServerError> {
+) -> Result<Vec<VolumeSpec>, SolveError> {
     let own = scene.volumes();
     if own.is_empty() {
         let (snapshot, bounds) = (scene.snapshot(), scene.bounds());
@@ -89,7 +89,7 @@ pub fn default_volume(
     scene: &Arc<Snapshot>,
     bounds: Aabb,
     gatherer: &mut dyn Gather,
-) -> Result<VolumeSpec, ServerError> {
+) -> Result<VolumeSpec, SolveError> {
     let within = useful(scene, bounds, gatherer)?;
     if within.share >= ENOUGH {
         return Ok(around(within.bounds));
@@ -113,7 +113,7 @@ fn useful(
     scene: &Arc<Snapshot>,
     bounds: Aabb,
     gatherer: &mut dyn Gather,
-) -> Result<Useful, ServerError> {
+) -> Result<Useful, SolveError> {
     let tried = trials(bounds);
     let uses = uses(scene, tried.positions(), gatherer)?;
     let half = 0.5 * tried.spacing();
@@ -144,7 +144,7 @@ pub fn survey(
     scene: &Arc<Snapshot>,
     volume: &VolumeSpec,
     gatherer: &mut dyn Gather,
-) -> Result<Survey, ServerError> {
+) -> Result<Survey, SolveError> {
     // An odd step goes through all layers of a grid.
     let step = volume.grid.probe_count().div_ceil(TRIALS as usize) | 1;
     let uses = uses(scene, volume.grid.positions().step_by(step), gatherer)?;
@@ -202,11 +202,11 @@ fn uses(
     scene: &Arc<Snapshot>,
     places: impl Iterator<Item = Vec3>,
     gatherer: &mut dyn Gather,
-) -> Result<Vec<Use>, ServerError> {
+) -> Result<Vec<Use>, SolveError> {
     let receivers: Vec<_> = places.map(|position| Receiver::probe(position, DIRECTIONS)).collect();
     let job = Job { bounces: 0, surfaces: true, ..Job::new(scene.clone(), receivers) };
     let ticket = gatherer.submit(job);
-    let gathered = gatherer.wait(ticket).ok_or(ServerError::Gather)?;
+    let gathered = gatherer.wait(ticket).ok_or(SolveError::Gather)?;
     Ok(gathered.sums.iter().map(found).collect())
 }
 

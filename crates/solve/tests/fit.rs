@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
-use lumencast_gather::fit::{FitSettings, Part, Surroundings, fit};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Place, Receiver, Sums};
 use lumencast_light::{FieldId, Grid, Light, Offset, Order, ProbeVolume};
 use lumencast_scene::{Environment, LightKind, Material, PunctualLight, Snapshot};
+use lumencast_solve::fit::{FitSettings, Part, Surroundings, fit};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 const POINTS: u32 = 64;

@@ -4,22 +4,22 @@
 use std::sync::Arc;
 
 use lumencast_gather::Gather;
-use lumencast_gather::blend::BlendSettings;
-use lumencast_light as light;
+use lumencast_light::Field;
 use lumencast_scene::{Snapshot, VolumeSpec};
 
-use crate::error::ServerError;
-use crate::field::{Brought, Field, publish};
-use crate::gather_options::GatherOptions;
+use crate::blend::BlendSettings;
+use crate::error::SolveError;
 use crate::noise;
-use crate::tick::look;
+use crate::options::GatherOptions;
+use crate::request::Request;
+use crate::solver::{FitEffort, Solver};
 
 /// Samples of a probe in one job: enough to spread directions well, few enough to show progress.
 const SAMPLES_A_PASS: u32 = 256;
 /// Rounds and steps of a fit to surfaces: more change nothing that can be seen.
-const FIT_EFFORT: (u32, u32) = (4, 64);
+const FIT_EFFORT: FitEffort = FitEffort { rounds: 4, steps: 64 };
 /// The same of what tells the noise.
-const LOOK_EFFORT: (u32, u32) = (2, 32);
+const LOOK_EFFORT: FitEffort = FitEffort { rounds: 2, steps: 32 };
 /// Passes after which the noise is looked at first.
 const FIRST_LOOK: u32 = 4;
 /// From one look at the noise to the next, samples become at most so many times as many, since noise
@@ -60,7 +60,7 @@ pub struct Done {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Baked {
     /// In the order in which they were asked for; pieces of a volume follow one another.
-    pub fields: Vec<light::Field>,
+    pub fields: Vec<Field>,
     /// Samples of a probe.
     pub samples: u32,
     /// As in [`Effort::noise`], where that was asked for.
@@ -76,8 +76,7 @@ pub struct Baked {
 /// lies as far from the whole as the whole does from light without noise.
 ///
 /// # Errors
-/// A volume that makes no sense, or more than the wire format carries: nothing is gathered then. A
-/// gatherer that gave up.
+/// A volume that makes no sense: nothing is gathered then. A gatherer that gave up.
 pub fn bake(
     scene: &Arc<Snapshot>,
     volumes: &[VolumeSpec],
@@ -85,13 +84,14 @@ pub fn bake(
     effort: Effort,
     options: GatherOptions,
     mut progress: impl FnMut(Done),
-) -> Result<Baked, ServerError> {
+) -> Result<Baked, SolveError> {
     let mean = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
-    let mut fields = Field::all(volumes, &GatherOptions { blend: mean, ..options })?;
-    if !look(&mut fields, gatherer, scene).is_empty() {
-        return Err(ServerError::Gather);
+    let mut all = Solver::new(volumes, GatherOptions { blend: mean, ..options })?;
+    for Request { job, asked } in all.looks(scene) {
+        let ticket = gatherer.submit(job);
+        all.take(&asked, &gatherer.wait(ticket).ok_or(SolveError::Gather)?);
     }
-    let mut half = effort.noise.map(|_| fields.clone());
+    let mut half = effort.noise.map(|_| all.clone());
     let most = effort.samples.max(1);
     let mut done = Done { share: 0.0, noise: None };
     let (mut samples, mut pass) = (0, 0);
@@ -99,24 +99,22 @@ pub fn bake(
     let mut until = effort.noise.map_or(most, |_| most.min(FIRST_LOOK * SAMPLES_A_PASS));
     while samples < most {
         let now = SAMPLES_A_PASS.min(most - samples);
-        for (number, field) in fields.iter_mut().enumerate() {
-            let seed = pass << 8 | u64::from(field.id().0);
-            let (job, points) = field.job(scene.clone(), None, now, options, seed);
+        let requests: Vec<Request> = all.jobs(scene, None, now, pass).collect();
+        for Request { job, asked } in requests {
             let ticket = gatherer.submit(job);
-            let gathered = gatherer.wait(ticket).ok_or(ServerError::Gather)?;
-            let brought = Brought { gathered, points };
-            field.blend(&brought);
+            let gathered = gatherer.wait(ticket).ok_or(SolveError::Gather)?;
+            all.take(&asked, &gathered);
             if let Some(half) = half.as_mut().filter(|_| pass % 2 == 0) {
-                half[number].blend(&brought);
+                half.take(&asked, &gathered);
             }
         }
         (samples, pass) = (samples + now, pass + 1);
         if samples >= until
             && let Some((wanted, half)) = effort.noise.zip(half.as_mut())
         {
-            publish(&mut fields, LOOK_EFFORT);
-            publish(half, LOOK_EFFORT);
-            let noise = noise::shown(&fields, half);
+            all.solve(LOOK_EFFORT);
+            half.solve(LOOK_EFFORT);
+            let noise = noise::shown(&all, half);
             done.noise = Some(noise);
             if noise <= wanted {
                 break;
@@ -127,8 +125,7 @@ pub fn bake(
         done.share = samples as f32 / until.max(samples) as f32;
         progress(done);
     }
-    publish(&mut fields, FIT_EFFORT);
+    all.solve(FIT_EFFORT);
     progress(Done { share: 1.0, ..done });
-    let fields = fields.into_iter().map(|field| field.into_volume().into()).collect();
-    Ok(Baked { fields, samples, noise: done.noise })
+    Ok(Baked { fields: all.into_fields(), samples, noise: done.noise })
 }

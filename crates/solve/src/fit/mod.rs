@@ -30,10 +30,9 @@
 mod solve;
 
 use glam::Vec3;
-use lumencast_light::{Light, Place, ProbeVolume, sh};
+use lumencast_gather::{Place as At, Receiver, Sums, SurfacePoint};
+use lumencast_light::{Light, Place, ProbeVolume, luminance, sh};
 
-use crate::sampling::luminance;
-use crate::{Place as At, Receiver, Sums, SurfacePoint};
 use solve::{Row, SIZE, System};
 
 /// Share of its directions in which a probe sees backs above which it counts as being inside of
@@ -223,7 +222,7 @@ pub struct Surroundings {
 
 impl Surroundings {
     /// Of the sums of all probes, in index order, and after them of any other places to look from, of a
-    /// job that asked for [`surfaces`](crate::Job::surfaces).
+    /// job that asked for [`surfaces`](lumencast_gather::Job::surfaces).
     pub fn new(probes: &[Sums]) -> Self {
         let backs = |sums: &Sums| sums.surfaces.iter().flatten().filter(|at| !at.front).count();
         let inside =

@@ -1,7 +1,8 @@
 //! How light is gathered, blended and fitted.
 
-use lumencast_gather::blend::BlendSettings;
 use lumencast_light::Offset;
+
+use crate::blend::BlendSettings;
 
 /// How light is gathered and blended.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +32,7 @@ impl Default for GatherOptions {
     }
 }
 
-/// How probes are fitted to surfaces ([`lumencast_gather::fit`]).
+/// How probes are fitted to surfaces ([`crate::fit`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitOptions {
     /// Directions a probe in which points of surfaces are looked for, at least 1; fewer where a volume

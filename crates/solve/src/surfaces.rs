@@ -4,13 +4,13 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{IVec3, Vec3};
-use lumencast_gather::blend::{BlendSettings, History};
-use lumencast_gather::fit::Surroundings;
 use lumencast_gather::{Job, Receiver, Sums, SurfacePoint};
 use lumencast_light::Grid;
 use lumencast_scene::Snapshot;
 
-use crate::gather_options::FitOptions;
+use crate::blend::{BlendSettings, History};
+use crate::fit::Surroundings;
+use crate::options::FitOptions;
 
 /// What a point's light is known from begins anew when the point has moved by more than this share of
 /// a cell, or its normal turned by more than the angle of this cosine.

@@ -2,18 +2,18 @@
 //! them: what probes in cells of a metre can tell apart.
 //!
 //! ```sh
-//! cargo run --release -p lumencast-server --example walls
+//! cargo run --release -p lumencast-solve --example walls
 //! ```
 #![expect(clippy::print_stdout, reason = "a program for the terminal")]
 
 use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
-use lumencast_gather::blend::BlendSettings;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Grid, Light, Offset, Order};
 use lumencast_scene::{LightKind, Material, PunctualLight, Snapshot, VolumeSpec};
-use lumencast_server::{Effort, FitOptions, GatherOptions, bake};
+use lumencast_solve::blend::BlendSettings;
+use lumencast_solve::{Effort, FitOptions, GatherOptions, bake};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 /// Sides of each of the two rooms, metres.

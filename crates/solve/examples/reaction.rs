@@ -1,6 +1,6 @@
 //! How fast blended probes follow a lamp that jumps, and how much they flicker while nothing moves.
 //!
-//! `cargo run --release -p lumencast-gather --example reaction`
+//! `cargo run --release -p lumencast-solve --example reaction`
 //!
 //! Error: RMS over all probes and coefficients against the new steady light, as a share of what it
 //! was before the jump. Flicker: mean change of the display value (c₀ over its 99th percentile,
@@ -10,11 +10,11 @@
 use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
-use lumencast_gather::blend::{BlendSettings, History};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Gathered, Job, Receiver};
 use lumencast_light::{Grid, Order};
 use lumencast_scene::{LightKind, PunctualLight, Snapshot};
+use lumencast_solve::blend::{BlendSettings, History};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 const STILL: u64 = 500;

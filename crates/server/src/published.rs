@@ -1,0 +1,65 @@
+//! One field as it is published: its encoder, and what its newest light shows.
+
+use lumencast_codec::{EncodedRegion, FieldEncoder, FieldInfo, UpdateInfo};
+use lumencast_light::{Field, FieldId};
+
+/// A moment of the scene.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moment {
+    /// The tick in which it was looked at.
+    pub(crate) tick: u64,
+    /// Scene time, seconds.
+    pub(crate) time: f64,
+    /// [`lumencast_scene::Snapshot::version`].
+    pub(crate) version: u64,
+}
+
+/// A field on its way to clients.
+pub(crate) struct Published {
+    pub(crate) id: FieldId,
+    encoder: FieldEncoder,
+    /// Number of the next update.
+    update: u64,
+    /// The moment that its light shows; none before there is any.
+    pub(crate) shown: Option<Moment>,
+    /// How many of its jobs have failed.
+    failures: u64,
+}
+
+impl Published {
+    pub(crate) fn new(field: &Field) -> Self {
+        let encoder = FieldEncoder::new(field);
+        Self { id: field.id(), encoder, update: 0, shown: None, failures: 0 }
+    }
+
+    /// The field as the catalog lists it.
+    pub(crate) fn describe(&self, field: &Field, source: &str) -> FieldInfo {
+        self.encoder.describe(field, source)
+    }
+
+    /// log2 of its scale as of the last update; none before there was any light.
+    pub(crate) fn scale_log2(&self) -> Option<i8> {
+        self.encoder.scale_log2()
+    }
+
+    /// The frames of the regions that somebody watches; none before there is any light.
+    pub(crate) fn encode(
+        &mut self,
+        field: &Field,
+        watched: impl Fn(u32) -> bool,
+    ) -> Vec<EncodedRegion> {
+        let Some(Moment { tick, time, version }) = self.shown else { return Vec::new() };
+        let info = UpdateInfo { update: self.update, tick, time, scene_version: version };
+        self.update += 1;
+        self.encoder.encode(field, info, watched)
+    }
+
+    /// Tells that a job has failed: the first time, and each time that it has failed twice as often.
+    pub(crate) fn note_failure(&mut self, outcome: &str) {
+        self.failures += 1;
+        if self.failures.is_power_of_two() {
+            let (field, failures) = (self.id.0, self.failures);
+            tracing::warn!(field, failures, "gathering light has failed: {outcome}");
+        }
+    }
+}

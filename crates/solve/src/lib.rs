@@ -1,0 +1,44 @@
+//! Fields while they are computed: what stands between sums of arriving light and what is published.
+//!
+//! A [`Solver`] keeps the fields of a scene. It says what to gather ([`Solver::jobs`]), takes in the
+//! sums that a gatherer brings ([`Solver::take`]), and makes light of them ([`Solver::solve`]). It owns
+//! no gatherer and no clock: [`bake`] steps it until the light has converged, a server tick by tick.
+//!
+//! ```no_run
+//! use lumencast_gather::path_trace::{CpuPathTracer, Options};
+//! use lumencast_light::Light;
+//! use lumencast_scene::Scene;
+//! use lumencast_solve::{Effort, GatherOptions, bake, volumes};
+//!
+//! let mut scene = Scene::builtin("cornell")?;
+//! let mut tracer = CpuPathTracer::new(Options::default())?;
+//! let volumes = volumes(&mut scene, &mut tracer)?;
+//! let (effort, options) = (Effort::of_samples(1024), GatherOptions::default());
+//! let baked = bake(&scene.snapshot(), &volumes, &mut tracer, effort, options, |_| ())?;
+//! let light = Light::new(baked.fields);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+#![forbid(unsafe_code)]
+
+mod bake;
+pub mod blend;
+mod error;
+pub mod fit;
+mod noise;
+mod options;
+mod placement;
+#[cfg(test)]
+mod random;
+mod request;
+mod solver;
+mod surfaces;
+mod volume;
+mod walls;
+
+pub use bake::{Baked, Done, Effort, bake};
+pub use error::SolveError;
+pub use options::{FitOptions, GatherOptions};
+pub use placement::{Survey, default_volume, survey, volumes};
+pub use request::{Asked, Request};
+pub use solver::{FitEffort, Solver};

@@ -1,0 +1,169 @@
+//! The fields of a scene while they are computed.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use lumencast_gather::Gathered;
+use lumencast_light::{Field, FieldId, Light};
+use lumencast_scene::{Snapshot, VolumeSpec};
+
+use crate::error::SolveError;
+use crate::fit::{FitSettings, Part, fit};
+use crate::options::GatherOptions;
+use crate::request::{Asked, Request, What};
+use crate::surfaces::Surfaces;
+use crate::volume::VolumeSolver;
+
+/// The fields of a scene while they are computed.
+#[derive(Clone)]
+pub struct Solver {
+    fields: Vec<FieldSolver>,
+    options: GatherOptions,
+    /// What is published.
+    light: Light,
+}
+
+/// A field, by its kind.
+#[derive(Clone)]
+enum FieldSolver {
+    Volume(VolumeSolver),
+}
+
+/// How hard a fit to surfaces is worked on; it goes on from the last one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FitEffort {
+    /// Rounds, each of which weighs the surfaces anew.
+    pub rounds: u32,
+    /// Steps of conjugate gradients in each.
+    pub steps: u32,
+}
+
+impl Solver {
+    /// The fields of volumes, dark, numbered in their order; of a volume too deep for clients' textures
+    /// one for each piece.
+    ///
+    /// # Errors
+    /// [`SolveError::Volume`]; no memory is taken for any then.
+    pub fn new(volumes: &[VolumeSpec], options: GatherOptions) -> Result<Self, SolveError> {
+        for (volume, spec) in (0..).zip(volumes) {
+            spec.check().map_err(|reason| SolveError::Volume { volume, reason })?;
+        }
+        let pieces = volumes.iter().flat_map(|spec| spec.split());
+        let new = |(id, spec)| VolumeSolver::new(FieldId(id), spec, &options);
+        let volumes: Vec<VolumeSolver> = (0..).zip(pieces).map(new).collect();
+        let light = Light::new(volumes.iter().map(|volume| volume.arriving().clone()));
+        Ok(Self { fields: volumes.into_iter().map(FieldSolver::Volume).collect(), options, light })
+    }
+
+    /// Numbers of the fields, in the order in which they were asked for; pieces of a volume follow one
+    /// another.
+    pub fn ids(&self) -> impl ExactSizeIterator<Item = FieldId> + '_ {
+        self.volumes().map(VolumeSolver::id)
+    }
+
+    /// The light as it was last solved.
+    pub fn light(&self) -> &Light {
+        &self.light
+    }
+
+    /// The fields as they were last solved, in the order in which they were asked for.
+    pub fn into_fields(self) -> Vec<Field> {
+        let mut fields = self.light.into_fields();
+        fields.sort_by_key(Field::id);
+        fields
+    }
+
+    /// Number of all probes.
+    pub fn probe_count(&self) -> usize {
+        self.volumes().map(VolumeSolver::probe_count).sum()
+    }
+
+    /// Number of probes inside walls.
+    pub fn buried_count(&self) -> usize {
+        self.volumes().map(VolumeSolver::buried_count).sum()
+    }
+
+    /// What to ask for before [`Self::jobs`], so that fields that want to know where surfaces are know
+    /// those of this scene.
+    pub fn looks(&self, scene: &Arc<Snapshot>) -> Vec<Request> {
+        let look = |(field, volume): (usize, &VolumeSolver)| {
+            let job = volume.look(scene)?;
+            Some(Request { job, asked: Asked { field, what: What::Surfaces } })
+        };
+        self.volumes().enumerate().filter_map(look).collect()
+    }
+
+    /// What to gather for each field, `samples` a probe. `pass` gives other directions each time.
+    pub fn jobs<'a>(
+        &'a mut self,
+        scene: &'a Arc<Snapshot>,
+        previous: Option<Arc<Light>>,
+        samples: u32,
+        pass: u64,
+    ) -> impl Iterator<Item = Request> + 'a {
+        let options = &self.options;
+        self.fields.iter_mut().enumerate().map(move |(field, FieldSolver::Volume(volume))| {
+            let seed = pass << 8 | u64::from(volume.id().0);
+            let (job, points) = volume.job(scene.clone(), previous.clone(), samples, options, seed);
+            Request { job, asked: Asked { field, what: What::Light { points } } }
+        })
+    }
+
+    /// Takes in what was gathered.
+    ///
+    /// # Panics
+    /// If the sums are those of another request.
+    pub fn take(&mut self, asked: &Asked, gathered: &Gathered) {
+        let FieldSolver::Volume(volume) = &mut self.fields[asked.field];
+        match &asked.what {
+            What::Surfaces => volume.found(gathered),
+            What::Light { points } => volume.blend(gathered, points),
+        }
+    }
+
+    /// The scene was edited: light may be another from now on.
+    pub fn expect_change(&mut self) {
+        self.volumes_mut().for_each(VolumeSolver::expect_change);
+    }
+
+    /// Makes light of what has been taken in: what arrives at the probes or, where they are fitted, the
+    /// fit of all of them.
+    pub fn solve(&mut self, effort: FitEffort) {
+        let Self { fields, light, .. } = self;
+        let of = |field: &Field| {
+            fields.iter().find_map(|FieldSolver::Volume(volume)| {
+                (volume.id() == field.id()).then_some(volume)
+            })
+        };
+        let ordered: Vec<&VolumeSolver> = light.fields().iter().filter_map(of).collect();
+        let surfaces: Option<Vec<&Surfaces>> = ordered.iter().map(|v| v.surfaces()).collect();
+        let Some(surfaces) = surfaces else {
+            let each = light.volumes_mut().zip(ordered);
+            each.for_each(|(published, volume)| published.clone_from(volume.arriving()));
+            return;
+        };
+        let each = ordered.into_iter().zip(surfaces);
+        let parts: Vec<Part<'_>> = each
+            .map(|(volume, surfaces)| Part {
+                gathered: volume.arriving(),
+                around: surfaces.around(),
+                irradiance: surfaces.irradiance(),
+            })
+            .collect();
+        let FitEffort { rounds, steps } = effort;
+        fit(light, &parts, &FitSettings { rounds, steps, ..FitSettings::default() });
+    }
+
+    /// Where light matters: see [`VolumeSolver::places`].
+    pub(crate) fn places(&self) -> Vec<(Vec3, Vec3)> {
+        self.volumes().flat_map(VolumeSolver::places).collect()
+    }
+
+    fn volumes(&self) -> impl ExactSizeIterator<Item = &VolumeSolver> {
+        self.fields.iter().map(|FieldSolver::Volume(volume)| volume)
+    }
+
+    fn volumes_mut(&mut self) -> impl Iterator<Item = &mut VolumeSolver> {
+        self.fields.iter_mut().map(|FieldSolver::Volume(volume)| volume)
+    }
+}
