@@ -89,7 +89,7 @@ export type Status =
       readonly retryIn: number;
     }
   | {
-      /** A saved light field, without any server: see `openLight`. */
+      /** Saved light, without any server: see `openLight`. */
       readonly state: 'saved';
     }
   | {
@@ -186,7 +186,7 @@ export interface Timing {
   readonly bytes: number;
 }
 
-/** What a saved light field keeps of its scene beside the light. */
+/** What a `.light` file keeps of its scene beside the light. */
 export interface SavedScene {
   /** Edits that turn the scene as it stands in its file into the scene that the light is of. */
   readonly edits: readonly Edit[];
@@ -194,7 +194,7 @@ export interface SavedScene {
   readonly files: ReadonlyMap<string, Uint8Array>;
 }
 
-/** A connection to the light of one scene, or a saved light field that stands in for one. */
+/** A connection to the light of one scene, or saved light that stands in for one. */
 export interface Session {
   /** The server's address, without a path. */
   readonly origin: string;
@@ -207,9 +207,9 @@ export interface Session {
   readonly status: Status;
   /** Resolves once the server has said what it offers; rejects when the session is closed before. */
   readonly ready: Promise<void>;
-  /** What the server offers, until it has said so what a saved light field holds; else `undefined`. */
+  /** What the server offers, until it has said so what the saved light holds; else `undefined`. */
   readonly catalog: Catalog | undefined;
-  /** What a saved light field that the session started from says of the scene. */
+  /** What the saved light that the session started from says of the scene. */
   readonly saved: SavedScene | undefined;
   readonly stats: SessionStats;
 
@@ -227,8 +227,8 @@ export interface Session {
   light(now?: number): LightState;
   /**
    * Scene time in seconds at which animations stand on the server, estimated for `now`; less `delay`
-   * seconds (0.1 unless given), so that it seldom runs ahead of what has arrived. It is that of a saved
-   * light field until the server has said its own.
+   * seconds (0.1 unless given), so that it seldom runs ahead of what has arrived. It is that of saved
+   * light until the server has said its own.
    */
   sceneTime(now?: number, delay?: number): number | undefined;
   /** Where the camera is, in world space: near regions come first. */

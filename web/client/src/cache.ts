@@ -82,8 +82,8 @@ export class Cache {
   }
 
   /**
-   * Starts from a saved light field; a server's light takes its place when it comes. Returns what the
-   * file says of the scene.
+   * Starts from saved light, the bytes of a `.light` file; a server's light takes its place when it comes.
+   * Returns what the file says of the scene.
    * @throws WireError when the bytes are none, Error once a server has been heard of; nothing has changed
    * then.
    */

@@ -11,14 +11,14 @@ import { Cache } from './cache.js';
 import type { Catalog } from './codec/catalog.js';
 import { Emitter } from './session/emitter.js';
 
-/** What of a saved light field's surroundings its file does not say. */
+/** What of saved light's surroundings its file does not say. */
 export interface SavedOptions {
   /** Address of a file of the scene, or of their folder with a slash at its end; the page's folder unless given. */
   files?: string | URL;
 }
 
 /**
- * Opens a saved light field, the bytes of a `.light` file, as a session that no server stands behind: it
+ * Opens saved light, the bytes of a `.light` file, as a session that no server stands behind: it
  * connects to nothing, its light stands still, and edits reject.
  * @throws WireError when the bytes are no light file
  */

@@ -40,7 +40,7 @@ export interface ConnectOptions {
    */
   certificateHash?: string;
   /**
-   * A saved light field (the bytes of a `.light` file) to show until the server's light comes: its
+   * Saved light (the bytes of a `.light` file) to show until the server's light comes: its
    * catalog is there at once, `ready` waits for the server all the same.
    */
   saved?: Uint8Array;

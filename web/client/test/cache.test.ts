@@ -462,7 +462,7 @@ describe('a field with an epoch of its own', () => {
   });
 });
 
-describe('a saved light field', () => {
+describe('saved light', () => {
   it('is shown until the server’s light comes', () => {
     const cache = new Cache(ME);
     cache.load(lightFile(new FakeServer({ brightness: () => 7 })), 0);

@@ -17,7 +17,7 @@ afterEach(() => {
   for (const server of servers.splice(0)) server.close();
 });
 
-describe('an opened light field', () => {
+describe('opened light', () => {
   it('has its light and connects to nothing', async () => {
     vi.useFakeTimers();
     const fetch = vi.fn();

@@ -178,7 +178,7 @@ describe('connecting', () => {
   });
 });
 
-describe('a saved light field', () => {
+describe('saved light', () => {
   const saved = () => lightFile(new FakeServer({ brightness: () => 7 }));
   const red = (session: Session) => session.light().fields[0].coefficients[0];
 

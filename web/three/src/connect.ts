@@ -37,7 +37,7 @@ export async function connectWith(
   const session = connect(url, options.session);
   const missed = record(session);
   try {
-    // A saved light field knows its scene without a server.
+    // Saved light knows its scene without a server.
     if (isToLoad(options) && !session.catalog) await joined(session);
     reportLosses(session, options.onWarning ?? warnInConsole);
     const gltf = await sceneOf(session, options);

@@ -16,7 +16,7 @@ export function sceneFile({ files }: Pick<LightSession, 'files'>, name: string):
   return new URL(name.split('/').map(encodeURIComponent).join('/'), files).href;
 }
 
-/** Files that a saved light field brings along, at addresses of their own until a server is there. */
+/** Files that saved light brings along, at addresses of their own until a server is there. */
 export class SavedFiles {
   readonly #addresses = new Map<Uint8Array, string>();
 

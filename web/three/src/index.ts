@@ -36,7 +36,7 @@ export function connect(
 }
 
 /**
- * Shows a saved light field, the address or the bytes of a `.light` file, without a server. Without
+ * Shows saved light, the address or the bytes of a `.light` file, without a server. Without
  * `gltf`, and when the scene shows nothing yet, the scene's file is loaded and added to it.
  * @throws Error, with the address and what was answered, when a file is missing
  */

@@ -51,7 +51,7 @@ describe('connect', () => {
     light.dispose();
   });
 
-  it('shows a saved light field when there is no server', async () => {
+  it('shows saved light when there is no server', async () => {
     net.refuse = 'nobody there';
     const scene = new Scene();
     const saved = lightFile(new FakeServer({ brightness: () => 7 }));
@@ -166,7 +166,7 @@ describe('connect', () => {
 describe('show', () => {
   const saved = lightFile(new FakeServer({ brightness: () => 7 }));
 
-  it('draws a saved light field in the scene beside it, and asks for nothing else', async () => {
+  it('draws saved light in the scene beside it, and asks for nothing else', async () => {
     const served = vi.fn((request: Request | URL) => {
       const { href } = new URL(request instanceof URL ? request : request.url);
       return href.endsWith('.light') ? Promise.resolve(new Response(saved as BodyInit)) : fetch(glbUrl(ROOM));

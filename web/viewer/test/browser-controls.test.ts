@@ -500,7 +500,7 @@ describe('the tomb', () => {
 });
 
 describe('a page without a server', () => {
-  it('shows a saved light field, and says what it is', async () => {
+  it('shows saved light, and says what it is', async () => {
     execFileSync(program, ['bake', 'cornell', '-o', join(folder, 'cornell.light'), '--samples', '64']);
     const server = await start('cornell');
     const { root } = (await (await fetch(`${server.address}/lumencast.json`)).json()) as { root: string };

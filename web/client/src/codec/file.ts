@@ -7,7 +7,7 @@ import { LIMITS } from './limits.js';
 import { splitProbeFrame } from './probe-header.js';
 import { Reader } from './reader.js';
 
-/** A saved light field: a catalog and keyframes, the same bytes as on the wire. */
+/** What a `.light` file holds: a catalog and keyframes, the same bytes as on the wire. */
 export interface LightFile {
   readonly catalog: Catalog;
   /** Edits that turn the scene as it stands in its file into the scene that this light is of. */

@@ -42,7 +42,7 @@ export const streams: readonly Uint8Array[] = sequences.map((sequence, number) =
   return join(packed('c', catalogOf(sequence)), ...frames);
 });
 
-/** Saved light fields. */
+/** Files of saved light. */
 export const lightFiles: readonly Uint8Array[] = sequences.map((sequence) => {
   const kept = json({ edits: edits.map((edit) => edit.json) });
   return join(

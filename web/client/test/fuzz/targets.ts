@@ -99,7 +99,7 @@ function parsed(data: Uint8Array): { readonly edit?: unknown } | undefined {
   }
 }
 
-/** Saved light fields. */
+/** Files of saved light. */
 export function lightFile(data: Uint8Array): boolean {
   const file = unlessRefused(() => readLightFile(data));
   if (!file) return false;
