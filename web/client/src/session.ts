@@ -14,11 +14,12 @@ import {
 import { Cache } from './cache.js';
 import type { Catalog } from './codec/catalog.js';
 import { checkEdit } from './codec/state.js';
+import { CATALOG_TRACK, STATE_TRACK } from './codec/tracks.js';
 import type { Edit, Vec3 } from './edit.js';
 import { Emitter } from './session/emitter.js';
 import { Meter } from './session/meter.js';
 import { Outbox } from './session/outbox.js';
-import { CATALOG_PRIORITY, type TrackPlan } from './session/plan.js';
+import type { TrackPlan } from './session/plan.js';
 import { Reading, type Sink } from './session/reading.js';
 import { parseTarget } from './session/target.js';
 import { reportUncaught } from './session/uncaught.js';
@@ -166,9 +167,8 @@ class LiveSession implements Session, Sink {
     const dead = new Promise<Ending>((resolve) => (die = resolve));
     this.link = link;
     this.silence = 0;
-    const catalog = link.subscribe('catalog', { priority: CATALOG_PRIORITY, maxAge: 0 }, (frame) =>
-      this.catalogFrame(frame, link),
-    );
+    const { name, priority } = CATALOG_TRACK;
+    const catalog = link.subscribe(name, { priority, maxAge: 0 }, (frame) => this.catalogFrame(frame, link));
     let beaten = seconds();
     const beat = setInterval(() => {
       const now = seconds();
@@ -220,7 +220,7 @@ class LiveSession implements Session, Sink {
   // What arrives
 
   private catalogFrame(frame: Uint8Array, link: Link): void {
-    const now = this.hear('catalog', frame);
+    const now = this.hear(CATALOG_TRACK.name, frame);
     let changed: boolean;
     try {
       changed = this.cache.addCatalog(frame);
@@ -242,7 +242,7 @@ class LiveSession implements Session, Sink {
   }
 
   state(frame: Uint8Array): void {
-    const now = this.hear('state', frame);
+    const now = this.hear(STATE_TRACK.name, frame);
     try {
       this.cache.addState(frame, now);
     } catch (error) {

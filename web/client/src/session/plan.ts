@@ -1,14 +1,8 @@
 import type { Catalog, Field, Grid, Region } from '../codec/catalog.js';
+import { lightPriority, lightTrack, TURN_PRIORITY } from '../codec/tracks.js';
 import type { Vec3, Vec4 } from '../edit.js';
 import type { Turns } from './turns.js';
 
-/** Priorities of the tracks that are always read. */
-export const CATALOG_PRIORITY = 255;
-export const STATE_PRIORITY = 254;
-/** Priority of the lowest layer of a region that has its turn. */
-const TURN_PRIORITY = 252;
-/** Regions of different priority in each layer; those farther away share the last. */
-const RANKS = 80;
 /**
  * Tracks read at once. Each takes a stream, and a peer allows about 100: past this, far regions lose
  * their upper layers, then all do, then far ones take turns (see `Turns`).
@@ -26,7 +20,7 @@ export interface TrackPlan {
 
 /** The tracks of the regions' lowest layers, near regions first. */
 export function lowestTracks(catalog: Catalog, camera: Vec3 | undefined): string[] {
-  return byDistance(catalog, camera).map(({ field, region }) => trackName(field, region, 0));
+  return byDistance(catalog, camera).map(({ field, region }) => lightTrack(field.id, region.id, 0));
 }
 
 /**
@@ -47,16 +41,10 @@ export function planTracks(
     if (layer > 0 && regions.length >= MOST_TRACKS) break;
     regions.forEach(({ field, region }, rank) => {
       if (layer >= field.layers) return;
-      const name = trackName(field, region, layer);
+      const name = lightTrack(field.id, region.id, layer);
       if (turns && !turns.reads(name)) return;
-      const ranked = STATE_PRIORITY - 4 - RANKS * layer - Math.min(rank, RANKS - 1);
-      plan.push({
-        name,
-        field: field.id,
-        region: region.id,
-        layer,
-        priority: name === turns?.turn ? TURN_PRIORITY : ranked,
-      });
+      const priority = name === turns?.turn ? TURN_PRIORITY : lightPriority(layer, rank);
+      plan.push({ name, field: field.id, region: region.id, layer, priority });
     });
   }
   return plan.slice(0, MOST_TRACKS);
@@ -72,10 +60,6 @@ function byDistance(catalog: Catalog, camera: Vec3 | undefined): { field: Field;
       })),
     )
     .sort((a, b) => a.distance - b.distance);
-}
-
-function trackName(field: Field, region: Region, layer: number): string {
-  return `f${field.id}/r${region.id}/l${layer}`;
 }
 
 /** Metres from a point in the world to a region's box. */

@@ -1,8 +1,9 @@
 import { type Catalog, epochOf } from '../codec/catalog.js';
+import { STATE_TRACK } from '../codec/tracks.js';
 import type { Vec3 } from '../edit.js';
 import type { Link, TrackReader } from '../transport.js';
 import { LayerControl } from './layers.js';
-import { lowestTracks, MOST_TRACKS, planTracks, STATE_PRIORITY, type TrackPlan } from './plan.js';
+import { lowestTracks, MOST_TRACKS, planTracks, type TrackPlan } from './plan.js';
 import { Turns } from './turns.js';
 
 /** Milliseconds for which state frames are waited for: every one of them counts. */
@@ -50,7 +51,8 @@ export class Reading {
     this.layers = new LayerControl(most, catalog.tickSeconds, (layers) =>
       framesPerUpdate(planTracks(catalog, layers, this.camera).filter(steady)),
     );
-    this.stateReader = link.subscribe('state', { priority: STATE_PRIORITY, maxAge: STATE_AGE }, (frame) => {
+    const { name: state, priority } = STATE_TRACK;
+    this.stateReader = link.subscribe(state, { priority, maxAge: STATE_AGE }, (frame) => {
       this.ticked = true;
       sink.state(frame);
     });

@@ -1,6 +1,7 @@
 import { Broadcast, Connection, Group, Path, Time, type Track } from '@moq/net';
 
 import { LIMITS } from '../codec/limits.js';
+import { EDITS_TRACK } from '../codec/tracks.js';
 import type { Connector, Link, ReadOptions, Target, TrackReader } from '../transport.js';
 import { developmentServer } from './certificate.js';
 import { castScene, diagnose } from './diagnosis.js';
@@ -185,7 +186,7 @@ export class MoqReader implements TrackReader {
 /** The broadcast by which a client sends its edits. */
 export class EditTrack {
   readonly broadcast = new Broadcast.Producer();
-  private readonly track = this.broadcast.createTrack('edits');
+  private readonly track = this.broadcast.createTrack(EDITS_TRACK);
   private group: Group.Producer | undefined;
   private frames = 0;
   /** Groups are numbered on from the clock, so that none of a former connection is newer. */
