@@ -37,13 +37,15 @@ const catalog = {
   fields: [
     {
       id: 0,
-      kind: 'volume',
-      basis: 'sh',
-      order: ORDER,
       use: 'all',
-      grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: [1, 1, 1], resolution: SIZE },
-      regions: [{ id: 0, min: [0, 0, 0], size: SIZE }],
-      layers: 3,
+      kind: 'volume',
+      shape: {
+        basis: 'sh',
+        order: ORDER,
+        grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: [1, 1, 1], resolution: SIZE },
+        regions: [{ id: 0, min: [0, 0, 0], size: SIZE }],
+        layers: 3,
+      },
     },
   ],
 };

@@ -1,14 +1,18 @@
-import type { Catalog, Field } from './codec/catalog.js';
+import type { Catalog, FieldInfo } from './codec/catalog.js';
 import type { Edit, Vec3 } from './edit.js';
 
+/** The light of one field at one moment; `kind` says which members it has. See `isVolume`. */
+export type FieldLight = VolumeLight;
+
 /**
- * One field of light as it stands at one moment.
+ * The light of a volume at one moment.
  *
  * The arrays belong to the cache and change with the next call of `light`: read them, don't keep them.
  */
-export interface FieldLight {
-  /** What the newest catalog says of the field: its grid, order and use. */
-  readonly field: Field;
+export interface VolumeLight {
+  readonly kind: 'volume';
+  /** What the newest catalog says of the field: its use, its grid, its order. */
+  readonly field: FieldInfo<'volume'>;
   /**
    * Coefficients of arriving radiance, cd/m²: `(order+1)²` times r, g, b a probe, probe by probe with
    * x fastest, then y, then z.
@@ -117,6 +121,14 @@ export interface RefusedEdit {
   readonly reason: string;
 }
 
+/** Newer light of a region of a field. */
+export interface LightNews {
+  readonly field: number;
+  readonly region: number;
+  /** Server tick in which it was computed. */
+  readonly tick: number;
+}
+
 /** What a session tells; the values are the listeners' argument. */
 export interface SessionEvents {
   /** The server's fields are known, or have changed in more than their scales. */
@@ -131,7 +143,7 @@ export interface SessionEvents {
   /** One of this session's edits was refused: undo what it showed. */
   refused: RefusedEdit;
   /** An update of a field arrived. */
-  light: { readonly field: number; readonly region: number; readonly tick: number };
+  light: LightNews;
   status: Status;
 }
 

@@ -1,5 +1,5 @@
 import type { Vec3 } from './edit.js';
-import { valuesPerProbe } from './codec/catalog.js';
+import { valuesPerProbe } from './codec/volume-shape.js';
 
 /**
  * Packing of a probe volume into the atlas that shaders sample: one RGBA16F 3D texture, the volume's
@@ -45,7 +45,7 @@ export function halfBits(value: number): number {
 }
 
 /**
- * Packs a volume's coefficients (as in `FieldLight.coefficients`) into `target`, which holds
+ * Packs a volume's coefficients (as in `VolumeLight.coefficients`) into `target`, which holds
  * `width * height * depth * 4` halves; allocates it when absent.
  */
 export function packAtlas(

@@ -2,7 +2,7 @@ import type { AcceptedEdit, FieldLight, LightState, RefusedEdit, SavedScene } fr
 import { ServerClock } from './cache/clock.js';
 import { FieldCache } from './cache/field.js';
 import { type PendingEdit, PendingEdits } from './cache/pending.js';
-import { type Catalog, epochOf, offersSame, parseCatalog } from './codec/catalog.js';
+import { type Catalog, epochOf, hasSameShape, offersSame, parseCatalog } from './codec/catalog.js';
 import { readLightFile } from './codec/file.js';
 import type { ProbeHeader } from './codec/probe-header.js';
 import { parseState, type StateFrame } from './codec/state.js';
@@ -114,7 +114,7 @@ export class Cache {
       // Each field's updates are numbered by its own server's run.
       const anew = this.saved || (before && same && epochOf(before, same.field) !== epochOf(catalog, field));
       if (same && anew) same.forgetUpdates();
-      if (same?.sameShape(field)) {
+      if (same && hasSameShape(same.field, field)) {
         same.field = field;
         this.fields.set(field.id, same);
         old.delete(field.id);

@@ -6,6 +6,7 @@
  * session.on('edit', ({ edit }) => apply(edit));
  * await session.edit({ edit: 'set_light', node: 7, intensity: 800 });
  * const { fields, age } = session.light();
+ * const volumes = fields.filter(isVolume);
  * ```
  */
 export * from './api.js';
@@ -15,17 +16,27 @@ export { capabilities, type Capabilities } from './capabilities.js';
 export {
   type Catalog,
   epochOf,
-  type Field,
-  type Grid,
-  type Offset,
+  type FieldHead,
+  type FieldInfo,
+  type FieldKind,
+  hasSameShape,
+  isVolume,
   parseCatalog,
-  type Region,
-  valuesPerProbe,
+  type Shapes,
+  type UnknownField,
   WIRE_VERSION,
 } from './codec/catalog.js';
 export { type LightFile, readLightFile } from './codec/file.js';
+export type { LightHead, ProbeHeader } from './codec/probe-header.js';
 export { ProbeDecoder, type RegionLight } from './codec/probes.js';
 export { parseState, type StateFrame } from './codec/state.js';
+export {
+  type Grid,
+  type Offset,
+  type Region,
+  valuesPerProbe,
+  type VolumeShape,
+} from './codec/volume-shape.js';
 export type * from './edit.js';
 export { fetchLight, openLight, type SavedOptions } from './saved.js';
 export { connect, type ConnectOptions } from './session.js';

@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 
 import { atlasLayout, halfBits, packAtlas } from '../src/atlas.js';
-import { valuesPerProbe } from '../src/codec/catalog.js';
+import { valuesPerProbe } from '../src/codec/volume-shape.js';
 import type { Vec3 } from '../src/edit.js';
 import { random } from './support/random.js';
 import { readVectors } from './support/vectors.js';

@@ -362,10 +362,10 @@ describe('a restarted server', () => {
     feed(cache, old.step(), 0);
     const fresh = new FakeServer({ epoch: '00000000000000bb', regions: 2, brightness: () => 80 });
     cache.addCatalog(fresh.catalog);
-    expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([1]);
+    expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([1]);
     expect(cache.light(1).fields[0].tick).toBeUndefined();
     feed(cache, fresh.step(), 1);
-    expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([2]);
+    expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([2]);
   });
 
   it('without a field that it had shows that one too until there is new light', () => {
@@ -433,10 +433,10 @@ describe('a field with an epoch of its own', () => {
     feed(cache, server.step(), 0);
     const fresh = new FakeServer({ ...own, fieldEpoch: '00000000000000f2', regions: 2 });
     cache.addCatalog(fresh.catalog);
-    expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([1]);
+    expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([1]);
     expect(cache.light(1).fields[0].tick).toBeUndefined();
     feed(cache, { probes: fresh.step().probes }, 1);
-    expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([2]);
+    expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([2]);
   });
 
   it('keeps one old light, however often its shape changes', () => {
@@ -449,7 +449,7 @@ describe('a field with an epoch of its own', () => {
     const cache = joined(shaped(0));
     feed(cache, shaped(0).step(), 0);
     for (let i = 1; i < 50; i++) cache.addCatalog(shaped(i).catalog);
-    expect(cache.light(1).fields.map(({ field }) => field.regions.length)).toEqual([1]);
+    expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([1]);
     // Shapes that never had light are not kept.
     expect(cache['leftover'].length).toBe(1);
     // Where each shape had light, the last is shown.
@@ -458,7 +458,7 @@ describe('a field with an epoch of its own', () => {
       feed(cache, { probes: shaped(i).step().probes }, i);
     }
     cache.addCatalog(shaped(80).catalog);
-    expect(cache.light(81).fields.map(({ field }) => field.regions.length)).toEqual([1 + (79 % 3)]);
+    expect(cache.light(81).fields.map(({ field }) => field.shape.regions.length)).toEqual([1 + (79 % 3)]);
   });
 });
 

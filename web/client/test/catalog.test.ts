@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 
-import { epochOf, offersSame, parseCatalog } from '../src/codec/catalog.js';
+import { epochOf, hasSameShape, offersSame, parseCatalog } from '../src/codec/catalog.js';
 import { parseState } from '../src/codec/state.js';
 import { FakeServer, json } from './support/fake-server.js';
 import { random } from './support/random.js';
@@ -14,11 +14,27 @@ function catalog(change: (catalog: Loose, field: Loose) => void = () => {}): Uin
 }
 
 describe('a catalog', () => {
-  it('is read, without the fields of unknown kinds', () => {
-    const { epoch, tickSeconds, fields } = parseCatalog(catalog());
+  it('is read, with the fields of unknown kinds apart', () => {
+    const { epoch, tickSeconds, fields, unknown } = parseCatalog(catalog());
+    expect(unknown).toEqual([{ id: 9, kind: 'something later' }]);
     expect([epoch, tickSeconds, fields.length]).toEqual(['00000000000000aa', 0.04, 1]);
-    expect(fields[0].regions[1]).toEqual({ id: 1, min: [2, 0, 0], size: [2, 2, 2] });
+    expect(fields[0].shape.regions[1]).toEqual({ id: 1, min: [2, 0, 0], size: [2, 2, 2] });
   });
+
+  const unknown: [string, (catalog: Loose, field: Loose) => void, object][] = [
+    ['another kind', (_, f) => (f.kind = 'hologram'), { id: 0, kind: 'hologram' }],
+    ['what all objects have as kind', (_, f) => (f.kind = 'constructor'), { id: 0, kind: 'constructor' }],
+    ['no kind and no number', (_, f) => ((f.kind = 1), (f.id = -1)), { id: undefined, kind: undefined }],
+    ['an escape sequence as kind', (_, f) => (f.kind = '\u001b[2J'), { id: 0, kind: undefined }],
+    ['another basis', (_, f) => (f.shape.basis = 'ambient cube'), { id: 0, kind: 'volume' }],
+  ];
+  for (const [name, change, wanted] of unknown) {
+    it(`tells apart a field of ${name}`, () => {
+      const read = parseCatalog(catalog(change));
+      expect(read.fields).toEqual([]);
+      expect(read.unknown).toEqual([wanted, { id: 9, kind: 'something later' }]);
+    });
+  }
 
   it('tells what computes a field, and its epoch where it is another', () => {
     const old = parseCatalog(catalog());
@@ -31,9 +47,11 @@ describe('a catalog', () => {
   });
 
   it('tells where in front of surfaces a field is read: half a cell unless it says so', () => {
-    expect(parseCatalog(catalog()).fields[0].offset).toEqual({ cells: 0.5 });
+    expect(parseCatalog(catalog()).fields[0].shape.offset).toEqual({ cells: 0.5 });
     for (const offset of [{ cells: 0.125 }, { metres: 0.1 }]) {
-      expect(parseCatalog(catalog((_, f) => (f.offset = offset))).fields[0].offset).toEqual(offset);
+      expect(parseCatalog(catalog((_, f) => (f.shape.offset = offset))).fields[0].shape.offset).toEqual(
+        offset,
+      );
     }
   });
 
@@ -49,15 +67,28 @@ describe('a catalog', () => {
     expect(same((c) => (c.epoch = '00000000000000ab'))).toBe(false);
     expect(same((_, f) => (f.epoch = '00000000000000ab'))).toBe(false);
     expect(same((_, f) => (f.source = 'another'))).toBe(false);
-    expect(same((_, f) => (f.layers = 2))).toBe(false);
-    expect(same((_, f) => (f.offset = { cells: 0 }))).toBe(false);
-    expect(same((_, f) => (f.grid.size = [4, 2, 3]))).toBe(false);
+    expect(same((_, f) => (f.shape.layers = 2))).toBe(false);
+    expect(same((_, f) => (f.shape.offset = { cells: 0 }))).toBe(false);
+    expect(same((_, f) => (f.shape.grid.size = [4, 2, 3]))).toBe(false);
     expect(same((c) => (c.fields = []))).toBe(false);
   });
 
+  it('has fields of the same shape where kind and shape are equal', () => {
+    const [field] = parseCatalog(catalog()).fields;
+    const same = (change: (f: Loose) => void) =>
+      hasSameShape(field, parseCatalog(catalog((_, f) => change(f))).fields[0]);
+    const head = { id: 7, use: 'static', scale_log2: 5, source: 'another', epoch: '00000000000000ab' };
+    expect(same((f) => Object.assign(f, head))).toBe(true);
+    expect(same((f) => (f.shape.offset = { cells: 0.5 }))).toBe(true);
+    expect(same((f) => (f.shape.offset = { metres: 0.5 }))).toBe(false);
+    expect(same((f) => (f.shape.layers = 2))).toBe(false);
+    expect(same((f) => (f.shape.cells_min = [0, 0, 1]))).toBe(false);
+    expect(same((f) => (f.shape.regions[0].id = 5))).toBe(false);
+  });
+
   it('has its rotation made a unit quaternion', () => {
-    const { fields } = parseCatalog(catalog((_, field) => (field.grid.rotation = [0, 0.6001, 0, 0.8])));
-    expect(Math.hypot(...fields[0].grid.rotation)).toBeCloseTo(1, 12);
+    const { fields } = parseCatalog(catalog((_, field) => (field.shape.grid.rotation = [0, 0.6001, 0, 0.8])));
+    expect(Math.hypot(...fields[0].shape.grid.rotation)).toBeCloseTo(1, 12);
   });
 
   const refused: [string, string, (catalog: Loose, field: Loose) => void][] = [
@@ -75,24 +106,26 @@ describe('a catalog', () => {
   }
 
   const unusable: [string, (catalog: Loose, field: Loose) => void][] = [
-    ['order 5', (_, f) => (f.order = 5)],
+    ['order 5', (_, f) => (f.shape.order = 5)],
+    ['no shape', (_, f) => delete f.shape],
     ['an unknown use', (_, f) => (f.use = 'some')],
-    ['an offset without a unit', (_, f) => (f.offset = 0.5)],
-    ['an offset in feet', (_, f) => (f.offset = { feet: 1 })],
-    ['no layers', (_, f) => (f.layers = 0)],
+    ['an offset without a unit', (_, f) => (f.shape.offset = 0.5)],
+    ['an offset in feet', (_, f) => (f.shape.offset = { feet: 1 })],
+    ['no layers', (_, f) => (f.shape.layers = 0)],
     ['a short epoch of a field', (_, f) => (f.epoch = 'abc')],
-    ['a flat box', (_, f) => (f.grid.size = [1, 0, 1])],
-    ['a rotation of length 2', (_, f) => (f.grid.rotation = [0, 0, 0, 2])],
-    ['too many probes', (_, f) => (f.grid.resolution = [65, 64, 64])],
-    ['half a cell', (_, f) => (f.grid.resolution = [4, 2, 1.5])],
-    ['a cell without region', (_, f) => f.regions.pop()],
-    ['overlapping regions', (_, f) => (f.regions[1].min = [1, 0, 0])],
-    ['a region outside', (_, f) => (f.regions[1].min = [3, 0, 0])],
-    ['a region of 17 cells', (_, f) => (f.regions[0].size = [17, 2, 2])],
-    ['a region twice', (_, f) => (f.regions[1].id = 0)],
+    ['a flat box', (_, f) => (f.shape.grid.size = [1, 0, 1])],
+    ['a rotation of length 2', (_, f) => (f.shape.grid.rotation = [0, 0, 0, 2])],
+    ['too many probes', (_, f) => (f.shape.grid.resolution = [65, 64, 64])],
+    ['half a cell', (_, f) => (f.shape.grid.resolution = [4, 2, 1.5])],
+    ['a cell without region', (_, f) => f.shape.regions.pop()],
+    ['overlapping regions', (_, f) => (f.shape.regions[1].min = [1, 0, 0])],
+    ['a region outside', (_, f) => (f.shape.regions[1].min = [3, 0, 0])],
+    ['a region of 17 cells', (_, f) => (f.shape.regions[0].size = [17, 2, 2])],
+    ['a region twice', (_, f) => (f.shape.regions[1].id = 0)],
   ];
   for (const [name, change] of unusable) {
-    it(`leaves out a field with ${name}`, () => expect(parseCatalog(catalog(change)).fields).toEqual([]));
+    it(`leaves out a field with ${name}`, () =>
+      expect(parseCatalog(catalog(change))).toMatchObject({ fields: [], unknown: [{ id: 9 }] }));
   }
 
   const none: [string, (catalog: Loose, field: Loose) => void][] = [
@@ -127,8 +160,12 @@ describe('a catalog', () => {
     }
     const many = (count: number) =>
       catalog((c, f) => {
-        const grid = { ...f.grid, resolution: [64, 64, 64] };
-        c.fields = Array.from({ length: count }, (_, id) => ({ ...f, id, grid, regions }));
+        const grid = { ...f.shape.grid, resolution: [64, 64, 64] };
+        c.fields = Array.from({ length: count }, (_, id) => ({
+          ...f,
+          id,
+          shape: { ...f.shape, grid, regions },
+        }));
       });
     expect(parseCatalog(many(2)).fields.length).toBe(2);
     expect(() => parseCatalog(many(3))).toThrow(expect.objectContaining({ kind: 'limit' }));

@@ -1,28 +1,38 @@
 import { describe, expect, it } from 'vitest';
 
-import type { Catalog, Field, Region } from '../src/codec/catalog.js';
+import type { Catalog, FieldInfo } from '../src/codec/catalog.js';
+import type { Region } from '../src/codec/volume-shape.js';
 import type { Vec3, Vec4 } from '../src/edit.js';
-import { distanceToRegion, planTracks } from '../src/session/plan.js';
+import { boxDistance } from '../src/session/box.js';
+import { planTracks } from '../src/session/plan.js';
 
 const HALF = Math.SQRT1_2;
 
-function field(regions: Region[], resolution: Vec3, rotation: Vec4 = [0, 0, 0, 1]): Field {
+function field(
+  regions: Region[],
+  resolution: Vec3,
+  rotation: Vec4 = [0, 0, 0, 1],
+  layers = 3,
+): FieldInfo<'volume'> {
   return {
     id: 3,
-    kind: 'volume',
-    basis: 'sh',
-    order: 2,
     use: 'all',
-    grid: { center: [10, 0, 0], rotation, size: [8, 4, 4], resolution },
-    offset: { cells: 0.5 },
-    cellsMin: [0, 0, 0],
-    regions,
-    layers: 3,
+    kind: 'volume',
+    shape: {
+      basis: 'sh',
+      order: 2,
+      grid: { center: [10, 0, 0], rotation, size: [8, 4, 4], resolution },
+      offset: { cells: 0.5 },
+      cellsMin: [0, 0, 0],
+      regions,
+      layers,
+    },
   };
 }
 
-function catalog(fields: Field[]): Catalog {
-  return { epoch: '0123456789abcdef', scene: { name: 'x', root: 'x.glb' }, tickSeconds: 0.04, fields };
+function catalog(fields: FieldInfo[]): Catalog {
+  const scene = { name: 'x', root: 'x.glb' };
+  return { epoch: '0123456789abcdef', scene, tickSeconds: 0.04, fields, unknown: [] };
 }
 
 describe('the distance to a region', () => {
@@ -30,20 +40,20 @@ describe('the distance to a region', () => {
   const right: Region = { id: 1, min: [4, 0, 0], size: [4, 4, 4] };
 
   it('is that to its box, 0 inside', () => {
-    const { grid } = field([left, right], [8, 4, 4]);
+    const { grid } = field([left, right], [8, 4, 4]).shape;
     // The left half reaches from x = 6 to 10, y and z from −2 to 2.
-    expect(distanceToRegion(grid, left, [8, 1, -1])).toBe(0);
-    expect(distanceToRegion(grid, left, [13, 0, 0])).toBe(3);
-    expect(distanceToRegion(grid, left, [3, 6, 0])).toBe(5);
-    expect(distanceToRegion(grid, right, [3, 0, 0])).toBe(7);
+    expect(boxDistance(grid, left, [8, 1, -1])).toBe(0);
+    expect(boxDistance(grid, left, [13, 0, 0])).toBe(3);
+    expect(boxDistance(grid, left, [3, 6, 0])).toBe(5);
+    expect(boxDistance(grid, right, [3, 0, 0])).toBe(7);
   });
 
   it('follows the box when it is turned', () => {
     // A quarter turn about +Y takes the grid's +x to the world's −z: the right half lies at z < 0.
-    const { grid } = field([left, right], [8, 4, 4], [0, HALF, 0, HALF]);
-    expect(distanceToRegion(grid, right, [10, 0, -3])).toBeCloseTo(0);
-    expect(distanceToRegion(grid, left, [10, 0, -3])).toBeCloseTo(3);
-    expect(distanceToRegion(grid, left, [10, 0, 3])).toBeCloseTo(0);
+    const { grid } = field([left, right], [8, 4, 4], [0, HALF, 0, HALF]).shape;
+    expect(boxDistance(grid, right, [10, 0, -3])).toBeCloseTo(0);
+    expect(boxDistance(grid, left, [10, 0, -3])).toBeCloseTo(3);
+    expect(boxDistance(grid, left, [10, 0, 3])).toBeCloseTo(0);
   });
 });
 
@@ -71,7 +81,7 @@ describe('the tracks to read', () => {
   });
 
   it('leave out layers that a field lacks', () => {
-    const one = { ...field(row(1), [1, 1, 1]), layers: 1 };
+    const one = field(row(1), [1, 1, 1], undefined, 1);
     expect(planTracks(catalog([one]), 3, undefined).map(({ name }) => name)).toEqual(['f3/r0/l0']);
   });
 });

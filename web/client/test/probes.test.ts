@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 
-import { valuesPerProbe } from '../src/codec/catalog.js';
+import { valuesPerProbe } from '../src/codec/volume-shape.js';
 import { ProbeDecoder } from '../src/codec/probes.js';
 import type { Vec3 } from '../src/edit.js';
 import { WireError } from '../src/wire-error.js';

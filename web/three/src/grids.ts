@@ -1,4 +1,11 @@
-import { type Field, halfBits, type LightState, packAtlas, type Vec3 } from '@lumencast/client';
+import {
+  halfBits,
+  isVolume,
+  type LightState,
+  packAtlas,
+  type Vec3,
+  type VolumeLight,
+} from '@lumencast/client';
 import {
   ClampToEdgeWrapping,
   Data3DTexture,
@@ -11,7 +18,7 @@ import {
 import { withMargin } from './margin.js';
 import type { Platform, ProbeGrid } from './platform.js';
 import { L2_VALUES, Resampler, toL2 } from './resample.js';
-import { type GridPlan, mostCells, planVolumes } from './volumes.js';
+import { type GridPlan, mostCells, planVolumes, type Volume } from './volumes.js';
 
 /**
  * By how many cells a grid's box is larger on each side than the volume. A grid lights nothing outside
@@ -21,12 +28,12 @@ import { type GridPlan, mostCells, planVolumes } from './volumes.js';
 const GROWTH = 0.05;
 
 /**
- * The probe grids of a scene: made from the catalog's fields, filled from the session's light. Each
+ * The probe grids of a scene: made from the catalog's volumes, filled from the session's light. Each
  * owns one half-float 3D texture, whose data is replaced when the light has changed.
  */
 export class ProbeGrids {
   #filled: FilledGrid[] = [];
-  #fields: readonly Field[] = [];
+  #volumes: readonly Volume[] = [];
   /** The most grids that the plan could have. */
   #planned = 0;
   #black = atlasTexture([1, 1, 1], new Uint16Array(4 * 7 * 3));
@@ -37,25 +44,25 @@ export class ProbeGrids {
     private readonly platform: Platform,
   ) {}
 
-  /** Replaces the grids by those for these fields; returns what could not be shown as meant. */
-  setFields(fields: readonly Field[]): readonly string[] {
-    this.#fields = fields;
+  /** Replaces the grids by those for these volumes; returns what could not be shown as meant. */
+  setVolumes(volumes: readonly Volume[]): readonly string[] {
+    this.#volumes = volumes;
     return this.#plan();
   }
 
-  /** Replaces the grids where the scene now leaves units for more or fewer; returns as {@link setFields}. */
+  /** Replaces the grids where the scene now leaves units for more or fewer; returns as {@link setVolumes}. */
   fit(): readonly string[] {
     return this.#mostGrids() === this.#planned ? [] : this.#plan();
   }
 
   #mostGrids(): number {
-    return Math.max(0, Math.min(this.platform.freeGrids(this.scene), this.#fields.length));
+    return Math.max(0, Math.min(this.platform.freeGrids(this.scene), this.#volumes.length));
   }
 
   #plan(): readonly string[] {
     const { platform } = this;
     this.#planned = this.#mostGrids();
-    const plan = planVolumes(this.#fields, {
+    const plan = planVolumes(this.#volumes, {
       grids: this.#planned,
       textureSize: platform.max3DTextureSize,
     });
@@ -86,7 +93,8 @@ export class ProbeGrids {
 
   /** Takes over light that has changed; true when some had. */
   update(light: LightState): boolean {
-    return this.#filled.map((filled) => filled.update(light)).includes(true);
+    const volumes = light.fields.filter(isVolume);
+    return this.#filled.map((filled) => filled.update(volumes)).includes(true);
   }
 
   dispose(): void {
@@ -133,8 +141,8 @@ class FilledGrid {
     this.grid.boundingBox.expandByVector(new Vector3(...cell).multiplyScalar(GROWTH));
   }
 
-  update(light: LightState): boolean {
-    const sources = this.plan.fields.map((field) => light.fields.find((lit) => lit.field.id === field.id));
+  update(volumes: readonly VolumeLight[]): boolean {
+    const sources = this.plan.fields.map((field) => volumes.find((lit) => lit.field.id === field.id));
     const revisions = sources.map((source) => source?.revision).join();
     if (revisions === this.#revisions) return false;
     this.#revisions = revisions;
@@ -148,7 +156,7 @@ class FilledGrid {
   }
 
   /** L2 coefficients of the grid's own probes. */
-  #gather(sources: readonly (LightState['fields'][number] | undefined)[]): Float32Array {
+  #gather(sources: readonly (VolumeLight | undefined)[]): Float32Array {
     if (this.#resampler) {
       this.#resampler.fill(
         sources.map((source) => source?.coefficients),
@@ -158,7 +166,7 @@ class FilledGrid {
     }
     const source = sources[0];
     return source
-      ? toL2(source.coefficients, source.field.order, this.#coefficients)
+      ? toL2(source.coefficients, source.field.shape.order, this.#coefficients)
       : this.#coefficients.fill(0);
   }
 

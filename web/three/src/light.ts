@@ -1,4 +1,12 @@
-import type { AcceptedEdit, Catalog, Edit, EditOptions, Environment, Session } from '@lumencast/client';
+import {
+  type AcceptedEdit,
+  type Catalog,
+  type Edit,
+  type EditOptions,
+  type Environment,
+  isVolume,
+  type Session,
+} from '@lumencast/client';
 import { type Camera, type Light, type Object3D, type Scene, Vector3 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import type { Content } from './content.js';
@@ -217,7 +225,7 @@ export class LumencastLight {
     if (epoch !== this.#epoch) this.#replica.forgetAdopted();
     this.#epoch = epoch;
     this.#warned.clear();
-    this.#warnOnce(this.#grids.setFields(fields));
+    this.#warnOnce(this.#grids.setVolumes(fields.filter(isVolume)));
   }
 
   /** Grids are made anew as materials come and go. */

@@ -1,5 +1,5 @@
-import { type Field, type Vec3, valuesPerProbe } from '@lumencast/client';
-import { conjugate, type GridPlan, rotate } from './volumes.js';
+import { type Vec3, valuesPerProbe } from '@lumencast/client';
+import { conjugate, type GridPlan, rotate, type Volume } from './volumes.js';
 
 /** Values of an L2 probe: nine coefficients of three channels. */
 export const L2_VALUES = valuesPerProbe(2);
@@ -30,8 +30,8 @@ export class Resampler {
     const distances = plan.fields.map((field) => outside(field, position));
     const source = distances.indexOf(Math.min(...distances));
     this.#source[probe] = source;
-    const { resolution, size } = plan.fields[source].grid;
-    const axes = fieldFromWorld(plan.fields[source], position).map((p, axis) => {
+    const { resolution, size } = plan.fields[source].shape.grid;
+    const axes = volumeFromWorld(plan.fields[source], position).map((p, axis) => {
       const n = resolution[axis];
       const cell = Math.min(Math.max(snapped((p / size[axis] + 0.5) * n - 0.5), 0), n - 1);
       const low = Math.min(Math.floor(cell), Math.max(n - 2, 0));
@@ -53,7 +53,7 @@ export class Resampler {
    */
   fill(coefficients: readonly (Float32Array | undefined)[], out: Float32Array): void {
     out.fill(0);
-    const strides = this.plan.fields.map((field) => valuesPerProbe(field.order));
+    const strides = this.plan.fields.map((field) => valuesPerProbe(field.shape.order));
     for (let probe = 0; probe < this.#source.length; probe++) {
       const source = this.#source[probe];
       const from = coefficients[source];
@@ -94,13 +94,15 @@ function probePosition({ center, size, resolution }: GridPlan, probe: number): V
   return cell.map((c, axis) => center[axis] + ((c + 0.5) / resolution[axis] - 0.5) * size[axis]) as Vec3;
 }
 
-/** A world position in a field's box: metres from its centre along its axes. */
-function fieldFromWorld({ grid }: Field, position: Vec3): Vec3 {
+/** A world position in a volume's box: metres from its centre along its axes. */
+function volumeFromWorld({ shape: { grid } }: Volume, position: Vec3): Vec3 {
   return rotate(conjugate(grid.rotation), position.map((p, axis) => p - grid.center[axis]) as Vec3);
 }
 
-/** Distance from a field's box, 0 inside. */
-function outside(field: Field, position: Vec3): number {
-  const local = fieldFromWorld(field, position);
-  return Math.hypot(...local.map((p, axis) => Math.max(Math.abs(p) - field.grid.size[axis] / 2 - 1e-6, 0)));
+/** Distance from a volume's box, 0 inside. */
+function outside(field: Volume, position: Vec3): number {
+  const local = volumeFromWorld(field, position);
+  return Math.hypot(
+    ...local.map((p, axis) => Math.max(Math.abs(p) - field.shape.grid.size[axis] / 2 - 1e-6, 0)),
+  );
 }

@@ -1,4 +1,7 @@
-import type { Field, Grid, Vec3, Vec4 } from '@lumencast/client';
+import type { FieldInfo, Grid, Vec3, Vec4 } from '@lumencast/client';
+
+/** A field that is a volume. */
+export type Volume = FieldInfo<'volume'>;
 
 /**
  * Which probe grids of three.js show a server's volumes. three.js' grids are axis-aligned, L2, and
@@ -18,7 +21,7 @@ export interface GridPlan {
   readonly size: Vec3;
   readonly resolution: Vec3;
   /** Where the light comes from, fine before coarse. */
-  readonly fields: readonly Field[];
+  readonly fields: readonly Volume[];
   /** One field whose probes are the grid's own: nothing to resample. */
   readonly exact: boolean;
 }
@@ -35,7 +38,7 @@ export const MAX_RESAMPLED = 16_384;
 /** Sub-volumes of an L2 atlas. */
 const SUB_VOLUMES = 7;
 
-export function planVolumes(fields: readonly Field[], limits: VolumeLimits): VolumePlan {
+export function planVolumes(fields: readonly Volume[], limits: VolumeLimits): VolumePlan {
   const warnings: string[] = [];
   const maxCells = mostCells(limits.textureSize);
   let grids = forAllInstances(fields, warnings).map((field) => gridOf(field, maxCells, warnings));
@@ -53,17 +56,18 @@ export function mostCells(textureSize: number): Vec3 {
 }
 
 /** three.js lights every instance with the same grids. */
-function forAllInstances(fields: readonly Field[], warnings: string[]): readonly Field[] {
+function forAllInstances(fields: readonly Volume[], warnings: string[]): readonly Volume[] {
   const kept = fields.filter((field) => field.use !== 'moving');
   if (kept.length === 0 || kept.length === fields.length) return fields;
   warnings.push('volumes for moving instances only are left out: three.js lights all instances alike');
   return kept;
 }
 
-function gridOf(field: Field, maxCells: Vec3, warnings: string[]): GridPlan {
-  const { center, size, resolution, rotation } = field.grid;
-  if (!('cells' in field.offset && field.offset.cells === 0.5)) {
-    const off = 'cells' in field.offset ? `${field.offset.cells} cells` : `${field.offset.metres} m`;
+function gridOf(field: Volume, maxCells: Vec3, warnings: string[]): GridPlan {
+  const { grid, offset } = field.shape;
+  const { center, size, resolution, rotation } = grid;
+  if (!('cells' in offset && offset.cells === 0.5)) {
+    const off = 'cells' in offset ? `${offset.cells} cells` : `${offset.metres} m`;
     warnings.push(
       `volume ${field.id} is meant to be read ${off} off surfaces: three.js reads it half a cell off`,
     );
@@ -77,7 +81,7 @@ function gridOf(field: Field, maxCells: Vec3, warnings: string[]): GridPlan {
       ? `volume ${field.id} is turned: it is resampled into an axis-aligned grid`
       : `volume ${field.id} has too many cells for this device's 3D textures: it is resampled`,
   );
-  const half = halfExtent(field.grid);
+  const half = halfExtent(grid);
   return resampled(
     center.map((c, axis) => c - half[axis]) as Vec3,
     center.map((c, axis) => c + half[axis]) as Vec3,
@@ -106,9 +110,11 @@ function mergeClosest(grids: readonly GridPlan[], maxCells: Vec3, warnings: stri
 }
 
 /** A grid over a box, as fine as the finest source as far as the limits allow. */
-function resampled(min: Vec3, max: Vec3, fields: readonly Field[], maxCells: Vec3): GridPlan {
+function resampled(min: Vec3, max: Vec3, fields: readonly Volume[], maxCells: Vec3): GridPlan {
   const size = max.map((m, axis) => m - min[axis]) as Vec3;
-  const spacing = [0, 1, 2].map((axis) => Math.min(...fields.map((field) => axisSpacing(field.grid, axis))));
+  const spacing = [0, 1, 2].map((axis) =>
+    Math.min(...fields.map((field) => axisSpacing(field.shape.grid, axis))),
+  );
   const cells = (coarser: number) =>
     size.map((s, axis) =>
       Math.min(maxCells[axis], Math.max(1, Math.round(s / (spacing[axis] * coarser)))),
@@ -154,8 +160,8 @@ function cellVolume(grid: Pick<GridPlan, 'size' | 'resolution'>): number {
   return volume(grid.size) / volume(grid.resolution);
 }
 
-function fieldCell(field: Field): number {
-  return cellVolume(field.grid);
+function fieldCell(field: Volume): number {
+  return cellVolume(field.shape.grid);
 }
 
 export function volume(size: Vec3): number {

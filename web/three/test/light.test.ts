@@ -1,4 +1,4 @@
-import type { Edit, Field, LightState, SessionEvents } from '@lumencast/client';
+import type { Edit, FieldInfo, LightState, SessionEvents } from '@lumencast/client';
 import {
   Color,
   DataUtils,
@@ -52,18 +52,25 @@ class FakeSession {
   close = () => void (this.closed = true);
 }
 
-const field: Field = {
+const field: FieldInfo<'volume'> = {
   id: 4,
-  kind: 'volume',
-  basis: 'sh',
-  order: 2,
   use: 'all',
-  grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: [1, 1, 1], resolution: [1, 1, 1] },
-  offset: { cells: 0.5 },
-  cellsMin: [0, 0, 0],
-  regions: [],
-  layers: 3,
+  kind: 'volume',
+  shape: {
+    basis: 'sh',
+    order: 2,
+    grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: [1, 1, 1], resolution: [1, 1, 1] },
+    offset: { cells: 0.5 },
+    cellsMin: [0, 0, 0],
+    regions: [],
+    layers: 3,
+  },
 };
+
+/** What a server says that has these fields. */
+function catalogOf(...fields: FieldInfo[]): SessionEvents['catalog'] {
+  return { epoch: '', scene: { name: '', root: '' }, tickSeconds: 0.04, fields, unknown: [] };
+}
 
 let session: FakeSession;
 let scene: Scene;
@@ -93,9 +100,18 @@ beforeEach(() => {
 
 describe('light', () => {
   it('goes into a grid: halves of value over scale, and the scale in the free channel', () => {
-    session.tell('catalog', { epoch: '', scene: { name: '', root: '' }, tickSeconds: 0.04, fields: [field] });
+    session.tell('catalog', catalogOf(field));
     const coefficients = new Float32Array(27).fill(1024).with(0, 2048);
-    const lit = { field, coefficients, scale: 2048, revision: 1, age: 0, sceneVersion: 0, tick: 0 };
+    const lit = {
+      kind: 'volume' as const,
+      field,
+      coefficients,
+      scale: 2048,
+      revision: 1,
+      age: 0,
+      sceneVersion: 0,
+      tick: 0,
+    };
     session.state = { fields: [{ ...lit, regions: { lit: 1, all: 1 } }], age: 0 };
     light.update(camera);
     const texture = light.grids[0].texture!;
@@ -249,13 +265,13 @@ describe('follow', () => {
 
 describe('grids', () => {
   it('are made anew as materials leave other numbers of texture units, and warn once', () => {
-    const { grid } = field;
-    const fields = [-4, 0, 4].map((x, id) => ({
+    const { shape } = field;
+    const fields = [-4, 0, 4].map((x, id): FieldInfo => ({
       ...field,
       id,
-      grid: { ...grid, center: [x, 0, 0] },
-    })) as Field[];
-    session.tell('catalog', { epoch: '', scene: { name: '', root: '' }, tickSeconds: 0.04, fields });
+      shape: { ...shape, grid: { ...shape.grid, center: [x, 0, 0] } },
+    }));
+    session.tell('catalog', catalogOf(...fields));
     const free = vi.spyOn(platform, 'freeGrids');
     const gridsWith = (units: number) => {
       free.mockReturnValue(units);

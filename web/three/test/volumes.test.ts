@@ -1,30 +1,37 @@
-import type { Field, Vec3, Vec4 } from '@lumencast/client';
+import type { Grid, Vec3, Vec4, VolumeShape } from '@lumencast/client';
 import { describe, expect, it } from 'vitest';
 import { withMargin } from '../src/margin.js';
 import { L2_VALUES, Resampler, toL2 } from '../src/resample.js';
-import { mostCells, planVolumes } from '../src/volumes.js';
+import { mostCells, planVolumes, type Volume } from '../src/volumes.js';
 
 const WIDE = { grids: 8, textureSize: 2048 };
 const QUARTER_ABOUT_Y: Vec4 = [0, Math.SQRT1_2, 0, Math.SQRT1_2];
 
-function field(id: number, grid: Partial<Field['grid']>, rest: Partial<Field> = {}): Field {
+function field(id: number, grid: Partial<Grid>, rest: Partial<VolumeShape> = {}): Volume {
   return {
     id,
-    kind: 'volume',
-    basis: 'sh',
-    order: 2,
     use: 'all',
-    grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: [4, 4, 4], resolution: [4, 4, 4], ...grid },
-    offset: { cells: 0.5 },
-    cellsMin: [0, 0, 0],
-    regions: [],
-    layers: 3,
-    ...rest,
+    kind: 'volume',
+    shape: {
+      basis: 'sh',
+      order: 2,
+      grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: [4, 4, 4], resolution: [4, 4, 4], ...grid },
+      offset: { cells: 0.5 },
+      cellsMin: [0, 0, 0],
+      regions: [],
+      layers: 3,
+      ...rest,
+    },
   };
 }
 
+/** The same field with another box. */
+function inGrid(field: Volume, grid: Partial<Grid>): Volume {
+  return { ...field, shape: { ...field.shape, grid: { ...field.shape.grid, ...grid } } };
+}
+
 /** Coefficients whose c0 is a function of the probe's world position, for grids that are not turned. */
-function fill({ grid, order }: Field, value: (position: Vec3) => number): Float32Array {
+function fill({ shape: { grid, order } }: Volume, value: (position: Vec3) => number): Float32Array {
   const [nx, ny, nz] = grid.resolution;
   const stride = 3 * (order + 1) ** 2;
   const out = new Float32Array(nx * ny * nz * stride);
@@ -99,14 +106,14 @@ describe('planVolumes', () => {
   });
 
   it('leaves volumes for moving instances out where there are others', () => {
-    const moving = field(1, {}, { use: 'moving' });
+    const moving: Volume = { ...field(1, {}), use: 'moving' };
     expect(planVolumes([field(0, {}), moving], WIDE).grids).toHaveLength(1);
     expect(planVolumes([moving], WIDE).grids).toHaveLength(1);
   });
 });
 
 describe('withMargin', () => {
-  const margins = (fields: Field[], textureSize = 2048) => {
+  const margins = (fields: Volume[], textureSize = 2048) => {
     const { grids } = planVolumes(fields, { ...WIDE, textureSize });
     return grids.map((grid) => withMargin(grid, grids, mostCells(textureSize)));
   };
@@ -123,9 +130,8 @@ describe('withMargin', () => {
     ];
     const out = new Float32Array(6 * 5 * 4 * L2_VALUES);
     new Resampler(grid).fill([fill(lonely, value)], out);
-    const beyond = fill({ ...lonely, grid: { ...lonely.grid, ...grid } as Field['grid'] }, (position) =>
-      value(clamped(position)),
-    );
+    const { center, size, resolution } = grid;
+    const beyond = fill(inGrid(lonely, { center, size, resolution }), (position) => value(clamped(position)));
     expect(out).toEqual(beyond);
   });
 
@@ -163,7 +169,7 @@ describe('Resampler', () => {
   it('reads a turned volume at the world position', () => {
     // Light that grows along the box's own x, which after a quarter turn about y points to −z.
     const source = field(0, { rotation: QUARTER_ABOUT_Y, resolution: [4, 1, 1] });
-    const along = { ...source, grid: { ...source.grid, rotation: [0, 0, 0, 1] as Vec4 } };
+    const along = inGrid(source, { rotation: [0, 0, 0, 1] });
     const out = new Float32Array(4 * L2_VALUES);
     const plan = planVolumes([source], WIDE).grids[0];
     expect(plan.resolution).toEqual([1, 1, 4]);

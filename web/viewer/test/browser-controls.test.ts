@@ -168,7 +168,7 @@ describe('a person at the page', () => {
     const spheres = await page.evaluate(() => {
       const { camera, renderer, session, viewer } = window.lumencast!;
       const { clientWidth, clientHeight } = renderer.domElement;
-      const { center, size, resolution } = session.catalog!.fields[0].grid;
+      const { center, size, resolution } = session.catalog!.fields[0].shape.grid;
       const at = (axis: number, cell: number) =>
         center[axis] + ((cell + 0.5) / resolution[axis] - 0.5) * size[axis];
       const points: [number, number][] = [];

@@ -1,7 +1,8 @@
-import type { FieldLight } from '../api.js';
-import { cellCount, type Field, type Region, valuesPerProbe } from '../codec/catalog.js';
+import type { VolumeLight } from '../api.js';
+import type { FieldInfo } from '../codec/catalog.js';
 import { type ProbeHeader, splitProbeFrame } from '../codec/probe-header.js';
 import { ProbeDecoder } from '../codec/probes.js';
+import { cellCount, type Region, valuesPerProbe } from '../codec/volume-shape.js';
 
 /** Seconds that a change takes to show at most, however long the silence before it was. */
 const LONGEST_BLEND = 0.5;
@@ -44,14 +45,15 @@ export class FieldCache {
 
   constructor(
     /** What the newest catalog says of it. */
-    public field: Field,
+    public field: FieldInfo<'volume'>,
     private readonly tickSeconds: number,
   ) {
-    this.coefficients = new Float32Array(cellCount(field.grid.resolution) * valuesPerProbe(field.order));
-    for (const region of field.regions) {
+    const { grid, order, regions } = field.shape;
+    this.coefficients = new Float32Array(cellCount(grid.resolution) * valuesPerProbe(order));
+    for (const region of regions) {
       this.regions.set(region.id, {
         region,
-        decoder: new ProbeDecoder(region.size, field.order),
+        decoder: new ProbeDecoder(region.size, order),
         header: undefined,
         from: undefined,
         to: undefined,
@@ -72,23 +74,10 @@ export class FieldCache {
     return [...this.regions.values()].some(({ to }) => to !== undefined);
   }
 
-  /** Whether another field's light could take this one's place. */
-  sameShape(field: Field): boolean {
-    const shape = ({ order, grid, offset, cellsMin, regions, use }: Field) => ({
-      order,
-      grid,
-      offset,
-      cellsMin,
-      regions,
-      use,
-    });
-    return JSON.stringify(shape(field)) === JSON.stringify(shape(this.field));
-  }
-
   /** Forgets updates, which are numbered anew after a restart of the server; what is shown stays. */
   forgetUpdates(): void {
     for (const state of this.regions.values()) {
-      state.decoder = new ProbeDecoder(state.region.size, this.field.order);
+      state.decoder = new ProbeDecoder(state.region.size, this.field.shape.order);
       state.header = undefined;
     }
   }
@@ -137,7 +126,7 @@ export class FieldCache {
   }
 
   /** The light at `now`; `undefined` when no region has any. `ageOf` tells the age of a tick's light. */
-  light(now: number, ageOf: (tick: number, arrived: number) => number | undefined): FieldLight | undefined {
+  light(now: number, ageOf: (tick: number, arrived: number) => number | undefined): VolumeLight | undefined {
     let lit = 0;
     let scale = 0;
     let changed = false;
@@ -151,6 +140,7 @@ export class FieldCache {
     if (changed) this.revision++;
     const oldest = this.span()?.oldest;
     return {
+      kind: 'volume',
       field: this.field,
       coefficients: this.coefficients,
       scale,
@@ -167,8 +157,9 @@ export class FieldCache {
     if (!state.to || state.shown === w) return false;
     state.shown = w;
     const { min, size } = state.region;
-    const [width, height] = this.field.grid.resolution;
-    const n = valuesPerProbe(this.field.order);
+    const { grid, order } = this.field.shape;
+    const [width, height] = grid.resolution;
+    const n = valuesPerProbe(order);
     const row = size[0] * n;
     const from = state.from ?? state.to;
     for (let z = 0; z < size[2]; z++) {

@@ -3,18 +3,22 @@ import { WireError } from '../wire-error.js';
 import { LIMITS } from './limits.js';
 import { Reader } from './reader.js';
 
-/** All of a probe frame but its payload. */
-export interface ProbeHeader {
+/** What a frame of light says of itself, whatever the kind of its field. */
+export interface LightHead {
   /** Number u of the update. */
   readonly update: number;
-  /** The update that a delta changes; `undefined` in a keyframe. */
-  readonly base: number | undefined;
   /** Version of the scene that this light was computed from. */
   readonly sceneVersion: number;
   /** Server tick in which it was computed. */
   readonly tick: number;
   /** Scene time of that tick, seconds. */
   readonly time: number;
+}
+
+/** All of a probe frame but its payload. */
+export interface ProbeHeader extends LightHead {
+  /** The update that a delta changes; `undefined` in a keyframe. */
+  readonly base: number | undefined;
   /** A power of two near the field's largest coefficient. */
   readonly scale: number;
   /** 1 to 4. */

@@ -5,7 +5,7 @@
  */
 import type { Vec3 } from '../edit.js';
 import { WireError } from '../wire-error.js';
-import { cellCount, valuesPerProbe } from './catalog.js';
+import { cellCount, valuesPerProbe } from './volume-shape.js';
 import { Contexts, RangeDecoder, SIGNED_CONTEXTS } from './range.js';
 
 /** What encoder and decoder agree that a region holds. */

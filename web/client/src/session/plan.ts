@@ -1,6 +1,7 @@
-import type { Catalog, Field, Grid, Region } from '../codec/catalog.js';
+import type { Catalog } from '../codec/catalog.js';
 import { lightPriority, lightTrack, TURN_PRIORITY } from '../codec/tracks.js';
-import type { Vec3, Vec4 } from '../edit.js';
+import type { Vec3 } from '../edit.js';
+import { type PlannedRegion, regionsOf } from './regions.js';
 import type { Turns } from './turns.js';
 
 /**
@@ -20,7 +21,7 @@ export interface TrackPlan {
 
 /** The tracks of the regions' lowest layers, near regions first. */
 export function lowestTracks(catalog: Catalog, camera: Vec3 | undefined): string[] {
-  return byDistance(catalog, camera).map(({ field, region }) => lightTrack(field.id, region.id, 0));
+  return byDistance(catalog, camera).map(({ field, region }) => lightTrack(field, region, 0));
 }
 
 /**
@@ -39,50 +40,17 @@ export function planTracks(
   for (let layer = 0; layer < layers; layer++) {
     // Tracks that are free between turns are for those who wait, not for upper layers.
     if (layer > 0 && regions.length >= MOST_TRACKS) break;
-    regions.forEach(({ field, region }, rank) => {
-      if (layer >= field.layers) return;
-      const name = lightTrack(field.id, region.id, layer);
+    regions.forEach(({ field, region, layers: most }, rank) => {
+      if (layer >= most) return;
+      const name = lightTrack(field, region, layer);
       if (turns && !turns.reads(name)) return;
       const priority = name === turns?.turn ? TURN_PRIORITY : lightPriority(layer, rank);
-      plan.push({ name, field: field.id, region: region.id, layer, priority });
+      plan.push({ name, field, region, layer, priority });
     });
   }
   return plan.slice(0, MOST_TRACKS);
 }
 
-function byDistance(catalog: Catalog, camera: Vec3 | undefined): { field: Field; region: Region }[] {
-  return catalog.fields
-    .flatMap((field) =>
-      field.regions.map((region) => ({
-        field,
-        region,
-        distance: camera ? distanceToRegion(field.grid, region, camera) : 0,
-      })),
-    )
-    .sort((a, b) => a.distance - b.distance);
-}
-
-/** Metres from a point in the world to a region's box. */
-export function distanceToRegion(grid: Grid, region: Region, point: Vec3): number {
-  const local = rotateBack(grid.rotation, [0, 1, 2].map((i) => point[i] - grid.center[i]) as Vec3);
-  let squared = 0;
-  for (let axis = 0; axis < 3; axis++) {
-    const cell = grid.size[axis] / grid.resolution[axis];
-    const min = region.min[axis] * cell - grid.size[axis] / 2;
-    const max = min + region.size[axis] * cell;
-    squared += Math.max(min - local[axis], 0, local[axis] - max) ** 2;
-  }
-  return Math.sqrt(squared);
-}
-
-/** A vector turned by the inverse of a unit quaternion: v + 2w(u×v) + 2u×(u×v) with u = −xyz. */
-function rotateBack([x, y, z, w]: Vec4, v: Vec3): Vec3 {
-  const u: Vec3 = [-x, -y, -z];
-  const t = cross(u, v).map((c) => 2 * c) as Vec3;
-  const s = cross(u, t);
-  return [v[0] + w * t[0] + s[0], v[1] + w * t[1] + s[1], v[2] + w * t[2] + s[2]];
-}
-
-function cross(a: Vec3, b: Vec3): Vec3 {
-  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+function byDistance(catalog: Catalog, camera: Vec3 | undefined): PlannedRegion[] {
+  return catalog.fields.flatMap((field) => regionsOf(field, camera)).sort((a, b) => a.distance - b.distance);
 }

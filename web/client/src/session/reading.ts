@@ -4,6 +4,7 @@ import type { Vec3 } from '../edit.js';
 import type { Link, TrackReader } from '../transport.js';
 import { LayerControl } from './layers.js';
 import { lowestTracks, MOST_TRACKS, planTracks, type TrackPlan } from './plan.js';
+import { layersOf } from './regions.js';
 import { Turns } from './turns.js';
 
 /** Milliseconds for which state frames are waited for: every one of them counts. */
@@ -42,7 +43,7 @@ export class Reading {
     now: number,
   ) {
     this.beat = this.tickedAt = this.awake = now;
-    const most = Math.max(1, ...catalog.fields.map((field) => field.layers));
+    const most = Math.max(1, ...catalog.fields.map((field) => layersOf(field)));
     // Only of the catalog's own server are clock and updates known by which delivery is judged.
     const own = catalog.fields.filter((field) => epochOf(catalog, field) === catalog.epoch);
     const judged = new Set(own.map((field) => field.id));

@@ -72,7 +72,8 @@ function framesOf(track: 'catalog' | 'state'): readonly Uint8Array[] {
 function catalogOf({ size, order }: Sequence): Uint8Array {
   const grid = { center: [0, 0, 0], rotation: [0, 0, 0, 1], size, resolution: size };
   const regions = [{ id: 0, min: [0, 0, 0], size }];
-  const field = { id: 0, kind: 'volume', basis: 'sh', order, use: 'all', grid, regions, layers: 3 };
+  const shape = { basis: 'sh', order, grid, regions, layers: 3 };
+  const field = { id: 0, use: 'all', kind: 'volume', shape };
   const scene = { name: 'fuzz', root: 'fuzz.glb' };
   return json({ lumencast: 1, epoch: '0000000000000001', scene, tick_seconds: 0.04, fields: [field] });
 }

@@ -4,13 +4,14 @@
  */
 import { expect } from 'vitest';
 import { Cache } from '../../src/cache.js';
-import { type Catalog, parseCatalog, type Region } from '../../src/codec/catalog.js';
+import { type Catalog, isVolume, parseCatalog } from '../../src/codec/catalog.js';
 import { parseEdit } from '../../src/codec/edits.js';
 import { readLightFile } from '../../src/codec/file.js';
 import { LIMITS } from '../../src/codec/limits.js';
 import { splitProbeFrame } from '../../src/codec/probe-header.js';
 import { ProbeDecoder } from '../../src/codec/probes.js';
 import { checkEdit, encodeClientEdit, parseState } from '../../src/codec/state.js';
+import type { Region } from '../../src/codec/volume-shape.js';
 import { WireError } from '../../src/wire-error.js';
 
 const utf8 = new TextDecoder();
@@ -57,10 +58,11 @@ export function catalog(data: Uint8Array): boolean {
 }
 
 function expectWithinLimits({ fields }: Catalog): void {
-  const probes = fields.map(({ grid: { resolution } }) => resolution[0] * resolution[1] * resolution[2]);
+  const shapes = fields.filter(isVolume).map(({ shape }) => shape);
+  const probes = shapes.map(({ grid: { resolution } }) => resolution[0] * resolution[1] * resolution[2]);
   expect(Math.max(0, ...probes)).toBeLessThanOrEqual(LIMITS.probesPerField);
   expect(probes.reduce((sum, more) => sum + more, 0)).toBeLessThanOrEqual(LIMITS.probesPerCatalog);
-  for (const { grid, regions } of fields) {
+  for (const { grid, regions } of shapes) {
     const isInside = ({ min, size }: Region) =>
       min.every((m, axis) => m + size[axis] <= grid.resolution[axis]);
     expect(regions.every(isInside)).toBe(true);

@@ -1,7 +1,7 @@
 import type { Vec3 } from '../../src/edit.js';
 import type { Edit } from '../../src/edit.js';
-import { valuesPerProbe } from '../../src/codec/catalog.js';
 import { layerOf } from '../../src/codec/probe-header.js';
+import { valuesPerProbe } from '../../src/codec/volume-shape.js';
 import { type EncodedRegion, encodeProbes } from './probe-encoder.js';
 
 export const TICK = 0.04;
@@ -67,20 +67,22 @@ export class FakeServer {
       fields: [
         {
           id: 0,
-          kind: 'volume',
-          basis: 'sh',
-          order: ORDER,
           use: 'all',
-          grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: resolution, resolution },
-          cells_min: [0, 0, 0],
-          regions: Array.from({ length: this.regions }, (_, id) => ({
-            id,
-            min: [2 * id, 0, 0],
-            size: CELLS,
-          })),
-          layers: 3,
           scale_log2: this.scaleLog2,
           ...(this.fieldEpoch === undefined ? {} : { source: 'a test', epoch: this.fieldEpoch }),
+          kind: 'volume',
+          shape: {
+            basis: 'sh',
+            order: ORDER,
+            grid: { center: [0, 0, 0], rotation: [0, 0, 0, 1], size: resolution, resolution },
+            cells_min: [0, 0, 0],
+            regions: Array.from({ length: this.regions }, (_, id) => ({
+              id,
+              min: [2 * id, 0, 0],
+              size: CELLS,
+            })),
+            layers: 3,
+          },
         },
         { id: 9, kind: 'something later' },
       ],

@@ -1,5 +1,5 @@
 import type { Vec3 } from '../../src/edit.js';
-import { valuesPerProbe } from '../../src/codec/catalog.js';
+import { valuesPerProbe } from '../../src/codec/volume-shape.js';
 import { RangeEncoder } from './range-encoder.js';
 
 /** What a frame's header says; see docs/wire.md. */

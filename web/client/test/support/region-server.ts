@@ -1,6 +1,8 @@
-import type { Catalog, Field, Region } from '../../src/codec/catalog.js';
+import type { Catalog, FieldInfo } from '../../src/codec/catalog.js';
+import type { Region } from '../../src/codec/volume-shape.js';
 import type { Vec3 } from '../../src/edit.js';
-import { distanceToRegion, type TrackPlan } from '../../src/session/plan.js';
+import { boxDistance } from '../../src/session/box.js';
+import type { TrackPlan } from '../../src/session/plan.js';
 import { Reading } from '../../src/session/reading.js';
 import type { Target, TrackReader } from '../../src/transport.js';
 import { FakeLink } from './fake-link.js';
@@ -22,31 +24,33 @@ export function catalogOf(counts: Vec3, tickSeconds = TICK): Catalog {
       }
     }
   }
-  const field: Field = {
+  const field: FieldInfo = {
     id: 0,
-    kind: 'volume',
-    basis: 'sh',
-    order: 1,
     use: 'all',
-    grid: {
-      center: resolution.map((c) => c / 2) as Vec3,
-      rotation: [0, 0, 0, 1],
-      size: resolution,
-      resolution,
+    kind: 'volume',
+    shape: {
+      basis: 'sh',
+      order: 1,
+      grid: {
+        center: resolution.map((c) => c / 2) as Vec3,
+        rotation: [0, 0, 0, 1],
+        size: resolution,
+        resolution,
+      },
+      offset: { cells: 0.5 },
+      cellsMin: [0, 0, 0],
+      regions,
+      layers: 3,
     },
-    offset: { cells: 0.5 },
-    cellsMin: [0, 0, 0],
-    regions,
-    layers: 3,
   };
   const scene = { name: 'x', root: 'x.glb' };
-  return { epoch: '0123456789abcdef', scene, tickSeconds, fields: [field] };
+  return { epoch: '0123456789abcdef', scene, tickSeconds, fields: [field], unknown: [] };
 }
 
 /** Numbers of the regions, nearest first. */
 export function byDistance(catalog: Catalog, camera: Vec3): number[] {
-  const [{ grid, regions }] = catalog.fields;
-  const distances = regions.map((region) => distanceToRegion(grid, region, camera));
+  const { grid, regions } = catalog.fields[0].shape;
+  const distances = regions.map((region) => boxDistance(grid, region, camera));
   return regions.map(({ id }) => id).sort((a, b) => distances[a] - distances[b]);
 }
 
@@ -101,7 +105,7 @@ export class World {
     catalog: Catalog,
     private readonly options: WorldOptions = {},
   ) {
-    this.light = catalog.fields[0].regions.map(() => []);
+    this.light = catalog.fields[0].shape.regions.map(() => []);
     const subscribe = this.link.subscribe.bind(this.link);
     this.link.subscribe = (track, options, onFrame): TrackReader => {
       const reader = subscribe(track, options, onFrame);

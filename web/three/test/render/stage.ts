@@ -1,5 +1,5 @@
 /** What the measurements share: a renderer, light that stands still, a floor, and pictures read back. */
-import type { Field, LightState, SessionEvents, Vec3 } from '@lumencast/client';
+import type { FieldInfo, LightState, SessionEvents, Vec3 } from '@lumencast/client';
 import {
   type Camera,
   DataTexture,
@@ -29,12 +29,13 @@ export async function rendererOf(kind: Kind): Promise<WebGLRenderer | WebGPURend
 }
 
 /** A session that stands still. */
-export function session(light: LightState, fields: readonly Field[] = []): LightSession {
+export function session(light: LightState, fields: readonly FieldInfo[] = []): LightSession {
   const catalog: SessionEvents['catalog'] = {
     epoch: '0000000000000000',
     scene: { name: 'test', root: 'test.glb' },
     tickSeconds: 0.04,
     fields,
+    unknown: [],
   };
   return {
     files: `${location.origin}/scene/`,
@@ -125,19 +126,22 @@ export function volumeLight(
     resolution?: Vec3;
   } = {},
 ): LightState['fields'][number] {
-  const field: Field = {
+  const field: FieldInfo<'volume'> = {
     id,
-    kind: 'volume',
-    basis: 'sh',
-    order,
     use: 'all',
-    grid: { center, rotation: [0, 0, 0, 1], size, resolution },
-    offset: { cells: 0.5 },
-    cellsMin: [0, 0, 0],
-    regions: [],
-    layers: 1,
+    kind: 'volume',
+    shape: {
+      basis: 'sh',
+      order,
+      grid: { center, rotation: [0, 0, 0, 1], size, resolution },
+      offset: { cells: 0.5 },
+      cellsMin: [0, 0, 0],
+      regions: [],
+      layers: 1,
+    },
   };
   return {
+    kind: 'volume',
     field,
     coefficients: new Float32Array(coefficients),
     scale,

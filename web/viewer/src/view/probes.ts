@@ -1,4 +1,4 @@
-import type { FieldLight, LightState } from '@lumencast/client';
+import { isVolume, type LightState, type VolumeLight } from '@lumencast/client';
 import {
   BufferAttribute,
   BufferGeometry,
@@ -14,7 +14,7 @@ import { mergeVertices } from 'three/addons/utils/BufferGeometryUtils.js';
 /** Least time between two colourings, milliseconds: the spheres are for looking at, not for lighting. */
 const INTERVAL = 100;
 
-/** Little spheres at the probes, each point in the colour of the irradiance that it would get there. */
+/** Little spheres at the probes of volumes, each point in the colour of the irradiance that it would get there. */
 export class ProbeSpheres {
   readonly group = new Group();
   readonly #fields = new Map<number, Spheres>();
@@ -27,7 +27,7 @@ export class ProbeSpheres {
   update(light: LightState, now: number): void {
     if (now - this.#at < INTERVAL) return;
     this.#at = now;
-    for (const lit of light.fields) {
+    for (const lit of light.fields.filter(isVolume)) {
       let spheres = this.#fields.get(lit.field.id);
       if (spheres?.field !== lit.field) {
         spheres?.dispose();
@@ -48,8 +48,8 @@ class Spheres {
   readonly #colors: BufferAttribute;
   #revision = -1;
 
-  constructor(readonly field: FieldLight['field']) {
-    const { resolution, size } = field.grid;
+  constructor(readonly field: VolumeLight['field']) {
+    const { resolution, size } = field.shape.grid;
     const probes = resolution[0] * resolution[1] * resolution[2];
     const sphere = unitSphere(probes > 1500 ? 1 : 2);
     const points = sphere.getAttribute('position');
@@ -64,11 +64,12 @@ class Spheres {
     this.mesh = new Mesh(geometry, new MeshBasicMaterial({ vertexColors: true }));
   }
 
-  update({ coefficients, revision, field }: FieldLight): void {
+  update({ coefficients, revision, field }: VolumeLight): void {
     if (revision === this.#revision) return;
     this.#revision = revision;
-    const stride = 3 * (field.order + 1) ** 2;
-    const bands = Math.min(field.order, 2);
+    const { order } = field.shape;
+    const stride = 3 * (order + 1) ** 2;
+    const bands = Math.min(order, 2);
     const count = (bands + 1) ** 2;
     const colors = this.#colors.array as Float32Array;
     for (let first = 0, to = 0; first < coefficients.length; first += stride) {
@@ -120,8 +121,8 @@ export function irradianceWeights(normals: Float32Array): Float32Array {
 }
 
 /** A sphere's points at every probe of a field, in world space. */
-function placed({ grid }: FieldLight['field'], points: ArrayLike<number>, radius: number): Float32Array {
-  const { center, rotation, size, resolution } = grid;
+function placed({ shape }: VolumeLight['field'], points: ArrayLike<number>, radius: number): Float32Array {
+  const { center, rotation, size, resolution } = shape.grid;
   const [nx, ny, nz] = resolution;
   const out = new Float32Array(nx * ny * nz * points.length);
   const turn = new Quaternion(...rotation);

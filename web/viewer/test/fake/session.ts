@@ -1,7 +1,7 @@
 import type {
   Catalog,
   Edit,
-  Field,
+  FieldInfo,
   LightState,
   Session,
   SessionEvents,
@@ -33,7 +33,7 @@ export class FakeSession implements Session {
   readonly catalog: Catalog;
   status: Status = { state: 'connected', transport: 'websocket' };
   readonly #listeners = new Map<string, Set<(value: never) => void>>();
-  readonly #field: Field;
+  readonly #field: FieldInfo<'volume'>;
   readonly #coefficients: Float32Array;
   #revision = 0;
   #seq = 0;
@@ -42,21 +42,24 @@ export class FakeSession implements Session {
     const { center, size, rotation } = light_;
     this.#field = {
       id: 0,
-      kind: 'volume',
-      basis: 'sh',
-      order: 2,
       use: 'all',
-      grid: { center, size, rotation, resolution: RESOLUTION },
-      offset: { cells: 0.5 },
-      cellsMin: [0, 0, 0],
-      regions: [{ id: 0, min: [0, 0, 0], size: RESOLUTION }],
-      layers: 3,
+      kind: 'volume',
+      shape: {
+        basis: 'sh',
+        order: 2,
+        grid: { center, size, rotation, resolution: RESOLUTION },
+        offset: { cells: 0.5 },
+        cellsMin: [0, 0, 0],
+        regions: [{ id: 0, min: [0, 0, 0], size: RESOLUTION }],
+        layers: 3,
+      },
     };
     this.catalog = {
       epoch: '0123456789abcdef',
       scene: { name: 'fake', root: 'fake.glb' },
       tickSeconds: 0.04,
       fields: [this.#field],
+      unknown: [],
     };
     this.#coefficients = this.#glow();
     setInterval(() => this.#revision++, 200);
@@ -110,6 +113,7 @@ export class FakeSession implements Session {
 
   light(): LightState {
     const lit = {
+      kind: 'volume' as const,
       field: this.#field,
       coefficients: this.#coefficients,
       scale: 4,
