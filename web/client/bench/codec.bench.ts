@@ -49,9 +49,9 @@ const catalog = {
     },
   ],
 };
-cache.addCatalog(new TextEncoder().encode(JSON.stringify(catalog)));
-cache.addProbes(0, 0, key.frame, 0);
-cache.addProbes(0, 0, delta.frame, 0.1);
+cache.addCatalog(new TextEncoder().encode(JSON.stringify(catalog)), 0);
+cache.addLight(0, 0, 0, key.frame, 0);
+cache.addLight(0, 0, 1, delta.frame, 0.1);
 let now = 0.1;
 
 describe('a volume of 16×16×16 probes, order 2', () => {

@@ -1,10 +1,16 @@
-import type { AcceptedEdit, FieldLight, LightState, RefusedEdit, SavedScene } from './api.js';
+import type { AcceptedEdit, FieldLight, LightNews, LightState, RefusedEdit, SavedScene } from './api.js';
 import { ServerClock } from './cache/clock.js';
-import { FieldCache } from './cache/field.js';
+import { createFieldCache, type FieldCache, type Received } from './cache/field.js';
 import { type PendingEdit, PendingEdits } from './cache/pending.js';
-import { type Catalog, epochOf, hasSameShape, offersSame, parseCatalog } from './codec/catalog.js';
+import {
+  type Catalog,
+  epochOf,
+  type FieldInfo,
+  hasSameShape,
+  offersSame,
+  parseCatalog,
+} from './codec/catalog.js';
 import { readLightFile } from './codec/file.js';
-import type { ProbeHeader } from './codec/probe-header.js';
 import { parseState, type StateFrame } from './codec/state.js';
 import type { Edit } from './edit.js';
 import type { WireError } from './wire-error.js';
@@ -14,6 +20,8 @@ export type CacheEvent =
   | { readonly kind: 'catalog'; readonly catalog: Catalog; readonly restarted: boolean }
   | { readonly kind: 'snapshot'; readonly edits: readonly Edit[] }
   | { readonly kind: 'edit'; readonly accepted: AcceptedEdit }
+  /** Newer light of a region can be shown. */
+  | { readonly kind: 'light'; readonly light: LightNews }
   /** One of our edits is dealt with, and the scene shows what came of it. */
   | { readonly kind: 'acknowledged'; readonly seq: number }
   | { readonly kind: 'refused'; readonly refused: RefusedEdit }
@@ -70,7 +78,7 @@ export class Cache {
   }
 
   /** Takes in a frame of the catalog track. Returns whether it tells more than the fields' scales. */
-  addCatalog(bytes: Uint8Array): boolean {
+  addCatalog(bytes: Uint8Array, _now: number): boolean {
     const catalog = parseCatalog(bytes);
     if (this.saved || !this.current || !offersSame(this.current, catalog)) {
       this.setCatalog(catalog);
@@ -90,17 +98,21 @@ export class Cache {
   load(file: Uint8Array, now: number): SavedScene {
     if (this.current && !this.saved) throw new Error('light of a server is there already');
     const { catalog, edits, files, frames } = readLightFile(file);
-    const loaded = new Cache(this.client);
-    loaded.setCatalog(catalog);
+    const fields = new Map(
+      catalog.fields.map((field) => [field.id, this.fieldCache(field, catalog.tickSeconds)]),
+    );
+    let savedTime = 0;
     for (const { field, region, frame } of frames) {
-      loaded.savedTime = loaded.addProbes(field, region, frame, now)?.header.time ?? loaded.savedTime;
+      const cache = fields.get(field);
+      // Keyframes are of layer 0.
+      if (cache?.has(region)) savedTime = cache.add(region, 0, frame, now).head.time;
     }
     this.current = catalog;
-    this.fields = loaded.fields;
+    this.fields = fields;
     this.leftover = [];
-    this.savedTime = loaded.savedTime;
+    this.savedTime = savedTime;
     this.saved = true;
-    this.happened.push(...loaded.happened);
+    this.happened.push({ kind: 'catalog', catalog, restarted: false });
     return { edits, files };
   }
 
@@ -120,7 +132,7 @@ export class Cache {
         old.delete(field.id);
       } else {
         if (same && anew) this.leave(same);
-        this.fields.set(field.id, new FieldCache(field, catalog.tickSeconds));
+        this.fields.set(field.id, this.fieldCache(field, catalog.tickSeconds));
       }
     }
     if (restarted) {
@@ -197,25 +209,34 @@ export class Cache {
   }
 
   /**
-   * Takes in a probe frame. Returns its head and whether it is newer than what the region had;
-   * `undefined` when the catalog has no such field or region.
+   * Takes in a frame of the track of a layer of a region. Returns at once what the frame says of itself and
+   * whether it is newer than what the region had; `undefined` when the catalog has no such field or region.
+   *
+   * That the light can be shown is told by an event of kind `light`. Of volumes it stands in {@link events}
+   * when this returns; of a kind whose decoder takes its time, later.
    */
-  addProbes(
+  addLight(
     field: number,
     region: number,
+    layer: number,
     bytes: Uint8Array,
     now: number,
-  ): { header: ProbeHeader; news: boolean } | undefined {
+  ): Received | undefined {
     const cache = this.fields.get(field);
-    if (!cache?.has(region)) return undefined;
-    const added = cache.add(region, bytes, now);
-    if (added.news) {
-      // New light takes the place of its field's old light, and of that of fields that are gone.
+    return cache?.has(region) ? cache.add(region, layer, bytes, now) : undefined;
+  }
+
+  private fieldCache(field: FieldInfo, tickSeconds: number): FieldCache {
+    const cache = createFieldCache(field, tickSeconds, (region, { tick }) => {
+      // That of a file is not announced, nor that of a field that is no more.
+      if (this.fields.get(field.id) !== cache) return;
+      // It takes the place of its field's old light, and of that of fields that are gone.
       this.leftover = this.leftover.filter(
-        (left) => left.field.id !== field && this.fields.has(left.field.id),
+        (left) => left.field.id !== field.id && this.fields.has(left.field.id),
       );
-    }
-    return added;
+      this.happened.push({ kind: 'light', light: { field: field.id, region, tick } });
+    });
+    return cache;
   }
 
   /** All light, blended to `now`. */
@@ -233,7 +254,7 @@ export class Cache {
     const ages = [...this.fields.values()]
       .map((cache) => {
         const newest = cache.span()?.newest;
-        return newest && this.ageOf(cache.field.id, newest.header.tick, newest.arrived, now);
+        return newest && this.ageOf(cache.field.id, newest.head.tick, newest.arrived, now);
       })
       .filter((age) => age !== undefined);
     return ages.length > 0 ? Math.min(...ages) : undefined;

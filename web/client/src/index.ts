@@ -13,6 +13,7 @@ export * from './api.js';
 export { type AtlasLayout, atlasLayout, halfBits, packAtlas } from './atlas.js';
 export { Cache, type CacheEvent } from './cache.js';
 export { capabilities, type Capabilities } from './capabilities.js';
+export type { Received } from './cache/field.js';
 export {
   type Catalog,
   epochOf,

@@ -223,7 +223,7 @@ class LiveSession implements Session, Sink {
     const now = this.hear(CATALOG_TRACK.name, frame);
     let changed: boolean;
     try {
-      changed = this.cache.addCatalog(frame);
+      changed = this.cache.addCatalog(frame, now);
     } catch (error) {
       if (error instanceof WireError && error.kind === 'version') return this.end(error.message, 'version');
       return this.drop(error);
@@ -241,7 +241,7 @@ class LiveSession implements Session, Sink {
     this.settleReady?.resolve();
   }
 
-  state(frame: Uint8Array): void {
+  stateFrame(frame: Uint8Array): void {
     const now = this.hear(STATE_TRACK.name, frame);
     try {
       this.cache.addState(frame, now);
@@ -252,25 +252,25 @@ class LiveSession implements Session, Sink {
     this.dispatch();
   }
 
-  probes(track: TrackPlan, frame: Uint8Array): boolean {
+  lightFrame(track: TrackPlan, frame: Uint8Array): boolean {
     const { name, field, region, layer } = track;
     const now = this.hear(name, frame);
-    let added: ReturnType<Cache['addProbes']>;
+    let added: ReturnType<Cache['addLight']>;
     try {
-      added = this.cache.addProbes(field, region, frame, now);
+      added = this.cache.addLight(field, region, layer, frame, now);
     } catch (error) {
       this.drop(error);
       return false;
     }
     if (!added) return false;
-    const { update, tick } = added.header;
+    const { update, tick } = added.head;
     const arrived = performance.timeOrigin + 1000 * now;
     const decoded = performance.timeOrigin + performance.now();
     const bytes = frame.length;
     this.meter.update(update, { field, region, layer, tick, arrived, decoded, bytes }, now);
     const delay = this.cache.delayOf(field, tick, now);
     if (delay !== undefined) this.reading?.arrived(track, update, delay, bytes, now);
-    if (added.news) this.emitter.emit('light', { field, region, tick });
+    this.dispatch();
     return added.news;
   }
 
@@ -300,6 +300,9 @@ class LiveSession implements Session, Sink {
           break;
         case 'edit':
           this.emitter.emit('edit', event.accepted);
+          break;
+        case 'light':
+          this.emitter.emit('light', event.light);
           break;
         case 'refused':
           this.emitter.emit('refused', event.refused);

@@ -13,18 +13,19 @@ const ME = 'me';
 
 function joined(server: FakeServer): Cache {
   const cache = new Cache(ME);
-  cache.addCatalog(server.catalog);
+  cache.addCatalog(server.catalog, 0);
   cache.events();
   return cache;
 }
 
 function feed(cache: Cache, frames: { state?: Uint8Array; probes?: SentFrame[] }, now: number): void {
   if (frames.state) cache.addState(frames.state, now);
-  for (const { track, bytes } of frames.probes ?? []) addProbes(cache, track, bytes, now);
+  for (const { track, bytes } of frames.probes ?? []) addLight(cache, track, bytes, now);
 }
 
-function addProbes(cache: Cache, track: string, bytes: Uint8Array, now: number): void {
-  cache.addProbes(0, Number(/r(\d+)/.exec(track)?.[1]), bytes, now);
+function addLight(cache: Cache, track: string, bytes: Uint8Array, now: number): void {
+  const [field, region, layer] = track.match(/\d+/g)!.map(Number);
+  cache.addLight(field, region, layer, bytes, now);
 }
 
 /** Red of the first probe's c0. */
@@ -81,7 +82,7 @@ describe('light', () => {
       }
       for (const { what } of link.arrived(now)) {
         try {
-          addProbes(cache, what.track, what.bytes, now);
+          addLight(cache, what.track, what.bytes, now);
         } catch (error) {
           const kind = (error as WireError).kind;
           refused.set(kind, (refused.get(kind) ?? 0) + 1);
@@ -121,10 +122,10 @@ describe('light', () => {
     const server = new FakeServer();
     const cache = joined(server);
     const group = Array.from({ length: 40 }, () => server.step().probes).flat();
-    for (const { track, bytes } of group) addProbes(cache, track, bytes, 0);
+    for (const { track, bytes } of group) addLight(cache, track, bytes, 0);
     const revision = () => cache.light(2).fields[0].revision;
     const before = revision();
-    for (const { track, bytes } of group) addProbes(cache, track, bytes, 1);
+    for (const { track, bytes } of group) addLight(cache, track, bytes, 1);
     expect(revision()).toBe(before);
     expect(shown(cache, 2)).toBeCloseTo(40, 3);
     // The next group follows, far later.
@@ -169,9 +170,48 @@ describe('light', () => {
     const server = new FakeServer();
     const cache = joined(server);
     const { probes } = server.step();
-    expect(cache.addProbes(9, 0, probes[0].bytes, 0)).toBeUndefined();
-    expect(cache.addProbes(0, 7, probes[0].bytes, 0)).toBeUndefined();
+    expect(cache.addLight(9, 0, 0, probes[0].bytes, 0)).toBeUndefined();
+    expect(cache.addLight(0, 7, 0, probes[0].bytes, 0)).toBeUndefined();
     expect(cache.light(0).fields).toEqual([]);
+  });
+
+  it('refuses frames on the track of another layer', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    const [{ bytes }] = server.step().probes;
+    const malformed = expect.objectContaining({ kind: 'malformed' });
+    for (const layer of [1, 2, 3]) expect(() => cache.addLight(0, 0, layer, bytes, 0)).toThrow(malformed);
+    expect(cache.light(0).fields).toEqual([]);
+    expect(cache.addLight(0, 0, 0, bytes, 0)).toMatchObject({ head: { update: 0, tick: 0 }, news: true });
+  });
+
+  it('is told of where it is newer than what was there', () => {
+    const server = new FakeServer({ regions: 2 });
+    const cache = joined(server);
+    const { probes } = server.step();
+    feed(cache, { probes }, 0);
+    feed(cache, { probes }, 1);
+    expect(cache.events()).toEqual([
+      { kind: 'light', light: { field: 0, region: 0, tick: 0 } },
+      { kind: 'light', light: { field: 0, region: 1, tick: 0 } },
+    ]);
+  });
+
+  it('goes on where the catalog changes but the field’s shape', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    feed(cache, server.step(), 0);
+    feed(cache, server.step(), TICK);
+    const changed = JSON.parse(new TextDecoder().decode(server.catalog));
+    Object.assign(changed.fields[0], { use: 'static', source: 'another' });
+    expect(cache.addCatalog(json(changed), 1)).toBe(true);
+    expect(cache.light(1).fields).toMatchObject([{ field: { use: 'static' }, tick: 1 }]);
+    // A delta that builds on what came before.
+    feed(cache, { probes: server.step().probes }, 1);
+    expect(shown(cache, 2)).toBeCloseTo(3, 3);
+    changed.fields[0].shape.layers = 1;
+    cache.addCatalog(json(changed), 3);
+    expect(cache.light(3).fields).toEqual([]);
   });
 
   it('is unmoved by bad frames', () => {
@@ -183,9 +223,9 @@ describe('light', () => {
     const next = random(3);
     for (let round = 0; round < 500; round++) {
       const noise = Uint8Array.from({ length: next() * 80 }, () => next() * 256);
-      expect(() => cache.addCatalog(noise)).toThrow(WireError);
+      expect(() => cache.addCatalog(noise, 0)).toThrow(WireError);
       expect(() => cache.addState(noise, 1)).toThrow(WireError);
-      expect(() => cache.addProbes(0, 0, noise, 1)).toThrow(WireError);
+      expect(() => cache.addLight(0, 0, 0, noise, 1)).toThrow(WireError);
     }
     expect(shown(cache, 1)).toBe(before);
     feed(cache, { state, probes }, 1);
@@ -343,13 +383,13 @@ describe('a restarted server', () => {
     cache.events();
 
     const fresh = new FakeServer({ epoch: '00000000000000bb', clock: 3, brightness: () => 80 });
-    cache.addCatalog(fresh.catalog);
+    cache.addCatalog(fresh.catalog, 0);
     expect(cache.events().map(({ kind }) => kind)).toEqual(['lost', 'catalog']);
     expect(shown(cache, 3)).toBeCloseTo(50, 2);
     expect(cache.age(3)).toBeUndefined();
     // Update 0 is news again, and fades in.
     feed(cache, fresh.step(), 3);
-    expect(cache.events().map(({ kind }) => kind)).toEqual(['snapshot']);
+    expect(cache.events().map(({ kind }) => kind)).toEqual(['snapshot', 'light']);
     expect(shown(cache, 3)).toBeCloseTo(50, 2);
     expect(shown(cache, 4)).toBeCloseTo(80, 2);
     expect(cache.serverTime(4)).toBeCloseTo(4, 6);
@@ -361,7 +401,7 @@ describe('a restarted server', () => {
     const cache = joined(old);
     feed(cache, old.step(), 0);
     const fresh = new FakeServer({ epoch: '00000000000000bb', regions: 2, brightness: () => 80 });
-    cache.addCatalog(fresh.catalog);
+    cache.addCatalog(fresh.catalog, 0);
     expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([1]);
     expect(cache.light(1).fields[0].tick).toBeUndefined();
     feed(cache, fresh.step(), 1);
@@ -375,9 +415,9 @@ describe('a restarted server', () => {
     const fresh = new FakeServer({ epoch: '00000000000000bb' });
     const renumbered = JSON.parse(new TextDecoder().decode(fresh.catalog));
     renumbered.fields[0].id = 4;
-    cache.addCatalog(json(renumbered));
+    cache.addCatalog(json(renumbered), 0);
     expect(cache.light(1).fields).toMatchObject([{ field: { id: 0 }, tick: undefined, age: undefined }]);
-    for (const { bytes } of fresh.step().probes) cache.addProbes(4, 0, bytes, 1);
+    for (const { bytes } of fresh.step().probes) cache.addLight(4, 0, 0, bytes, 1);
     expect(cache.light(1).fields).toMatchObject([{ field: { id: 4 }, tick: 0 }]);
   });
 
@@ -387,7 +427,7 @@ describe('a restarted server', () => {
     feed(cache, server.step(), 0);
     const catalog = JSON.parse(new TextDecoder().decode(server.catalog));
     catalog.fields = [];
-    cache.addCatalog(json(catalog));
+    cache.addCatalog(json(catalog), 0);
     expect(cache.light(1).fields).toEqual([]);
   });
 });
@@ -403,7 +443,7 @@ describe('a field with an epoch of its own', () => {
     expect(cache.age(3)).toBeCloseTo(3 - 49 * TICK, 9);
     expect(cache.delayOf(0, 49, 3)).toBeUndefined();
     const catalog = new FakeServer({ ...own, epoch: '00000000000000bb' }).catalog;
-    cache.addCatalog(catalog);
+    cache.addCatalog(catalog, 0);
     expect(cache.events().at(-1)).toMatchObject({ kind: 'catalog', restarted: true });
     expect(cache.serverTime(3)).toBeUndefined();
     expect(cache.age(3)).toBeCloseTo(3 - 49 * TICK, 9);
@@ -418,7 +458,7 @@ describe('a field with an epoch of its own', () => {
     for (let i = 0; i < 50; i++) feed(cache, server.step(), i * TICK);
     cache.events();
     const fresh = new FakeServer({ ...own, fieldEpoch: '00000000000000f2', brightness: () => 80 });
-    cache.addCatalog(fresh.catalog);
+    cache.addCatalog(fresh.catalog, 0);
     expect(cache.events()).toMatchObject([{ kind: 'catalog', restarted: false }]);
     expect(cache.serverTime(3)).toBeDefined();
     expect(cache.age(3)).toBeUndefined();
@@ -432,7 +472,7 @@ describe('a field with an epoch of its own', () => {
     const cache = joined(server);
     feed(cache, server.step(), 0);
     const fresh = new FakeServer({ ...own, fieldEpoch: '00000000000000f2', regions: 2 });
-    cache.addCatalog(fresh.catalog);
+    cache.addCatalog(fresh.catalog, 0);
     expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([1]);
     expect(cache.light(1).fields[0].tick).toBeUndefined();
     feed(cache, { probes: fresh.step().probes }, 1);
@@ -448,16 +488,16 @@ describe('a field with an epoch of its own', () => {
       });
     const cache = joined(shaped(0));
     feed(cache, shaped(0).step(), 0);
-    for (let i = 1; i < 50; i++) cache.addCatalog(shaped(i).catalog);
+    for (let i = 1; i < 50; i++) cache.addCatalog(shaped(i).catalog, 0);
     expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([1]);
     // Shapes that never had light are not kept.
     expect(cache['leftover'].length).toBe(1);
     // Where each shape had light, the last is shown.
     for (let i = 50; i < 80; i++) {
-      cache.addCatalog(shaped(i).catalog);
+      cache.addCatalog(shaped(i).catalog, 0);
       feed(cache, { probes: shaped(i).step().probes }, i);
     }
-    cache.addCatalog(shaped(80).catalog);
+    cache.addCatalog(shaped(80).catalog, 0);
     expect(cache.light(81).fields.map(({ field }) => field.shape.regions.length)).toEqual([1 + (79 % 3)]);
   });
 });
@@ -470,7 +510,7 @@ describe('saved light', () => {
     expect(cache.age(100)).toBeUndefined();
     const { seq } = cache.edit(move(1, 1));
     const server = new FakeServer({ brightness: () => 9 });
-    cache.addCatalog(server.catalog);
+    cache.addCatalog(server.catalog, 0);
     expect(shown(cache, 1)).toBeCloseTo(7, 2);
     // Made before there was a server, the edit is still to be sent.
     expect(cache.pending.map((edit) => edit.seq)).toEqual([seq]);
@@ -501,7 +541,7 @@ describe('saved light', () => {
     expect(() => cache.load(broken, 0)).toThrow(WireError);
     expect([cache.catalog, cache.light(0).fields, cache.events()]).toEqual([undefined, [], []]);
     const server = new FakeServer({ brightness: () => 9 });
-    cache.addCatalog(server.catalog);
+    cache.addCatalog(server.catalog, 0);
     expect(() => cache.load(good, 0)).toThrow('light of a server');
     feed(cache, server.step(), 0);
     expect(shown(cache, 0)).toBeCloseTo(9, 2);

@@ -12,9 +12,9 @@ const STATE_AGE = 5000;
 
 /** Who takes what is read. */
 export interface Sink {
-  state(frame: Uint8Array): void;
+  stateFrame(frame: Uint8Array): void;
   /** Returns whether this is newer light than the region had. */
-  probes(track: TrackPlan, frame: Uint8Array): boolean;
+  lightFrame(track: TrackPlan, frame: Uint8Array): boolean;
 }
 
 /** The tracks read of one server's epoch over one connection: which, and with what priority. */
@@ -55,7 +55,7 @@ export class Reading {
     const { name: state, priority } = STATE_TRACK;
     this.stateReader = link.subscribe(state, { priority, maxAge: STATE_AGE }, (frame) => {
       this.ticked = true;
-      sink.state(frame);
+      sink.stateFrame(frame);
     });
   }
 
@@ -112,7 +112,7 @@ export class Reading {
       name,
       this.link.subscribe(name, options, (frame) => {
         // A group under way is sent from its beginning: that is light of the last turn.
-        if (this.sink.probes(track, frame)) this.turns.heard(name);
+        if (this.sink.lightFrame(track, frame)) this.turns.heard(name);
       }),
     );
   }

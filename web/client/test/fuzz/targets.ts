@@ -53,7 +53,7 @@ export function catalog(data: Uint8Array): boolean {
   if (!read) return false;
   expectWithinLimits(read);
   // What decodes is taken in.
-  expect(new Cache('me').addCatalog(data)).toBe(true);
+  expect(new Cache('me').addCatalog(data, 0)).toBe(true);
   return true;
 }
 
@@ -130,9 +130,9 @@ export function stream(data: Uint8Array): boolean {
 
 /** Hands a frame to the cache; `undefined` where it has no use for it. */
 function read(cache: Cache, track: number, frame: Uint8Array, now: number): unknown {
-  if (track === 'c'.charCodeAt(0)) return cache.addCatalog(frame);
+  if (track === 'c'.charCodeAt(0)) return cache.addCatalog(frame, now);
   if (track === 's'.charCodeAt(0)) return cache.addState(frame, now) ?? true;
-  return cache.addProbes(0, 0, frame, now);
+  return cache.addLight(0, 0, track, frame, now);
 }
 
 /** All that a page asks of a cache each frame has an answer. */

@@ -119,7 +119,7 @@ export class World {
       };
       return { setPriority: (priority) => reader.setPriority(priority), close };
     };
-    const sink = { state: () => {}, probes: (track: TrackPlan) => this.came(track) };
+    const sink = { stateFrame: () => {}, lightFrame: (track: TrackPlan) => this.came(track) };
     this.reading = new Reading(this.link, catalog, sink, 0);
   }
 
