@@ -40,7 +40,7 @@ const LONGEST_RUN = 1;
 export class Cache {
   private current: Catalog | undefined;
   private fields = new Map<number, FieldCache>();
-  /** Fields of the time before a restart whose light fits none of now; shown until there is new light. */
+  /** Fields of before whose light fits none of now; shown until there is new light. */
   private leftover: FieldCache[] = [];
   private clock = new ServerClock(1);
   private newest: StateFrame | undefined;
@@ -125,23 +125,27 @@ export class Cache {
       const same = old.get(field.id);
       // Each field's updates are numbered by its own server's run.
       const anew = this.saved || (before && same && epochOf(before, same.field) !== epochOf(catalog, field));
-      if (same && anew) same.forgetUpdates();
-      if (same && hasSameShape(same.field, field)) {
+      const keeps = same && hasSameShape(same.field, field);
+      if (same && (anew || !keeps)) same.forgetUpdates();
+      if (keeps) {
         same.field = field;
         this.fields.set(field.id, same);
         old.delete(field.id);
       } else {
-        if (same && anew) this.leave(same);
+        if (same) this.leave(same);
         this.fields.set(field.id, this.fieldCache(field, catalog.tickSeconds));
       }
     }
+    const gone = [...old.values()].filter(({ field }) => !this.fields.has(field.id));
     if (restarted) {
-      const gone = [...old.values()].filter(({ field }) => !this.fields.has(field.id));
       for (const cache of gone) {
         cache.forgetUpdates();
         this.leave(cache);
       }
       this.restart();
+    } else {
+      const ids = new Set(gone.map(({ field }) => field.id));
+      this.leftover = this.leftover.filter(({ field }) => !ids.has(field.id));
     }
     if (!before || restarted) this.clock = new ServerClock(catalog.tickSeconds);
     this.saved = false;

@@ -209,9 +209,28 @@ describe('light', () => {
     // A delta that builds on what came before.
     feed(cache, { probes: server.step().probes }, 1);
     expect(shown(cache, 2)).toBeCloseTo(3, 3);
+  });
+
+  it('of a field’s former shape is shown until its own is there, or the field is gone', () => {
+    const server = new FakeServer();
+    const cache = joined(server);
+    feed(cache, server.step(), 0);
+    const changed = JSON.parse(new TextDecoder().decode(server.catalog));
     changed.fields[0].shape.layers = 1;
-    cache.addCatalog(json(changed), 3);
-    expect(cache.light(3).fields).toEqual([]);
+    cache.addCatalog(json(changed), 1);
+    const before = { field: { shape: { layers: 3 } }, tick: undefined, age: undefined };
+    expect(cache.light(1).fields).toMatchObject([before]);
+    expect(() => feed(cache, { probes: server.step().probes }, 1)).toThrow('not at hand');
+    expect(cache.light(1).fields).toMatchObject([before]);
+    const key = new FakeServer({ brightness: () => 80 }).step();
+    feed(cache, { probes: key.probes }, 2);
+    expect(cache.light(2).fields).toMatchObject([{ field: { shape: { layers: 1 } }, tick: 0 }]);
+    expect(shown(cache, 2)).toBeCloseTo(80, 2);
+
+    cache.addCatalog(server.catalog, 3);
+    expect(cache.light(3).fields).toHaveLength(1);
+    cache.addCatalog(json({ ...changed, fields: [] }), 4);
+    expect(cache.light(4).fields).toEqual([]);
   });
 
   it('is unmoved by bad frames', () => {

@@ -174,7 +174,7 @@ function parseHead(json: Json): FieldHead {
 function parseUnknown(json: Json): UnknownField {
   return {
     id: usable(() => parseId(json)),
-    kind: usable(() => label(json.kind, 'kind', LIMITS.nameBytes)),
+    kind: usable(() => label(json.kind, 'kind', LIMITS.sourceBytes)),
   };
 }
 
