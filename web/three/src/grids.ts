@@ -1,5 +1,6 @@
 import {
   halfBits,
+  hasSameShape,
   isVolume,
   type LightState,
   packAtlas,
@@ -117,6 +118,8 @@ class FilledGrid {
   readonly #atlas: Uint16Array<ArrayBuffer>;
   readonly #resampler: Resampler | undefined;
   readonly #coefficients: Float32Array;
+  /** Of what the light says of its field, whether it is of the shape that is planned for. */
+  readonly #isPlanned = new WeakMap<Volume, boolean>();
   #revisions = '';
   #scale = 1;
   #visible = true;
@@ -142,7 +145,7 @@ class FilledGrid {
   }
 
   update(volumes: readonly VolumeLight[]): boolean {
-    const sources = this.plan.fields.map((field) => volumes.find((lit) => lit.field.id === field.id));
+    const sources = this.plan.fields.map((field) => volumes.find((lit) => this.#isOf(field, lit.field)));
     const revisions = sources.map((source) => source?.revision).join();
     if (revisions === this.#revisions) return false;
     this.#revisions = revisions;
@@ -153,6 +156,16 @@ class FilledGrid {
     this.platform.upload?.(this.#texture);
     this.#setIntensity();
     return true;
+  }
+
+  /** Whether light is that of a planned volume: until there is new light, it may be of a former shape. */
+  #isOf(planned: Volume, lit: Volume): boolean {
+    if (lit.id !== planned.id) return false;
+    const known = this.#isPlanned.get(lit);
+    if (known !== undefined) return known;
+    const isPlanned = hasSameShape(lit, planned);
+    this.#isPlanned.set(lit, isPlanned);
+    return isPlanned;
   }
 
   /** L2 coefficients of the grid's own probes. */

@@ -1,4 +1,4 @@
-import type { Edit, FieldInfo, LightState, SessionEvents } from '@lumencast/client';
+import type { Edit, FieldInfo, LightState, SessionEvents, Vec3 } from '@lumencast/client';
 import {
   Color,
   DataUtils,
@@ -264,6 +264,31 @@ describe('follow', () => {
 });
 
 describe('grids', () => {
+  it('are dark while the light is of a field’s former shape', () => {
+    const { shape } = field;
+    const wider = { ...shape, grid: { ...shape.grid, resolution: [2, 1, 1] as Vec3 } };
+    const lit = (of: FieldInfo<'volume'>, probes: number) => ({
+      kind: 'volume' as const,
+      field: of,
+      coefficients: new Float32Array(27 * probes).fill(2),
+      scale: 1,
+      revision: 1,
+      age: undefined,
+      sceneVersion: undefined,
+      tick: undefined,
+      regions: { lit: 1, all: 1 },
+    });
+    session.tell('catalog', catalogOf({ ...field, shape: wider }));
+    session.state = { fields: [lit(field, 1)], age: undefined };
+    const first = () => {
+      light.update(camera);
+      return (light.grids[0].texture!.image.data as Uint16Array).find((half) => half !== 0);
+    };
+    expect(DataUtils.fromHalfFloat(first() ?? 0)).toBe(0);
+    session.state = { fields: [lit({ ...field, shape: wider }, 2)], age: undefined };
+    expect(DataUtils.fromHalfFloat(first() ?? 0)).toBe(2);
+  });
+
   it('are made anew as materials leave other numbers of texture units, and warn once', () => {
     const { shape } = field;
     const fields = [-4, 0, 4].map((x, id): FieldInfo => ({
