@@ -52,9 +52,9 @@ impl Bench {
         previous: Option<Arc<Light>>,
         seed: u64,
     ) -> (Arc<Light>, f64) {
-        let receivers: Vec<_> =
-            self.grid.positions().map(|position| Receiver::probe(position, samples)).collect();
-        let job = Job { bounces, previous, seed, ..Job::new(self.scene.clone(), receivers) };
+        let receivers: Vec<_> = self.grid.positions().map(Receiver::probe).collect();
+        let job = Job::new(self.scene.clone(), receivers, samples);
+        let job = Job { bounces, previous, seed, ..job };
         let ticket = self.tracer.submit(job);
         let mut volume = ProbeVolume::dark(FieldId(0), self.grid, Order::L2);
         let Some(gathered) = self.tracer.wait(ticket) else { unreachable!("nobody cancels") };

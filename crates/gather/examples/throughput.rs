@@ -23,8 +23,7 @@ fn measure(
     bounces: u32,
     threads: usize,
 ) {
-    let receivers: Arc<[_]> =
-        grid.positions().map(|position| Receiver::probe(position, samples)).collect();
+    let receivers: Arc<[_]> = grid.positions().map(Receiver::probe).collect();
     let threads = NonZeroUsize::new(threads);
     let Ok(mut tracer) = CpuPathTracer::new(Options { threads, ..Options::default() }) else {
         return;
@@ -33,7 +32,8 @@ fn measure(
     let mut rays = 0;
     for seed in 0..30 {
         let start = Instant::now();
-        let job = Job { bounces, clamp: 10.0, seed, ..Job::new(scene.clone(), receivers.clone()) };
+        let job = Job::new(scene.clone(), receivers.clone(), samples);
+        let job = Job { bounces, clamp: 10.0, seed, ..job };
         let ticket = tracer.submit(job);
         let Some(gathered) = tracer.wait(ticket) else { return };
         ticks.push(start.elapsed().as_secs_f64());

@@ -7,7 +7,7 @@ use lumencast_gather::path_trace::{CpuPathTracer, Levels, Options};
 use lumencast_gather::reference::{
     Film, PictureSettings, ProbeEstimate, ProbeSettings, Renderer, probe_sh,
 };
-use lumencast_gather::{Gather, Job, Place, Receiver, Sums};
+use lumencast_gather::{Gather, Job, Receiver, Sums};
 use lumencast_light::{FieldId, Grid, Light, Order, ProbeVolume};
 use lumencast_scene::View;
 use lumencast_testkit::rooms::{Placed, Rooms};
@@ -117,10 +117,15 @@ fn pictures_show_what_they_show_near_the_origin() {
     }
 }
 
-fn gathered(rooms: &Rooms, receivers: Vec<Receiver>, job: impl FnOnce(Job) -> Job) -> Vec<Sums> {
+fn gathered(
+    rooms: &Rooms,
+    receivers: Vec<Receiver>,
+    samples: u32,
+    job: impl FnOnce(Job) -> Job,
+) -> Sums {
     let options = Options { levels: Levels::Two, ..Options::default() };
     let mut tracer = CpuPathTracer::new(options).expect("threads");
-    let ticket = tracer.submit(job(Job::new(rooms.scene().snapshot(), receivers)));
+    let ticket = tracer.submit(job(Job::new(rooms.scene().snapshot(), receivers, samples)));
     tracer.wait(ticket).expect("a result").sums
 }
 
@@ -129,9 +134,9 @@ fn floor(rooms: &Rooms, points: &[Vec3]) -> Vec<Vec3> {
     let footprint = [Vec3::X * 0.2, Vec3::Z * 0.2];
     let lumel = |point: &Vec3| {
         let position = Vec3 { y: rooms.at.y as f32, ..*point };
-        Receiver { place: Place::Lumel { position, normal: Vec3::Y, footprint }, samples: 2048 }
+        Receiver::Lumel { position, normal: Vec3::Y, footprint }
     };
-    let sums = gathered(rooms, points.iter().map(lumel).collect(), |job| job);
+    let sums = gathered(rooms, points.iter().map(lumel).collect(), 2048, |job| job);
     sums.iter().map(|sums| sums.mean().next().expect("irradiance")).collect()
 }
 
@@ -170,21 +175,25 @@ fn light(world: impl Fn(Vec3) -> Vec3) -> Light {
 fn surfaces_and_fields_are_of_the_world() {
     for rooms in far() {
         let find = |these: &Rooms, points: &[Vec3]| {
-            let receivers = points.iter().map(|point| Receiver::probe(*point, 512)).collect();
+            let receivers = points.iter().copied().map(Receiver::probe).collect();
             let is_far = these.at != DVec3::ZERO;
             let place = |p| if is_far { rooms.world(p) } else { rooms.local(rooms.world(p)) };
             let previous = Some(Arc::new(light(place)));
             let job = |job| Job { previous, bounces: 0, surfaces: true, ..job };
-            gathered(these, receivers, job)
+            let sums = gathered(these, receivers, 512, job);
+            let found = sums.iter().map(|sums| {
+                let c0 = sums.mean().next().expect("a coefficient").x;
+                (c0, sums.surfaces.to_vec())
+            });
+            found.collect::<Vec<_>>()
         };
-        let c0 = |sums: &Sums| sums.mean().next().expect("a coefficient").x;
         let digits = f32::EPSILON * rooms.at.abs().as_vec3() + 0.01;
         // Fields are read at points of the world, to the last digit that those have.
         let slack = 0.02 + 0.1 * digits.max_element();
         for (far, near) in beside(&rooms, &[LIT[0], DARK[0]], find) {
-            let (a, b) = (c0(&far), c0(&near));
+            let ((a, surfaces), (b, _)) = (far, near);
             assert!((a - b).abs() < slack * b, "{rooms:?}: {a} {b}");
-            for point in far.surfaces.iter().map(|point| point.expect("the room is closed")) {
+            for point in surfaces.iter().map(|point| point.expect("the room is closed")) {
                 let local = rooms.local(point.position);
                 let walls = [
                     (local.x.abs() - 0.05).abs() - digits.x,
@@ -197,7 +206,7 @@ fn surfaces_and_fields_are_of_the_world() {
             }
         }
         let [lit, dark] = [LIT[0], DARK[0]].map(|at| rooms.world(at));
-        let [lit, dark] = [lit, dark].map(|at| c0(&find(&rooms, &[at])[0]));
+        let [lit, dark] = [lit, dark].map(|at| find(&rooms, &[at])[0].0);
         assert!(lit > 5.0 * dark, "the check has no teeth: {lit} {dark}");
     }
 }

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_gather::{Gather, Job, Place, Receiver, Sums};
-use lumencast_light::{FieldId, Grid, Light, Order, ProbeVolume};
+use lumencast_gather::{Budget, Gather, Job, Receiver, Sums, SumsAt};
+use lumencast_light::{FieldId, Grid, Light, Order, Place, ProbeVolume};
 use lumencast_scene::{Environment, LightKind, Material, PunctualLight, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -16,20 +16,21 @@ const BLACK: Vec3 = Vec3::ZERO;
 const C0: f32 = 3.544_907_7;
 const Y1: f32 = 0.488_602_5;
 
-fn gather(job: Job) -> Vec<Sums> {
+fn gather(job: Job) -> Sums {
     let mut tracer = CpuPathTracer::new(Options::default()).unwrap();
     let ticket = tracer.submit(job);
     tracer.wait(ticket).unwrap().sums
 }
 
 fn lumel(position: Vec3, normal: Vec3, footprint: [Vec3; 2]) -> Receiver {
-    Receiver { place: Place::Lumel { position, normal, footprint }, samples: 1 << 16 }
+    Receiver::Lumel { position, normal, footprint }
 }
 
 /// Irradiance of a lumel whose light comes straight from sources.
 fn irradiance(scene: &Arc<Snapshot>, lumel: Receiver) -> f32 {
-    let sums = gather(Job { bounces: 0, ..Job::new(scene.clone(), [lumel]) }).remove(0);
-    assert_eq!((sums.sum.len(), sums.sum_of_squares.len(), sums.count), (1, 1, lumel.samples));
+    let sums = gather(Job { bounces: 0, ..Job::new(scene.clone(), [lumel], 1 << 16) });
+    let sums = sums.at(0);
+    assert_eq!((sums.sum.len(), sums.squares.len(), sums.count), (1, 1, 1 << 16));
     assert_eq!(sums.back_face_fraction, 0.0);
     sums.sum[0].x / sums.count as f32
 }
@@ -50,19 +51,23 @@ fn neighbours_change_nothing() {
     stage.room(BLACK, Vec3::new(2.0, 3.0, 4.0), grey);
     stage.light(lamp(0.1, 10.0), Vec3::Y, Vec3::NEG_Y);
     let scene = stage.snapshot();
-    let receiver = |(i, &samples): (usize, &u32)| {
-        let position = Vec3::new(0.03 * i as f32 - 0.9, 0.1, 0.0);
-        let place = Place::Lumel { position, normal: Vec3::Y, footprint: [BLACK; 2] };
-        if i % 3 == 0 { Receiver::probe(position, samples) } else { Receiver { place, samples } }
+    let receiver = |i: u8| {
+        let position = Vec3::new(0.03 * f32::from(i) - 0.9, 0.1, 0.0);
+        let lumel = Receiver::point(position, Vec3::Y);
+        if i % 3 == 0 { Receiver::probe(position) } else { lumel }
     };
     let counts = [1, 5, 0, 63, 1, 64, 2, 130, 0, 7, 1, 1, 300, 3];
-    let receivers: Vec<Receiver> = counts.iter().enumerate().map(receiver).collect();
-    let job = |receivers: &[Receiver]| Job { surfaces: true, ..Job::new(scene.clone(), receivers) };
-    let all = gather(job(&receivers));
+    let receivers: Arc<[Receiver]> = (0..counts.len() as u8).map(receiver).collect();
+    let budgets: Vec<Budget> =
+        (0..).zip(counts).map(|(receiver, samples)| Budget { receiver, samples }).collect();
+    let job = |budgets: &[Budget]| {
+        let job = Job::with_budgets(scene.clone(), receivers.clone(), budgets.to_vec());
+        Job { surfaces: true, ..job }
+    };
+    let all = gather(job(&budgets));
     for (n, own) in all.iter().enumerate() {
         assert_eq!((own.count, own.surfaces.len()), (counts[n], counts[n] as usize));
-        let last = gather(job(&receivers[..=n])).pop();
-        assert_eq!(last.as_ref(), Some(own), "receiver {n}");
+        assert_eq!(gather(job(&budgets[..=n])).at(n), own, "receiver {n}");
     }
     let lit = all.iter().filter(|sums| sums.sum.iter().any(|c| c.x > 0.0)).count();
     assert_eq!(lit, counts.iter().filter(|n| **n > 0).count());
@@ -102,10 +107,11 @@ fn small_lamps_are_reached_for() {
     stage.quad(Vec3::new(3.0, 1.0, -5.0), Vec3::Z * 10.0, Vec3::X * 10.0, black);
     let at = |n: u32| Vec3::new(if n < 8 { 0.1 * n as f32 } else { 15.0 }, 0.0, 0.0);
     let samples = 64;
-    let lumel = |position| Place::Lumel { position, normal: Vec3::Y, footprint: [BLACK; 2] };
-    let places = (0..16).flat_map(|n| [lumel(at(n)), Place::Probe { position: at(n) }]);
-    let receivers: Vec<_> = places.map(|place| Receiver { place, samples }).collect();
-    let sums = gather(Job { bounces: 0, ..Job::new(stage.snapshot(), receivers) });
+    let lumel = |position| Receiver::point(position, Vec3::Y);
+    let pairs = (0..16).flat_map(|n| [lumel(at(n)), Receiver::probe(at(n))]);
+    let receivers: Vec<_> = pairs.collect();
+    let sums = gather(Job { bounces: 0, ..Job::new(stage.snapshot(), receivers, samples) });
+    let sums: Vec<SumsAt<'_>> = sums.iter().collect();
     for (n, pair) in (0..16).zip(sums.chunks_exact(2)) {
         let to = Vec3::new(0.0, height, 0.0) - at(n);
         let cosine = to.normalize().y;
@@ -165,11 +171,12 @@ fn distances_have_their_moments() {
     let mut stage = Stage::default();
     let floor = stage.material(lambert(Vec3::ONE, BLACK));
     stage.quad(Vec3::new(-50.0, 0.0, 50.0), Vec3::X * 100.0, Vec3::NEG_Z * 100.0, floor);
-    let probe = Receiver::probe(Vec3::Y * h, 1 << 14);
+    let probe = Receiver::probe(Vec3::Y * h);
     let lumel = lumel(Vec3::Y * h, Vec3::NEG_Y, [BLACK; 2]);
-    let job = Job { bounces: 0, ..Job::new(stage.snapshot(), [probe, lumel]) };
-    assert!(gather(job.clone())[0].distances.is_empty(), "nobody asked");
+    let job = Job { bounces: 0, ..Job::new(stage.snapshot(), [probe, lumel], 1 << 16) };
+    assert!(gather(job.clone()).at(0).distances.is_empty(), "nobody asked");
     let sums = gather(Job { distances: Some(far), ..job });
+    let sums: Vec<SumsAt<'_>> = sums.iter().collect();
     let mean = |receiver: usize, k: usize, moment: usize| {
         sums[receiver].distances[k][moment] / sums[receiver].count as f32
     };
@@ -191,9 +198,9 @@ fn grid(size: Vec3) -> Grid {
 }
 
 /// What a job found for the probes of a [`grid`].
-fn field(size: Vec3, sums: &[Sums]) -> Arc<Light> {
+fn field<'a>(size: Vec3, sums: impl Iterator<Item = SumsAt<'a>>) -> Arc<Light> {
     let mut volume = ProbeVolume::dark(FieldId(0), grid(size), Order::L2);
-    for (i, sums) in sums.iter().enumerate() {
+    for (i, sums) in sums.enumerate() {
         for (c, mean) in volume.probe_mut(i).iter_mut().zip(sums.mean()) {
             *c = mean;
         }
@@ -203,9 +210,10 @@ fn field(size: Vec3, sums: &[Sums]) -> Arc<Light> {
 
 /// The same radiance everywhere.
 fn uniform(radiance: f32) -> Arc<Light> {
-    let mut sum = vec![BLACK; 9];
+    let mut sum = [BLACK; 9];
     sum[0] = Vec3::splat(C0 * radiance);
-    field(Vec3::ONE, &vec![Sums { sum, count: 1, ..Sums::default() }; 8])
+    let sums = SumsAt { sum: &sum, count: 1, ..SumsAt::default() };
+    field(Vec3::ONE, std::iter::repeat_n(sums, 8))
 }
 
 fn lamp(radius: f32, intensity: f32) -> PunctualLight {
@@ -224,13 +232,12 @@ fn bounces_add_up_from_job_to_job() {
         let intensity = 3.0 * (1.0 - emission);
         stage.light(lamp(0.0, intensity), BLACK, Vec3::X);
         let first = emission + albedo * intensity / (PI * radius * radius);
-        let probes: Arc<[_]> = grid(size).positions().map(|p| Receiver::probe(p, 256)).collect();
+        let probes: Arc<[_]> = grid(size).positions().map(Receiver::probe).collect();
         let light = (0..30).fold(uniform(0.0), |before, seed| {
-            let job = Job { bounces: 0, seed, ..Job::new(stage.snapshot(), probes.clone()) };
-            field(size, &gather(Job { previous: Some(before), ..job }))
+            let job = Job { bounces: 0, seed, ..Job::new(stage.snapshot(), probes.clone(), 256) };
+            field(size, gather(Job { previous: Some(before), ..job }).iter())
         });
-        let found =
-            light.sample(&lumencast_light::Place::in_space(BLACK)).unwrap().coefficients[0].x;
+        let found = light.sample(&Place::in_space(BLACK)).unwrap().coefficients[0].x;
         check(found, C0 * first / (1.0 - albedo), C0 * first * (1.0 + albedo), 5e-3);
     }
 }
@@ -247,12 +254,11 @@ fn the_last_surface_reflects_the_light_from_before() {
         stage.environment(Environment::Constant { radiance: Vec3::ONE });
         let material = stage.material(material);
         stage.quad(Vec3::new(-50.0, 0.0, 50.0), Vec3::X * 100.0, Vec3::NEG_Z * 100.0, material);
-        let at = Receiver::probe(Vec3::Y, 4096);
+        let at = Receiver::probe(Vec3::Y);
         let seen = |radiance| {
             let previous = Some(uniform(radiance));
-            let job = Job { bounces: 0, previous, ..Job::new(stage.snapshot(), [at]) };
-            let sums = gather(job).remove(0);
-            sums.sum[0].x / sums.count as f32
+            let job = Job { bounces: 0, previous, ..Job::new(stage.snapshot(), [at], 4096) };
+            gather(job).at(0).mean().next().unwrap().x
         };
         check(seen(1.0), C0, seen(0.9), 3e-3);
     }
@@ -267,10 +273,11 @@ fn the_last_surface_is_lit_by_lamps_with_a_size() {
     stage.quad(Vec3::new(-2e3, 0.0, 2e3), Vec3::X * 4e3, Vec3::NEG_Z * 4e3, floor);
     stage.light(lamp(0.6, intensity), Vec3::Y * height, Vec3::X);
     let previous = Some(uniform(0.0));
-    let at = Receiver::probe(Vec3::Y * height, 1 << 15);
-    let sums = gather(Job { bounces: 0, previous, ..Job::new(stage.snapshot(), [at]) }).remove(0);
+    let at = Receiver::probe(Vec3::Y * height);
+    let job = Job { bounces: 0, previous, ..Job::new(stage.snapshot(), [at], 1 << 15) };
+    let found = gather(job).at(0).mean().next().unwrap().x;
     let peak = albedo * intensity / (PI * height * height);
     // ∫ cos³θ dω = 2π/4.
     let expected = C0 / (4.0 * PI) * peak * 0.5 * PI;
-    check(sums.sum[0].x / sums.count as f32, expected, 0.95 * expected, 1e-2);
+    check(found, expected, 0.95 * expected, 1e-2);
 }

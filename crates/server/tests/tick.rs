@@ -287,7 +287,7 @@ struct Slow {
 
 impl Gather for Slow {
     fn submit(&mut self, job: Job) -> Ticket {
-        self.samples = job.receivers[0].samples;
+        self.samples = job.budgets[0].samples;
         self.inner.submit(job)
     }
 

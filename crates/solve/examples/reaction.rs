@@ -45,9 +45,8 @@ fn gather(tracer: &mut CpuPathTracer, scene: &Arc<Snapshot>, samples: u32, seed:
         size: Vec3::splat(2.0),
         resolution: UVec3::splat(8),
     };
-    let receivers: Vec<_> =
-        grid.positions().map(|position| Receiver::probe(position, samples)).collect();
-    let job = Job { clamp: 10.0, seed, ..Job::new(scene.clone(), receivers) };
+    let receivers: Vec<_> = grid.positions().map(Receiver::probe).collect();
+    let job = Job { clamp: 10.0, seed, ..Job::new(scene.clone(), receivers, samples) };
     let ticket = tracer.submit(job);
     tracer.wait(ticket).unwrap_or_else(|| unreachable!("nobody cancels"))
 }
@@ -91,7 +90,7 @@ fn main() -> std::io::Result<()> {
             let fields: Vec<Field> = updates
                 .iter()
                 .map(|u| {
-                    history.update(&u.sums);
+                    history.update(u.sums.iter());
                     (0..history.len()).map(|i| history.coefficients(i).to_vec()).collect()
                 })
                 .collect();

@@ -24,12 +24,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let snapshot = scene.snapshot();
     let grid = scene.volumes()[0].grid;
     let mut tracer = CpuPathTracer::new(Options::default())?;
-    let mut gather = |samples: u32, seed: u64| -> Vec<Sums> {
-        let receivers: Vec<_> =
-            grid.positions().map(|position| Receiver::probe(position, samples)).collect();
+    let mut gather = |samples: u32, seed: u64| -> Sums {
+        let receivers: Vec<_> = grid.positions().map(Receiver::probe).collect();
         let (scene, clamp) = (snapshot.clone(), f32::INFINITY);
-        let ticket = tracer.submit(Job { clamp, seed, ..Job::new(scene, receivers) });
-        tracer.wait(ticket).map_or_else(Vec::new, |gathered| gathered.sums)
+        let ticket = tracer.submit(Job { clamp, seed, ..Job::new(scene, receivers, samples) });
+        tracer.wait(ticket).map_or_else(Sums::default, |gathered| gathered.sums)
     };
     let converged: Vec<f32> =
         gather(CONVERGED, UPDATES).iter().map(|s| s.sum[0].y / s.count as f32).collect();
@@ -45,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for update in 1..=UPDATES {
         let sums = gather(SAMPLES, update);
         for (significance, history) in &mut histories {
-            history.update(&sums);
+            history.update(sums.iter());
             if SHOWN.contains(&update) {
                 let error = |(i, exact): (usize, &f32)| {
                     let c0: Vec3 = history.coefficients(i)[0];

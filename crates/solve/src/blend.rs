@@ -33,7 +33,7 @@
 
 use glam::Vec3;
 
-use lumencast_gather::Sums;
+use lumencast_gather::SumsAt;
 use lumencast_light::luminance;
 
 /// The least weights of the quick means.
@@ -105,20 +105,20 @@ impl History {
 
     /// Takes an update, one entry a receiver in order. Entries without samples, or with numbers that
     /// are not finite, change nothing.
-    pub fn update(&mut self, sums: &[Sums]) {
-        self.update_at(0..self.len(), sums);
+    pub fn update<'a>(&mut self, sums: impl IntoIterator<Item = SumsAt<'a>>) {
+        self.update_at((0..self.len()).zip(sums));
     }
 
-    /// Takes an update of the receivers with these numbers, one entry each.
-    pub fn update_at(&mut self, receivers: impl IntoIterator<Item = usize>, sums: &[Sums]) {
+    /// Takes an update of the receivers with these numbers.
+    pub fn update_at<'a>(&mut self, entries: impl IntoIterator<Item = (usize, SumsAt<'a>)>) {
         let mut significance = self.settings.significance;
         if self.expecting > 0 && significance.is_finite() {
             significance = significance.min(EXPECTED);
         }
         self.expecting = self.expecting.saturating_sub(1);
-        for (receiver, sums) in receivers.into_iter().zip(sums) {
+        for (receiver, sums) in entries {
             let ladder = &mut self.receivers[receiver];
-            if let Some(update) = Update::new(sums, ladder.coefficients()) {
+            if let Some(update) = Update::new(&sums, ladder.coefficients()) {
                 ladder.update(&update, significance);
             }
         }
@@ -151,10 +151,9 @@ struct Update {
 }
 
 impl Update {
-    fn new(sums: &Sums, coefficients: usize) -> Option<Self> {
-        let usable = sums.count > 0
-            && sums.sum.len() == coefficients
-            && sums.sum_of_squares.len() == coefficients;
+    fn new(sums: &SumsAt<'_>, coefficients: usize) -> Option<Self> {
+        let usable =
+            sums.count > 0 && sums.sum.len() == coefficients && sums.squares.len() == coefficients;
         let samples = sums.count as f32;
         let mean: Vec<Vec3> = sums.mean().collect();
         if !usable || !mean.iter().all(|m| m.is_finite()) {
@@ -162,9 +161,7 @@ impl Update {
         }
         let variance = std::array::from_fn(|k| {
             let Some(mean) = mean.get(k) else { return 0.0 };
-            let square = sums.sum_of_squares[k] / samples - mean * mean;
-            // Channels vary together, so deviations add up.
-            luminance(square.max(Vec3::ZERO).map(f32::sqrt)).powi(2)
+            (sums.squares[k] / samples - luminance(*mean).powi(2)).max(0.0)
         });
         Some(Self { mean, samples, variance })
     }
@@ -311,23 +308,37 @@ mod tests {
 
     const COUNT: u32 = 16;
 
+    /// The sums of one receiver.
+    #[derive(Clone, Default)]
+    struct Owned {
+        sum: Vec<Vec3>,
+        squares: Vec<f32>,
+        count: u32,
+    }
+
+    impl Owned {
+        fn at(&self) -> SumsAt<'_> {
+            let Self { sum, squares, count } = self;
+            SumsAt { sum, squares, count: *count, ..SumsAt::default() }
+        }
+    }
+
     /// An update whose mean has c₀ = `level` with a standard deviation of `noise`.
-    fn sums(level: f32, noise: f32, seed: u64) -> Sums {
+    fn sums(level: f32, noise: f32, seed: u64) -> Owned {
         let n = COUNT as f32;
         let value =
             |k: u64| Vec3::splat((if k == 0 { level } else { 0.0 }) + noise * normal(seed * 9 + k));
         let sum: Vec<Vec3> = (0..9).map(|k| n * value(k)).collect();
-        let sum_of_squares =
-            sum.iter().map(|s| s * s / n + Vec3::splat(n * n * noise * noise)).collect();
-        Sums { sum, sum_of_squares, count: COUNT, ..Sums::default() }
+        let squares = sum.iter().map(|s| s.y * s.y / n + n * n * noise * noise).collect();
+        Owned { sum, squares, count: COUNT }
     }
 
-    fn blend(settings: BlendSettings, updates: impl IntoIterator<Item = Sums>) -> Vec<f32> {
+    fn blend(settings: BlendSettings, updates: impl IntoIterator<Item = Owned>) -> Vec<f32> {
         let mut history = History::new(settings, 1, 9);
         updates
             .into_iter()
             .map(|s| {
-                history.update(&[s]);
+                history.update([s.at()]);
                 history.coefficients(0)[0].x
             })
             .collect()
@@ -336,14 +347,14 @@ mod tests {
     #[test]
     fn single_sums_are_blended_too() {
         let mut history = History::new(BlendSettings::default(), 2, 1);
-        let one = |value: f32| Sums {
+        let one = |value: f32| Owned {
             sum: vec![Vec3::splat(value * 4.0)],
-            sum_of_squares: vec![Vec3::splat(value * value * 4.0)],
+            squares: vec![value * value * 4.0],
             count: 4,
-            ..Sums::default()
         };
-        history.update(&[one(1.0), one(5.0)]);
-        history.update(&[one(3.0), one(5.0)]);
+        for value in [1.0, 3.0] {
+            history.update([one(value), one(5.0)].iter().map(Owned::at));
+        }
         assert_eq!(history.coefficients(0), [Vec3::splat(2.0)]);
         assert_eq!(history.coefficients(1), [Vec3::splat(5.0)]);
     }
@@ -371,17 +382,17 @@ mod tests {
         let mut history =
             History::new(BlendSettings { ratio: 1e-6, significance: f32::INFINITY }, 1, 9);
         let mut few = sums(1.0, 0.0, 1);
-        let scaled = |s: &Sums, n: u32| Sums {
+        let scaled = |s: &Owned, n: u32| Owned {
             sum: s.sum.iter().map(|x| x / COUNT as f32 * n as f32).collect(),
             count: n,
             ..s.clone()
         };
         few = scaled(&few, 10);
-        history.update(&[few]);
-        history.update(&[scaled(&sums(4.0, 0.0, 1), 30)]);
+        history.update([few.at()]);
+        history.update([scaled(&sums(4.0, 0.0, 1), 30).at()]);
         assert!((history.coefficients(0)[0].x - 3.25).abs() < 1e-5);
         assert!((history.effective_samples(0) - 40.0).abs() < 1e-3);
-        history.update(&[Sums::default()]);
+        history.update([SumsAt::default()]);
         assert!((history.coefficients(0)[0].x - 3.25).abs() < 1e-5);
     }
 
@@ -426,12 +437,12 @@ mod tests {
         let after = |expected: bool| {
             let answers = (0..100).map(|receiver| {
                 let mut history = History::new(settings, 1, 9);
-                (0..400).for_each(|t| history.update(&[sums(10.0, 1.0, receiver * 2000 + t)]));
+                (0..400).for_each(|t| history.update([sums(10.0, 1.0, receiver * 2000 + t).at()]));
                 if expected {
                     history.expect_change();
                 }
                 let mut update = |t: u64| {
-                    history.update(&[sums(12.0, 1.0, receiver * 2000 + t)]);
+                    history.update([sums(12.0, 1.0, receiver * 2000 + t).at()]);
                     history.coefficients(0)[0].x
                 };
                 (400..1000).take_while(|t| update(*t) < 11.0).count()

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
-use lumencast_gather::{Gather, Job, Receiver, Sums};
+use lumencast_gather::{Gather, Job, Receiver, SumsAt};
 use lumencast_light::{Grid, Order};
 use lumencast_scene::{Aabb, Scene, Snapshot, VolumeSpec};
 
@@ -203,14 +203,14 @@ fn uses(
     places: impl Iterator<Item = Vec3>,
     gatherer: &mut dyn Gather,
 ) -> Result<Vec<Use>, SolveError> {
-    let receivers: Vec<_> = places.map(|position| Receiver::probe(position, DIRECTIONS)).collect();
-    let job = Job { bounces: 0, surfaces: true, ..Job::new(scene.clone(), receivers) };
+    let receivers: Vec<_> = places.map(Receiver::probe).collect();
+    let job = Job { bounces: 0, surfaces: true, ..Job::new(scene.clone(), receivers, DIRECTIONS) };
     let ticket = gatherer.submit(job);
     let gathered = gatherer.wait(ticket).ok_or(SolveError::Gather)?;
-    Ok(gathered.sums.iter().map(found).collect())
+    Ok(gathered.sums.iter().map(|sums| found(&sums)).collect())
 }
 
-fn found(sums: &Sums) -> Use {
+fn found(sums: &SumsAt<'_>) -> Use {
     let met = || sums.surfaces.iter().flatten();
     if sums.culled_fraction > BURIED_ABOVE {
         Use::Buried

@@ -1,6 +1,6 @@
 //! What a solver asks a gatherer for.
 
-use lumencast_gather::Job;
+use lumencast_gather::{Budget, Job};
 
 /// A job for a gatherer. Its sums go back to the solver with what was asked.
 #[derive(Clone, Debug)]
@@ -23,6 +23,6 @@ pub struct Asked {
 pub(crate) enum What {
     /// Where a scene's surfaces are.
     Surfaces,
-    /// Light at the probes, and at the points of surfaces with these numbers.
-    Light { points: Vec<usize> },
+    /// Light at receivers.
+    Light { budgets: Vec<Budget> },
 }

@@ -104,8 +104,9 @@ impl Solver {
         let options = &self.options;
         self.fields.iter_mut().enumerate().map(move |(field, FieldSolver::Volume(volume))| {
             let seed = pass << 8 | u64::from(volume.id().0);
-            let (job, points) = volume.job(scene.clone(), previous.clone(), samples, options, seed);
-            Request { job, asked: Asked { field, what: What::Light { points } } }
+            let job = volume.job(scene.clone(), previous.clone(), samples, options, seed);
+            let what = What::Light { budgets: job.budgets.clone() };
+            Request { job, asked: Asked { field, what } }
         })
     }
 
@@ -117,7 +118,7 @@ impl Solver {
         let FieldSolver::Volume(volume) = &mut self.fields[asked.field];
         match &asked.what {
             What::Surfaces => volume.found(gathered),
-            What::Light { points } => volume.blend(gathered, points),
+            What::Light { budgets } => volume.blend(gathered, budgets),
         }
     }
 

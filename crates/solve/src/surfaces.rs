@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{IVec3, Vec3};
-use lumencast_gather::{Job, Receiver, Sums, SurfacePoint};
+use lumencast_gather::{Budget, Job, Receiver, Sums, SumsAt, SurfacePoint};
 use lumencast_light::Grid;
 use lumencast_scene::Snapshot;
 
@@ -29,7 +29,7 @@ const SAMPLES_A_TURN: u32 = 4;
 #[derive(Clone)]
 pub(crate) struct Surfaces {
     /// Where they are looked for from: the volume's probes, and places about it.
-    lookouts: Vec<Vec3>,
+    lookouts: Arc<[Receiver]>,
     /// How many of them are probes.
     probes: usize,
     /// A lookout.
@@ -46,7 +46,8 @@ pub(crate) struct Surfaces {
 
 impl Surfaces {
     pub(crate) fn new(options: FitOptions, blend: BlendSettings, grid: &Grid) -> Self {
-        let lookouts: Vec<Vec3> = grid.positions().chain(about(grid)).collect();
+        let lookouts: Arc<[Receiver]> =
+            grid.positions().chain(about(grid)).map(Receiver::probe).collect();
         let each = (options.points as usize).min(MOST_POINTS / lookouts.len().max(1)).max(1);
         let points = lookouts.len() * each;
         Self {
@@ -63,17 +64,16 @@ impl Surfaces {
 
     /// What to ask for to find the surfaces of a scene; `None` while it is the one that was seen.
     pub(crate) fn look(&self, scene: &Arc<Snapshot>) -> Option<Job> {
-        let lookout = |position: &Vec3| Receiver::probe(*position, self.points);
         (self.seen != Some(scene.version)).then(|| Job {
             bounces: 0,
             surfaces: true,
             seed: SEED,
-            ..Job::new(scene.clone(), self.lookouts.iter().map(lookout).collect::<Vec<_>>())
+            ..Job::new(scene.clone(), self.lookouts.clone(), self.points)
         })
     }
 
     /// Takes in what a look has found. `cell` is the shortest side of a cell, metres.
-    pub(crate) fn found(&mut self, sums: &[Sums], scene_version: u64, cell: f32) {
+    pub(crate) fn found(&mut self, sums: &Sums, scene_version: u64, cell: f32) {
         self.around = Surroundings::new(sums);
         self.seen = Some(scene_version);
         for (number, now) in self.around.points().iter().enumerate() {
@@ -91,14 +91,24 @@ impl Surfaces {
         }
     }
 
-    /// Where to gather next, `samples` a probe in all: at all points, or at those whose turn it is.
-    pub(crate) fn receivers(&mut self, samples: u32) -> (Vec<usize>, Vec<Receiver>) {
+    /// All points as receivers of light.
+    pub(crate) fn receivers(&self) -> impl Iterator<Item = Receiver> + '_ {
+        self.around.receivers()
+    }
+
+    /// At which points to gather next, `samples` a probe in all: at all that count, or at those whose
+    /// turn it is.
+    pub(crate) fn budgets(&mut self, samples: u32) -> impl Iterator<Item = Budget> + '_ {
         let points = self.points;
         let turns = (SAMPLES_A_TURN * points).div_ceil(samples.max(1)).max(1);
         let each = (samples * turns).div_ceil(points);
         let turn = self.turn % turns as usize;
         self.turn += 1;
-        self.around.receivers(each).filter(|(point, _)| point % turns as usize == turn).unzip()
+        let around = &self.around;
+        (turn..around.points().len())
+            .step_by(turns as usize)
+            .filter(|point| around.counts(*point))
+            .map(move |point| Budget { receiver: point as u32, samples: each })
     }
 
     /// The scene was edited: light may be another from now on.
@@ -106,9 +116,9 @@ impl Surfaces {
         self.history.expect_change();
     }
 
-    /// Blends in what arrived at points.
-    pub(crate) fn blend(&mut self, points: &[usize], sums: &[Sums]) {
-        self.history.update_at(points.iter().copied(), sums);
+    /// Blends in what arrived at the points with these numbers.
+    pub(crate) fn blend<'a>(&mut self, entries: impl IntoIterator<Item = (usize, SumsAt<'a>)>) {
+        self.history.update_at(entries);
     }
 
     /// What the probes see.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumencast_gather::{Gathered, Job, Receiver};
+use lumencast_gather::{Budget, Gathered, Job, Receiver};
 use lumencast_light::{FieldId, Light, ProbeVolume};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
@@ -19,7 +19,8 @@ use crate::walls::{Buried, Sight};
 pub(crate) struct VolumeSolver {
     /// What arrives at the probes: the history's estimates, with probes inside walls filled in.
     arriving: ProbeVolume,
-    positions: Vec<Vec3>,
+    /// Its probes and, after them, the points of surfaces that it knows.
+    receivers: Arc<[Receiver]>,
     history: History,
     buried: Buried,
     surfaces: Option<Surfaces>,
@@ -31,7 +32,7 @@ impl VolumeSolver {
         let GatherOptions { blend, fit, offset, .. } = *options;
         Self {
             arriving: ProbeVolume::dark(id, grid, order).read_at(offset),
-            positions: grid.positions().collect(),
+            receivers: grid.positions().map(Receiver::probe).collect(),
             history: History::new(blend, grid.probe_count(), order.coefficients()),
             buried: Buried::new(grid.probe_count()),
             surfaces: fit.map(|fit| Surfaces::new(fit, blend, &grid)),
@@ -51,7 +52,7 @@ impl VolumeSolver {
     }
 
     pub(crate) fn probe_count(&self) -> usize {
-        self.positions.len()
+        self.arriving.grid.probe_count()
     }
 
     /// Number of probes inside walls.
@@ -66,8 +67,8 @@ impl VolumeSolver {
             return surfaces.places();
         }
         let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
-        let open = self.positions.iter().zip(self.buried.open()).filter(|(_, open)| *open);
-        open.flat_map(|(&position, _)| axes.map(|axis| (position, axis))).collect()
+        let open = self.arriving.grid.positions().zip(self.buried.open()).filter(|(_, open)| *open);
+        open.flat_map(|(position, _)| axes.map(|axis| (position, axis))).collect()
     }
 
     /// What to ask for so that it knows of the surfaces: only where probes are fitted, and the scene is
@@ -81,11 +82,12 @@ impl VolumeSolver {
         let cell = self.arriving.grid.spacing().min_element();
         if let Some(surfaces) = &mut self.surfaces {
             surfaces.found(&gathered.sums, gathered.scene_version, cell);
+            let probes = self.arriving.grid.positions().map(Receiver::probe);
+            self.receivers = probes.chain(surfaces.receivers()).collect();
         }
     }
 
-    /// What to gather for every probe and, at the points whose numbers come with it, for the surfaces
-    /// about them.
+    /// What to gather for every probe and, where they are fitted, for the surfaces about them.
     pub(crate) fn job(
         &mut self,
         scene: Arc<Snapshot>,
@@ -93,15 +95,16 @@ impl VolumeSolver {
         samples: u32,
         options: &GatherOptions,
         seed: u64,
-    ) -> (Job, Vec<usize>) {
-        let probe = |&position: &Vec3| Receiver::probe(position, samples);
-        let mut receivers: Vec<_> = self.positions.iter().map(probe).collect();
-        let (points, at_points) =
-            self.surfaces.as_mut().map(|surfaces| surfaces.receivers(samples)).unwrap_or_default();
-        receivers.extend(at_points);
+    ) -> Job {
+        let probes = self.probe_count() as u32;
+        let at_probes = (0..probes).map(|receiver| Budget { receiver, samples });
+        let at_points = self.surfaces.iter_mut().flat_map(|surfaces| surfaces.budgets(samples));
+        let at_points = at_points.map(|b| Budget { receiver: probes + b.receiver, ..b });
+        let budgets = at_probes.chain(at_points).collect();
         let GatherOptions { bounces, clamp, .. } = *options;
-        let order = self.arriving.order;
-        (Job { previous, order, bounces, clamp, seed, ..Job::new(scene, receivers) }, points)
+        let (order, receivers) = (self.arriving.order, self.receivers.clone());
+        let job = Job::with_budgets(scene, receivers, budgets);
+        Job { previous, order, bounces, clamp, seed, ..job }
     }
 
     /// The scene was edited: light may be another from now on.
@@ -110,17 +113,18 @@ impl VolumeSolver {
         self.surfaces.iter_mut().for_each(Surfaces::expect_change);
     }
 
-    /// Blends new light into the histories; at points of surfaces it is that of these numbers.
-    pub(crate) fn blend(&mut self, gathered: &Gathered, points: &[usize]) {
-        let (probes, at_points) = gathered.sums.split_at(self.positions.len());
-        self.history.update(probes);
+    /// Blends new light into the histories; `budgets` are those of the job.
+    pub(crate) fn blend(&mut self, gathered: &Gathered, budgets: &[Budget]) {
+        let probes = self.probe_count();
+        self.history.update(gathered.sums.iter().take(probes));
         for probe in 0..self.history.len() {
             self.arriving.probe_mut(probe).copy_from_slice(self.history.coefficients(probe));
         }
-        self.buried.record(probes.iter().map(Sight::of));
+        self.buried.record(gathered.sums.iter().take(probes).map(|sums| Sight::of(&sums)));
         self.buried.fill(&mut self.arriving);
         if let Some(surfaces) = &mut self.surfaces {
-            surfaces.blend(points, at_points);
+            let at_points = budgets.iter().zip(gathered.sums.iter()).skip(probes);
+            surfaces.blend(at_points.map(|(b, sums)| (b.receiver as usize - probes, sums)));
         }
     }
 }

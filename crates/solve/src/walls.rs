@@ -11,7 +11,7 @@
 //! mix, which only visibility can avoid. Where no probe of a volume is valid, all stay as they are.
 
 use glam::{IVec3, Vec3};
-use lumencast_gather::Sums;
+use lumencast_gather::SumsAt;
 use lumencast_light::ProbeVolume;
 
 /// Share of backs above which a probe is taken to be inside a wall, and below which it is
@@ -27,7 +27,7 @@ const MEMORY: f32 = 0.1;
 /// What a probe saw in one tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sight {
-    /// [`Sums::back_face_fraction`] and [`Sums::culled_fraction`].
+    /// [`SumsAt::back_face_fraction`] and [`SumsAt::culled_fraction`].
     backs: f32,
     culled: f32,
     samples: u32,
@@ -36,7 +36,7 @@ pub(crate) struct Sight {
 }
 
 impl Sight {
-    pub(crate) fn of(sums: &Sums) -> Self {
+    pub(crate) fn of(sums: &SumsAt<'_>) -> Self {
         Self {
             backs: sums.back_face_fraction,
             culled: sums.culled_fraction,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_gather::{Gather, Job, Place, Receiver, Sums};
+use lumencast_gather::{Budget, Gather, Job, Receiver, Sums, SumsAt};
 use lumencast_light::{FieldId, Grid, Light, Offset, Order, ProbeVolume};
 use lumencast_scene::{Environment, LightKind, Material, PunctualLight, Snapshot};
 use lumencast_solve::fit::{FitSettings, Part, Surroundings, fit};
@@ -12,38 +12,40 @@ use lumencast_testkit::scenes::{Stage, lambert};
 
 const POINTS: u32 = 64;
 
-fn gather(job: Job) -> Vec<Sums> {
+fn gather(job: Job) -> Sums {
     let mut tracer = CpuPathTracer::new(Options::default()).unwrap();
     let ticket = tracer.submit(job);
     tracer.wait(ticket).unwrap().sums
 }
 
-fn irradiance(sums: &Sums) -> Vec3 {
+fn irradiance(sums: &SumsAt<'_>) -> Vec3 {
     sums.mean().next().unwrap()
 }
 
 /// A volume as it is gathered, and what is seen from its probes.
 fn look(scene: &Arc<Snapshot>, grid: Grid, bounces: u32) -> (ProbeVolume, Surroundings) {
-    let probes =
-        |samples| grid.positions().map(|at| Receiver::probe(at, samples)).collect::<Vec<_>>();
+    let probes: Arc<[Receiver]> = grid.positions().map(Receiver::probe).collect();
     let mut volume = ProbeVolume::dark(FieldId(0), grid, Order::L2);
-    let sums = gather(Job { bounces, ..Job::new(scene.clone(), probes(4096)) });
+    let sums = gather(Job { bounces, ..Job::new(scene.clone(), probes.clone(), 4096) });
     for (probe, sums) in sums.iter().enumerate() {
         for (c, mean) in volume.probe_mut(probe).iter_mut().zip(sums.mean()) {
             *c = mean;
         }
     }
-    let job = Job { bounces: 0, surfaces: true, ..Job::new(scene.clone(), probes(POINTS)) };
+    let job = Job { bounces: 0, surfaces: true, ..Job::new(scene.clone(), probes, POINTS) };
     (volume, Surroundings::new(&gather(job)))
 }
 
 /// What a volume's surroundings receive.
 fn known(scene: &Arc<Snapshot>, around: &Surroundings, bounces: u32) -> Vec<Option<Vec3>> {
-    let (numbers, receivers): (Vec<usize>, Vec<Receiver>) = around.receivers(256).unzip();
-    let lit = gather(Job { bounces, ..Job::new(scene.clone(), receivers) });
+    let receivers: Vec<Receiver> = around.receivers().collect();
+    let counting = (0..receivers.len() as u32).filter(|point| around.counts(*point as usize));
+    let budgets: Vec<Budget> = counting.map(|receiver| Budget { receiver, samples: 256 }).collect();
+    let job = Job::with_budgets(scene.clone(), receivers, budgets.clone());
+    let lit = gather(Job { bounces, ..job });
     let mut known = vec![None; around.points().len()];
-    for (number, sums) in numbers.into_iter().zip(&lit) {
-        known[number] = Some(irradiance(sums));
+    for (budget, sums) in budgets.iter().zip(lit.iter()) {
+        known[budget.receiver as usize] = Some(irradiance(&sums));
     }
     known
 }
@@ -104,16 +106,13 @@ fn grid_of_rooms() -> Grid {
 /// towards `normal`, and the mean of what should be read.
 fn wall(scene: &Arc<Snapshot>, volume: &ProbeVolume, normal: Vec3) -> [f32; 2] {
     let at = |i: u32| Vec3::new(0.2, 0.18 * (i % 10) as f32 - 0.8, 0.28 * (i / 10) as f32 - 1.26);
-    let receiver = |i: u32| Receiver {
-        place: Place::Lumel { position: at(i), normal, footprint: [Vec3::ZERO; 2] },
-        samples: 4096,
-    };
-    let lit = gather(Job::new(scene.clone(), (0..100).map(receiver).collect::<Vec<_>>()));
+    let receivers: Vec<_> = (0..100).map(|i| Receiver::point(at(i), normal)).collect();
+    let lit = gather(Job::new(scene.clone(), receivers, 4096));
     let (mut squares, mut sum) = (0.0, 0.0);
-    for (i, sums) in (0..100).zip(&lit) {
+    for (i, sums) in (0..100).zip(lit.iter()) {
         let read = volume.sample(at(i), normal).irradiance(normal).y;
-        squares += (read - irradiance(sums).y).powi(2) / 100.0;
-        sum += irradiance(sums).y / 100.0;
+        squares += (read - irradiance(&sums).y).powi(2) / 100.0;
+        sum += irradiance(&sums).y / 100.0;
     }
     [squares.sqrt(), sum]
 }
@@ -168,11 +167,9 @@ fn volumes_that_meet_in_a_wall_are_fitted_together() {
         let x = 0.2 + if i < 30 { -0.4 } else { 0.1 } + 0.3 * (i % 5) as f32 / 4.0;
         Vec3::new(x, -1.0, 0.45 * (i % 30 / 5) as f32 - 1.1)
     };
-    let receiver = |i: u32| Receiver {
-        place: Place::Lumel { position: at(i), normal: Vec3::Y, footprint: [Vec3::ZERO; 2] },
-        samples: 1024,
-    };
-    let lit = gather(Job::new(scene.clone(), (0..60).map(receiver).collect::<Vec<_>>()));
+    let receivers: Vec<_> = (0..60).map(|i| Receiver::point(at(i), Vec3::Y)).collect();
+    let lit = gather(Job::new(scene.clone(), receivers, 1024));
+    let lit: Vec<SumsAt<'_>> = lit.iter().collect();
     let bright = (0..30).map(|i| irradiance(&lit[i]).y).sum::<f32>() / 30.0;
     assert!(bright > 0.0 && lit[30..].iter().all(|sums| irradiance(sums) == Vec3::ZERO));
     // As it is displayed.
@@ -299,9 +296,10 @@ fn surfaces_are_where_samples_meet_them() {
     for y in [-1.0, 2.0] {
         stage.quad(Vec3::new(-50.0, y, -50.0), Vec3::X * 100.0, Vec3::Z * 100.0, grey);
     }
-    let job = Job::new(stage.snapshot(), [Receiver::probe(Vec3::ZERO, 500)]);
-    assert!(gather(Job { bounces: 0, ..job.clone() })[0].surfaces.is_empty(), "nobody asked");
-    let sums = gather(Job { bounces: 0, surfaces: true, ..job }).remove(0);
+    let job = Job::new(stage.snapshot(), [Receiver::probe(Vec3::ZERO)], 500);
+    assert!(gather(Job { bounces: 0, ..job.clone() }).at(0).surfaces.is_empty(), "nobody asked");
+    let found = gather(Job { bounces: 0, surfaces: true, ..job });
+    let sums = found.at(0);
     assert_eq!(sums.surfaces.len(), 500);
     let (mut above, mut below) = (0, 0);
     for at in sums.surfaces.iter().flatten() {
@@ -316,6 +314,6 @@ fn surfaces_are_where_samples_meet_them() {
     // Half of all directions each, but for those that pass the borders 50 m away.
     assert!((230..=250).contains(&above) && (235..=250).contains(&below), "{above} {below}");
     // A probe that sees so many backs is inside of something: its points do not count.
-    let around = Surroundings::new(&[sums]);
-    assert_eq!(around.receivers(1).count(), 0);
+    let around = Surroundings::new(&found);
+    assert_eq!((0..500).filter(|point| around.counts(*point)).count(), 0);
 }

@@ -16,7 +16,7 @@ use crate::bsdf::frame;
 use crate::sampling::{Sampler, cosine_hemisphere, lattice, power_heuristic};
 use crate::surface::gamma;
 use crate::world::{Passing, World};
-use crate::{Job, Place};
+use crate::{Budget, Job, Receiver};
 
 /// Of a lumel's size, how far off the surface its samples start.
 const LIFT: f32 = 1e-3;
@@ -58,14 +58,15 @@ enum Prepared {
 impl Aim {
     /// Of a receiver of a job in its world. Where surfaces are is known to some ulps of its largest
     /// coordinate only, from its origin; where receivers are, to one of theirs in the world.
-    pub(super) fn new(job: &Job, receiver: u32, world: &World) -> Self {
+    pub(super) fn new(job: &Job, budget: Budget, world: &World) -> Self {
+        let Budget { receiver, samples } = budget;
         let (seed, extent, origin) = (job.seed, world.extent(), world.origin());
-        let place = match job.receivers[receiver as usize].place {
-            Place::Probe { position } => {
+        let place = match job.receivers[receiver as usize] {
+            Receiver::Probe { position } => {
                 let (position, turn) = (position - origin, lattice::turn(seed, receiver));
                 Prepared::Probe { order: job.order, position, turn }
             }
-            Place::Lumel { position, normal, footprint } => {
+            Receiver::Lumel { position, normal, footprint } => {
                 let normal = normal.normalize_or(Vec3::Y);
                 let size = footprint[0].length().max(footprint[1].length());
                 let position = position - origin;
@@ -79,7 +80,6 @@ impl Aim {
                 }
             }
         };
-        let samples = job.receivers[receiver as usize].samples;
         Self { place, samples, seed, receiver, reaches: world.lights.are_sampled() }
     }
 
@@ -123,7 +123,7 @@ impl Aim {
     }
 
     /// What radiance from a direction is multiplied by where it is integrated, the first
-    /// [`Place::terms`] numbers.
+    /// [`Receiver::terms`] numbers.
     pub(super) fn integrand(&self, direction: Vec3) -> [f32; sh::MAX_COEFFICIENTS] {
         match &self.place {
             Prepared::Probe { order, .. } => sh::basis(*order, direction),
@@ -133,7 +133,7 @@ impl Aim {
         }
     }
 
-    /// What the light of a sample is multiplied by, the first [`Place::terms`] numbers: the inverse
+    /// What the light of a sample is multiplied by, the first [`Receiver::terms`] numbers: the inverse
     /// of its density times what is integrated.
     pub(super) fn terms(&self, sample: u32) -> [f32; sh::MAX_COEFFICIENTS] {
         match &self.place {

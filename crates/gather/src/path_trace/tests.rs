@@ -13,8 +13,8 @@ use super::group::LOST;
 use super::integrator::Integrator;
 use super::paths::{Look, Paths};
 use super::*;
-use crate::Receiver;
 use crate::sampling::Sampler;
+use crate::{Budget, Receiver};
 
 const BLACK: Vec3 = Vec3::ZERO;
 
@@ -269,9 +269,11 @@ fn shading_normals_make_no_light() {
 }
 
 fn job(scene: &Arc<Snapshot>, seed: u64) -> Job {
-    let probe = |k: u32| Receiver::probe(Vec3::new(0.1 * k as f32, 0.5, 0.0), 1 + 40 * k);
+    let probe = |k: u8| Receiver::probe(Vec3::new(0.1 * f32::from(k), 0.5, 0.0));
     let receivers: Vec<_> = (0..9).map(probe).collect();
-    Job { order: Order::L3, bounces: 2, seed, ..Job::new(scene.clone(), receivers) }
+    let budget = |receiver| Budget { receiver, samples: 1 + 40 * receiver };
+    let job = Job::with_budgets(scene.clone(), receivers, (0..9).map(budget).collect());
+    Job { order: Order::L3, bounces: 2, seed, ..job }
 }
 
 fn lit_room() -> Arc<Snapshot> {
@@ -393,12 +395,31 @@ fn results_do_not_depend_on_threads() {
     assert!(one.iter().zip(0..).all(|(s, k)| s.count == 1 + 40 * k && s.sum.len() == 16));
 }
 
+/// A receiver draws the same samples whichever others are gathered at, in whatever order.
+#[test]
+fn a_subset_draws_the_samples_of_the_whole() {
+    let whole = job(&lit_room(), 5);
+    let gather = |budgets: Vec<Budget>| {
+        let mut tracer = tracer(2);
+        let ticket = tracer.submit(Job { budgets, ..whole.clone() });
+        tracer.wait(ticket).unwrap().sums
+    };
+    let all = gather(whole.budgets.clone());
+    let some: Vec<Budget> = [7, 2, 5].map(|receiver| whole.budgets[receiver]).into();
+    let found = gather(some.clone());
+    for (budget, found) in some.iter().zip(found.iter()) {
+        assert_eq!(found, all.at(budget.receiver as usize));
+    }
+    let other = Budget { receiver: 7, ..whole.budgets[2] };
+    assert_ne!(gather(vec![other]).at(0), found.at(1), "another place");
+}
+
 #[test]
 fn jobs_run_beside_each_other_and_can_be_given_up() {
     let scene = lit_room();
     let mut tracer = tracer(2);
     let mut huge = job(&scene, 1);
-    huge.receivers = Arc::from([Receiver::probe(Vec3::ZERO, 20_000_000)]);
+    huge.budgets = vec![Budget { receiver: 0, samples: 20_000_000 }];
     let endless = tracer.submit(huge.clone());
     let queued = tracer.submit(job(&scene, 2));
     let wanted = tracer.submit(job(&scene, 3));
@@ -418,7 +439,7 @@ fn jobs_run_beside_each_other_and_can_be_given_up() {
 fn empty_jobs_end() {
     let mut tracer = tracer(1);
     let mut empty = job(&Stage::default().snapshot(), 1);
-    empty.receivers = Arc::from([]);
+    empty.budgets.clear();
     let ticket = tracer.submit(empty);
     assert!(tracer.wait(ticket).unwrap().sums.is_empty());
 }

@@ -7,7 +7,7 @@ use lumencast_light::Order;
 use lumencast_scene::Snapshot;
 
 use crate::path_trace::{CpuPathTracer, Levels, MaterialModel, Options};
-use crate::{Gather, Job, Receiver, Sums};
+use crate::{Gather, Job, Receiver, SumsAt};
 
 /// What to compute at each point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +50,7 @@ pub struct ProbeEstimate {
     pub sh: Vec<Vec3>,
     /// Their standard errors, from how much the lattices differ.
     pub standard_error: Vec<Vec3>,
-    /// As in [`Sums::back_face_fraction`].
+    /// As in [`SumsAt::back_face_fraction`].
     pub back_face_fraction: f32,
 }
 
@@ -66,8 +66,7 @@ pub fn probe_sh(
     let options = Options { materials: settings.materials, threads: None, levels: Levels::One };
     let mut tracer = CpuPathTracer::new(options)?;
     let samples = settings.samples.max(1);
-    let receivers: Arc<[_]> =
-        points.iter().map(|&position| Receiver::probe(position, samples)).collect();
+    let receivers: Arc<[_]> = points.iter().copied().map(Receiver::probe).collect();
     let mut lattices = Vec::new();
     for lattice in 0..settings.lattices.max(2) {
         let ticket = tracer.submit(Job {
@@ -75,18 +74,18 @@ pub fn probe_sh(
             bounces: settings.bounces,
             clamp: settings.clamp,
             seed: crate::sampling::mix2(settings.seed, u64::from(lattice)),
-            ..Job::new(scene.clone(), receivers.clone())
+            ..Job::new(scene.clone(), receivers.clone(), samples)
         });
         let gathered =
             tracer.wait(ticket).ok_or_else(|| std::io::Error::other("gathering ended early"))?;
         lattices.push(gathered.sums);
     }
-    let of_point = |p: usize| lattices.iter().map(|l| &l[p]).collect::<Vec<_>>();
+    let of_point = |p: usize| lattices.iter().map(|sums| sums.at(p)).collect::<Vec<_>>();
     Ok((0..points.len()).map(|p| combine(&of_point(p))).collect())
 }
 
 /// Mean and standard error of the mean over lattices.
-fn combine(lattices: &[&Sums]) -> ProbeEstimate {
+fn combine(lattices: &[SumsAt<'_>]) -> ProbeEstimate {
     let n = lattices.len() as f64;
     let statistics = (0..lattices[0].sum.len()).map(|k| {
         let values: Vec<DVec3> =

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{Affine2, Affine3A, UVec2, Vec2, Vec3, Vec4};
 use lumencast_gather::path_trace::{CpuPathTracer, Levels, Options};
 use lumencast_gather::reference::{Film, PictureSettings, Renderer};
-use lumencast_gather::{Gather, Job, Place, Receiver};
+use lumencast_gather::{Gather, Job, Receiver};
 use lumencast_scene::{
     AlphaMode, Environment, Filter, HdrImage, Image, LightKind, Material, MaterialId, Primitive,
     Projection, PunctualLight, Snapshot, TextureRef, Vertices, View, Wrap,
@@ -61,10 +61,9 @@ pub(super) fn irradiance(
     bounces: u32,
     samples: u32,
 ) -> Estimate {
-    let place = Place::Lumel { position, normal, footprint: [Vec3::ZERO; 2] };
-    let receivers = vec![Receiver { place, samples }; 32];
+    let receivers = [Receiver::point(position, normal); 32];
     let mut tracer = CpuPathTracer::new(Options { levels, ..Options::default() }).unwrap();
-    let ticket = tracer.submit(Job { bounces, ..Job::new(scene.clone(), receivers) });
+    let ticket = tracer.submit(Job { bounces, ..Job::new(scene.clone(), receivers, samples) });
     let sums = tracer.wait(ticket).unwrap().sums;
     Estimate::of(&sums.iter().flat_map(|sums| sums.mean().map(|e| e.x)).collect::<Vec<_>>())
 }

@@ -30,7 +30,7 @@
 mod solve;
 
 use glam::Vec3;
-use lumencast_gather::{Place as At, Receiver, Sums, SurfacePoint};
+use lumencast_gather::{Receiver, Sums, SumsAt, SurfacePoint};
 use lumencast_light::{Light, Place, ProbeVolume, luminance, sh};
 
 use solve::{Row, SIZE, System};
@@ -223,10 +223,11 @@ pub struct Surroundings {
 impl Surroundings {
     /// Of the sums of all probes, in index order, and after them of any other places to look from, of a
     /// job that asked for [`surfaces`](lumencast_gather::Job::surfaces).
-    pub fn new(probes: &[Sums]) -> Self {
-        let backs = |sums: &Sums| sums.surfaces.iter().flatten().filter(|at| !at.front).count();
+    pub fn new(probes: &Sums) -> Self {
+        let backs =
+            |sums: &SumsAt<'_>| sums.surfaces.iter().flatten().filter(|at| !at.front).count();
         let inside =
-            probes.iter().map(|sums| backs(sums) as f32 > INSIDE * sums.count as f32).collect();
+            probes.iter().map(|sums| backs(&sums) as f32 > INSIDE * sums.count as f32).collect();
         let points = probes.iter().flat_map(|sums| sums.surfaces.iter().copied()).collect();
         Self { points, inside }
     }
@@ -243,13 +244,12 @@ impl Surroundings {
             && !self.inside[point / directions.max(1)]
     }
 
-    /// The points that [count](Self::counts) as receivers of light, with their numbers.
-    pub fn receivers(&self, samples: u32) -> impl Iterator<Item = (usize, Receiver)> + '_ {
-        let counting = self.points.iter().enumerate().filter(|(number, _)| self.counts(*number));
-        counting.filter_map(move |(number, point)| {
-            let SurfacePoint { position, normal, .. } = (*point)?;
-            let place = At::Lumel { position, normal, footprint: [Vec3::ZERO; 2] };
-            Some((number, Receiver { place, samples }))
+    /// All points as receivers of light; those where there is none stand at the origin.
+    pub fn receivers(&self) -> impl Iterator<Item = Receiver> + '_ {
+        self.points.iter().map(|point| {
+            point.map_or(Receiver::point(Vec3::ZERO, Vec3::Y), |at| {
+                Receiver::point(at.position, at.normal)
+            })
         })
     }
 }
