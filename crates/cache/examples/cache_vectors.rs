@@ -252,7 +252,9 @@ fn restarted() -> Value {
         steps.catalog(3.0, again.catalog());
         steps.shows_all(3.0, 2.0);
         steps.light(4.0, &again.light(5.0));
-        steps.shows_all(5.0, 5.0);
+        steps.shows_all(4.0, 2.0);
+        steps.shows_all(4.25, 3.5);
+        steps.shows_all(4.5, 5.0);
     })
 }
 

@@ -137,8 +137,12 @@ impl Cache {
                 _ => FieldCache::lit_by(&self.light, info),
             });
             let goes_on = same == Some(catalog.epoch_of(info)) && !self.saved;
-            let cache = self.fields.remove(&info.id).filter(|_| goes_on);
-            caches.insert(info.id, cache.unwrap_or_else(|| FieldCache::new(info)));
+            let kept = self.fields.remove(&info.id).filter(|_| same.is_some());
+            let mut cache = kept.unwrap_or_else(|| FieldCache::new(info));
+            if !goes_on {
+                cache.forget_updates();
+            }
+            caches.insert(info.id, cache);
         }
         self.fields = caches;
         self.light = Light::new(shown);

@@ -48,6 +48,13 @@ impl FieldCache {
         }
     }
 
+    /// Forgets updates, which another run of the server numbers anew; what is shown stays.
+    pub(crate) fn forget_updates(&mut self) {
+        match self {
+            Self::Volume(cache) => cache.forget_updates(),
+        }
+    }
+
     /// Brings what is shown to `now`.
     pub(crate) fn show(&mut self, now: f64, shown: &mut Field) {
         match (self, shown) {

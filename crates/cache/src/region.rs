@@ -13,8 +13,11 @@ const LONGEST_PASSAGE: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub(crate) struct RegionCache {
     region: Region,
+    order: Order,
     decoder: ProbeDecoder,
     newest: Option<Newest>,
+    /// When light came last, of this run of the server or the one before.
+    arrived: Option<f64>,
     /// What was shown when the newest light came; empty when nothing had come before.
     from: Vec<Vec3>,
     to: Vec<Vec3>,
@@ -28,13 +31,22 @@ impl RegionCache {
     pub(crate) fn new(region: Region, order: Order) -> Self {
         Self {
             region,
+            order,
             decoder: ProbeDecoder::new(region.size, order),
             newest: None,
+            arrived: None,
             from: Vec::new(),
             to: Vec::new(),
             passage: 0.0,
             settled: true,
         }
+    }
+
+    /// Forgets updates, which another run of the server numbers anew. What is shown stays, and passes
+    /// into what comes.
+    pub(crate) fn forget_updates(&mut self) {
+        self.decoder = ProbeDecoder::new(self.region.size, self.order);
+        self.newest = None;
     }
 
     pub(crate) fn newest(&self) -> Option<&Newest> {
@@ -56,18 +68,18 @@ impl RegionCache {
         if self.newest.is_some_and(|n| n.info.update >= light.header.info.update) {
             return Ok(false);
         }
-        if let Some(newest) = self.newest {
+        if let Some(arrived) = self.arrived {
             self.show(now, volume);
             self.from.clear();
             for probe in self.region.probes(volume.grid.resolution) {
                 self.from.extend_from_slice(volume.probe(probe));
             }
-            let waited = now - newest.arrived;
-            let ticks = light.header.info.tick.saturating_sub(newest.info.tick);
-            let made = ticks as f64 * tick_seconds;
-            self.passage = waited.max(made).clamp(0.0, LONGEST_PASSAGE);
+            let tick = self.newest.map_or(light.header.info.tick, |newest| newest.info.tick);
+            let made = light.header.info.tick.saturating_sub(tick) as f64 * tick_seconds;
+            self.passage = (now - arrived).max(made).clamp(0.0, LONGEST_PASSAGE);
         }
         self.newest = Some(Newest { info: light.header.info, arrived: now });
+        self.arrived = Some(now);
         self.to = light.coefficients;
         self.settled = false;
         Ok(true)
@@ -76,11 +88,8 @@ impl RegionCache {
     /// Brings `volume` to what is to be seen at `now`: on the way from the last update to the
     /// newest, which it reaches one passage after that one came, and keeps.
     pub(crate) fn show(&mut self, now: f64, volume: &mut ProbeVolume) {
-        let Some(newest) = self.newest else { return };
-        if self.settled {
-            return;
-        }
-        let passed = (now - newest.arrived).max(0.0);
+        let Some(arrived) = self.arrived.filter(|_| !self.settled) else { return };
+        let passed = (now - arrived).max(0.0);
         let is_there = self.from.is_empty() || passed >= self.passage;
         let share = if is_there { 1.0 } else { passed / self.passage } as f32;
         let n = volume.order.coefficients();

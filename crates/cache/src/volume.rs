@@ -56,6 +56,10 @@ impl VolumeCache {
         Ok(Received { info, news })
     }
 
+    pub(crate) fn forget_updates(&mut self) {
+        self.regions.values_mut().for_each(RegionCache::forget_updates);
+    }
+
     pub(crate) fn show(&mut self, now: f64, shown: &mut ProbeVolume) {
         self.regions.values_mut().for_each(|region| region.show(now, shown));
     }
