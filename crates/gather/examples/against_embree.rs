@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use glam::{Affine3A, Vec3};
 use lumencast_gather::measure::{RayBench, TestRay, build_seconds, scattered, top_level_seconds};
-use lumencast_gather::path_trace::{Levels, Trees};
+use lumencast_gather::path_trace::{Levels, Options, Trees};
 use lumencast_scene::{Scene, Snapshot};
 use lumencast_testkit::embree::{Embree, EmbreeInstances, Quality};
 use rayon::prelude::*;
@@ -40,7 +40,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         None => return Err("the scene has no camera".into()),
     };
     let snapshot = scene.snapshot();
-    let bench_with = |levels, trees| RayBench::new(&snapshot, view, rays, threads, levels, trees);
+    let bench_with = |levels, trees| {
+        let options = Options { threads, levels, ..Options::default() };
+        RayBench::new(&snapshot, view, rays, &options, trees)
+    };
     let bench = bench_with(Levels::One, Trees::Improved)?;
     let bench_built = bench_with(Levels::One, Trees::AsBuilt)?;
     let bench_two = bench_with(Levels::Two, Trees::Improved)?;

@@ -9,6 +9,7 @@ mod gatherer;
 mod job;
 mod lights;
 pub mod measure;
+mod numbers;
 pub mod path_trace;
 mod queue;
 pub mod reference;

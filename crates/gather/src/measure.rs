@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::accel::{AccelCache, Hit, Kernel, Ray, Stacks};
 use crate::bsdf::frame;
-use crate::path_trace::{Levels, MaterialModel, Trees};
+use crate::path_trace::{Levels, MaterialModel, Options, Trees};
 use crate::sampling::{Sampler, cosine_hemisphere, mix2};
 use crate::world::{Passing, World, WorldCache, itself};
 
@@ -82,10 +82,10 @@ impl RayBench {
         scene: &Arc<Snapshot>,
         view: View,
         count: usize,
-        threads: Option<NonZeroUsize>,
-        levels: Levels,
+        options: &Options,
         trees: Trees,
     ) -> std::io::Result<Self> {
+        let Options { threads, levels, .. } = *options;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads.map_or(0, NonZeroUsize::get))
             .build()

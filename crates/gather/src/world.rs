@@ -291,9 +291,9 @@ impl World {
         mut found: impl FnMut(u32, Option<Hit>),
     ) {
         let stops = |&n: &u32, hit: &Hit| self.stops(hit, &passing(n));
-        let mut left = Vec::new();
-        items.closest(rays, stops, &mut found, |ray, n| left.push((ray, n)));
-        self.accel.closest(left.into_iter(), stacks, stops, found);
+        let mut undecided = Vec::new();
+        items.closest(rays, stops, &mut found, |ray, n| undecided.push((ray, n)));
+        self.accel.closest(undecided.into_iter(), stacks, stops, found);
     }
 
     /// Whether something lies on each of the rays; otherwise like [`Self::closest`].
@@ -305,14 +305,14 @@ impl World {
         mut found: impl FnMut(u32, bool),
     ) {
         let stops = |&n: &u32, hit: &Hit| self.stops(hit, &passing(n));
-        let mut left = Vec::new();
+        let mut undecided = Vec::new();
         for buffer in self.light_buffers.iter() {
             let its_own = rays.clone().filter(|(ray, _)| buffer.answers(ray));
-            buffer.occluded(its_own, stops, &mut found, |ray, n| left.push((ray, n)));
+            buffer.occluded(its_own, stops, &mut found, |ray, n| undecided.push((ray, n)));
         }
         let is_anyones = |ray: &Ray| self.light_buffers.iter().any(|buffer| buffer.answers(ray));
         let others = rays.filter(|(ray, _)| !is_anyones(ray));
-        self.accel.occluded(others.chain(left), stacks, stops, found);
+        self.accel.occluded(others.chain(undecided), stacks, stops, found);
     }
 
     /// Whether a ray that passes some surfaces by ends at this one.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 use lumencast_gather::measure::{RayBench, TestRay};
-use lumencast_gather::path_trace::{Levels, Trees};
+use lumencast_gather::path_trace::{Levels, Options, Trees};
 use lumencast_scene::{Scene, View};
 use lumencast_testkit::embree::{Embree, Quality};
 
@@ -87,7 +87,8 @@ fn a_million_random_rays_agree_in_the_tomb_as_a_whole() {
 fn agree_but_for_ties(mut scene: Scene, levels: Levels, library: &Path) {
     let bounds = scene.bounds();
     let view = View::look_at(bounds.min, bounds.max, 1.0).unwrap();
-    let bench = RayBench::new(&scene.snapshot(), view, 0, None, levels, Trees::Improved).unwrap();
+    let options = Options { levels, ..Options::default() };
+    let bench = RayBench::new(&scene.snapshot(), view, 0, &options, Trees::Improved).unwrap();
     let triangles = bench.triangles();
     let rays: Vec<_> =
         (0..u64::from(RAYS)).map(|i| random_ray(i, bounds.min, bounds.max)).collect();

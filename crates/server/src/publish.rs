@@ -101,3 +101,87 @@ fn write(track: &mut TrackWriter, frame: Vec<u8>, new_group: bool, shared: &Shar
         Err(error) => tracing::warn!(track = track.name(), %error, "frame not published"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::RwLock;
+    use std::sync::atomic::AtomicU64;
+    use std::time::{Duration, Instant};
+
+    use glam::{Quat, UVec3, Vec3};
+    use lumencast_codec::{Epoch, FieldInfo, SceneInfo};
+    use lumencast_light::{FieldId, Grid, Order, ProbeVolume};
+    use lumencast_transport::{Client, ConnectOptions, ReadOptions, Server, ServerConfig};
+
+    use super::*;
+    use crate::http::Ticked;
+    use crate::metrics::Metrics;
+
+    /// So long something may take that has to come.
+    const PATIENCE: Duration = Duration::from_secs(60);
+
+    fn catalog(fields: &[u32]) -> Catalog {
+        let grid = Grid {
+            center: Vec3::ZERO,
+            rotation: Quat::IDENTITY,
+            size: Vec3::ONE,
+            resolution: UVec3::ONE,
+        };
+        let info = |id: &u32| {
+            FieldInfo::of_volume(&ProbeVolume::dark(FieldId(*id), grid, Order::L1), None, "")
+        };
+        let scene = SceneInfo { name: "room".into(), root: "room.glb".into() };
+        let fields = fields.iter().map(info).collect();
+        Catalog { epoch: Epoch(1), scene, tick_seconds: 0.04, fields, unknown: vec![] }
+    }
+
+    fn light(bytes: &[u8]) -> EncodedRegion {
+        EncodedRegion { region: 0, layer: 0, new_group: true, bytes: bytes.into(), error: 0.0 }
+    }
+
+    /// Fields come and go: their tracks with them, while those that stay go on.
+    #[tokio::test]
+    async fn tracks_follow_catalogs() {
+        let shared = Arc::new(Shared {
+            metrics: Metrics::default(),
+            page: Default::default(),
+            scene_files: Default::default(),
+            scene: "room".into(),
+            root: "room.glb".into(),
+            tick: AtomicU64::new(0),
+            ticked: RwLock::new(Ticked::at(Instant::now(), 0.04, 0.0)),
+        });
+        let config = ServerConfig::new("127.0.0.1:0".parse().unwrap());
+        let server = Server::bind(config, axum::Router::new()).await.unwrap();
+        let broadcast = server.publish("room").unwrap();
+        let mut publisher = Publisher::new(broadcast, &catalog(&[0, 1]), shared).unwrap();
+        let address = format!("http://{}/room", server.local_addr());
+        let client = Client::connect(&address, ConnectOptions::default()).await.unwrap();
+        let read = |field| {
+            let track = LightTrack { field, region: 0, layer: 0 }.to_string();
+            client.subscribe("room", &track, ReadOptions::default())
+        };
+        let frame = async |reader: &mut lumencast_transport::TrackReader| {
+            let frame = tokio::time::timeout(PATIENCE, reader.next()).await.expect("in time");
+            frame.expect("a track").map(|frame| frame.bytes)
+        };
+
+        let (mut stays, mut goes) = (read(0), read(1));
+        publisher.light(0, light(b"a"));
+        publisher.light(1, light(b"b"));
+        assert_eq!(frame(&mut stays).await.as_deref(), Some(&b"a"[..]));
+        assert_eq!(frame(&mut goes).await.as_deref(), Some(&b"b"[..]));
+        assert!(publisher.is_watched(0, 0) && publisher.is_watched(1, 0));
+
+        publisher.catalog(&catalog(&[0, 2]));
+        let mut comes = read(2);
+        publisher.light(0, light(b"c"));
+        publisher.light(1, light(b"to nobody"));
+        publisher.light(2, light(b"d"));
+        assert_eq!(frame(&mut stays).await.as_deref(), Some(&b"c"[..]));
+        assert_eq!(frame(&mut comes).await.as_deref(), Some(&b"d"[..]));
+        assert!(publisher.is_watched(0, 0) && !publisher.is_watched(1, 0));
+        drop(goes);
+        server.shutdown(Duration::ZERO).await;
+    }
+}

@@ -2,6 +2,7 @@
 
 use lumencast_codec::{EncodedRegion, FieldEncoder, FieldInfo, UpdateInfo};
 use lumencast_light::{Field, FieldId};
+use lumencast_solve::Solver;
 
 /// A moment of the scene.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +31,16 @@ impl Published {
     pub(crate) fn new(field: &Field) -> Self {
         let encoder = FieldEncoder::new(field);
         Self { id: field.id(), encoder, update: 0, shown: None, failures: 0 }
+    }
+
+    /// The solver's fields, in its order; those that were there before go on.
+    pub(crate) fn all(solver: &Solver, mut before: Vec<Self>) -> Vec<Self> {
+        let published = |id| {
+            let same = before.iter().position(|published| published.id == id);
+            let new = || solver.light().field(id).map(Self::new);
+            same.map(|at| before.remove(at)).or_else(new)
+        };
+        solver.ids().filter_map(published).collect()
     }
 
     /// The field as the catalog lists it.

@@ -119,18 +119,24 @@ impl Server {
             tokio::spawn(edits::collect(network.announced(&prefix)?, inbox.clone(), clock));
 
         let start_error = |error: std::io::Error| ServerError::Stopped(error.to_string());
-        let mut loader = Loader::start().map_err(start_error)?;
+        let loader = Loader::start().map_err(start_error)?;
         let stopping = Arc::new(AtomicBool::new(false));
         let (ended, mut wait_ended) = tokio::sync::oneshot::channel();
-        let thread = {
-            let (stopping, shared) = (stopping.clone(), shared.clone());
-            let body = move || {
-                beat(tick, publisher, &mut loader, &shared, &inbox, clock, &stopping);
-                // Nobody listens any more if the server is stopping.
-                let _ = ended.send(());
-            };
-            thread::Builder::new().name("tick".into()).spawn(body).map_err(start_error)?
+        let ticking = Ticking {
+            tick,
+            publisher,
+            loader,
+            shared: shared.clone(),
+            inbox,
+            clock,
+            stopping: stopping.clone(),
         };
+        let body = move || {
+            ticking.run();
+            // Nobody listens any more if the server is stopping.
+            let _ = ended.send(());
+        };
+        let thread = thread::Builder::new().name("tick".into()).spawn(body).map_err(start_error)?;
 
         let mut counting = tokio::time::interval(Duration::from_secs(1));
         tokio::pin!(stop);
@@ -155,34 +161,48 @@ impl Server {
     }
 }
 
-/// Ticks at the rate set until told to stop.
-fn beat(
-    mut tick: Tick,
-    mut publisher: Publisher,
-    loader: &mut Loader,
-    shared: &Shared,
-    inbox: &Mutex<Inbox>,
+/// What the tick's thread works with.
+struct Ticking {
+    tick: Tick,
+    publisher: Publisher,
+    loader: Loader,
+    shared: Arc<Shared>,
+    inbox: Arc<Mutex<Inbox>>,
     clock: Instant,
-    stopping: &AtomicBool,
-) {
-    let now = || clock.elapsed().as_secs_f64();
-    let mut beat = Beat::new(tick.period(), now());
-    while !stopping.load(Ordering::Relaxed) {
-        let wait = beat.wait(now());
-        if wait > 0.0 {
-            // Wakes early when the server stops, or for no reason at all.
-            thread::park_timeout(Duration::from_secs_f64(wait));
-            continue;
+    stopping: Arc<AtomicBool>,
+}
+
+impl Ticking {
+    /// Ticks at the rate set until told to stop.
+    fn run(mut self) {
+        let mut beat = Beat::new(self.tick.period(), self.now());
+        while !self.stopping.load(Ordering::Relaxed) {
+            let wait = beat.wait(self.now());
+            if wait > 0.0 {
+                // Wakes early when the server stops, or for no reason at all.
+                thread::park_timeout(Duration::from_secs_f64(wait));
+                continue;
+            }
+            let started = self.now();
+            beat.start(started);
+            self.step(started);
         }
-        let started = now();
-        beat.start(started);
-        loader.deliver(&mut tick);
+    }
+
+    fn now(&self) -> f64 {
+        self.clock.elapsed().as_secs_f64()
+    }
+
+    /// One tick, with the mail that is ready, and what others are told of it.
+    fn step(&mut self, now: f64) {
+        let Self { tick, publisher, loader, shared, inbox, .. } = self;
+        loader.deliver(tick);
         let mail = inbox
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .take_ready(started, |edit| loader.is_ready(&tick, edit));
+            .take_ready(now, |edit| loader.is_ready(tick, edit));
         shared.tick.store(tick.number(), Ordering::Relaxed);
-        let report = tick.step(started, mail, &mut publisher);
+        let report = tick.step(now, mail, publisher);
         // With the log's time, from which pages measure the way to them.
         tracing::debug!(tick = report.tick, late = report.late, "tick published");
         if report.files_changed {

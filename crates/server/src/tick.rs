@@ -86,6 +86,8 @@ pub struct Tick {
     number: u64,
     /// The scales that clients know from the catalog.
     told_scales: Vec<Option<i8>>,
+    /// Whether clients do not know yet which fields there are.
+    fields_are_news: bool,
     /// The tick from which on the catalog may go out again.
     next_catalog: u64,
     /// At most so many bytes has the scene's snapshot.
@@ -119,8 +121,7 @@ impl Tick {
         };
         check_volumes(&volumes)?;
         let solver = Solver::new(&volumes, options.gather)?;
-        let fields = solver.ids().filter_map(|id| solver.light().field(id));
-        let published: Vec<Published> = fields.map(Published::new).collect();
+        let published = Published::all(&solver, Vec::new());
         let told_scales = vec![None; published.len()];
         let budget = Budget::new(options.period, options.samples);
         let last = Report::default();
@@ -134,6 +135,7 @@ impl Tick {
             epoch,
             number: 0,
             told_scales,
+            fields_are_news: false,
             next_catalog: 0,
             snapshot_bytes: 0,
             measured: None,
@@ -174,6 +176,19 @@ impl Tick {
             Some(published.describe(field, &self.options.source))
         };
         self.published.iter().filter_map(describe).collect()
+    }
+
+    /// Computes the light of these volumes from the next tick on, of which the catalog then tells.
+    /// Volumes that are there already go on as they are.
+    ///
+    /// # Errors
+    /// As in [`Tick::new`]; nothing has changed then.
+    pub fn set_volumes(&mut self, volumes: &[VolumeSpec]) -> Result<(), ServerError> {
+        check_volumes(volumes)?;
+        self.solver.set_volumes(volumes)?;
+        self.published = Published::all(&self.solver, std::mem::take(&mut self.published));
+        self.fields_are_news = true;
+        Ok(())
     }
 
     /// The light as it was last published.
@@ -224,6 +239,9 @@ impl Tick {
         self.blend(&scene, &brought);
         report.seconds[Stage::Blend as usize] = watch.lap();
 
+        if std::mem::take(&mut self.fields_are_news) {
+            outlet.catalog(&self.catalog());
+        }
         let frames = self.encode(outlet);
         report.seconds[Stage::Encode as usize] = watch.lap();
 
@@ -236,7 +254,15 @@ impl Tick {
         }
         report.seconds[Stage::Publish as usize] += watch.lap();
 
-        self.finish(now, &scene, &edits, &brought, watched, report)
+        report.rays = brought.iter().filter_map(|b| b.gathered.as_ref()).map(|g| g.rays).sum();
+        report.accepted = edits.accepted.len() as u64;
+        report.refused = edits.refused.len() as u64;
+        // Clients ask for files then that they did not need before.
+        report.files_changed = edits.accepted.iter().any(|accepted| accepted.edit.file().is_some());
+        report.scene_version = scene.version;
+        report.scene_time = scene.time;
+        self.last_now = Some(now);
+        self.finish(watched, report)
     }
 
     /// Applies the script's edits that are due and then the clients', each whole or not at all.
@@ -378,28 +404,12 @@ impl Tick {
     }
 
     /// Counts the tick and sets the samples of the next.
-    fn finish(
-        &mut self,
-        now: f64,
-        scene: &Snapshot,
-        edits: &Edits,
-        brought: &[Brought],
-        watched: bool,
-        mut report: Report,
-    ) -> Report {
+    fn finish(&mut self, watched: bool, mut report: Report) -> Report {
         let probes = self.solver.probe_count();
-        let buried = self.solver.buried_count();
         report.samples_a_probe = self.budget.samples();
         report.samples = probes as u64 * u64::from(report.samples_a_probe);
-        report.rays = brought.iter().filter_map(|b| b.gathered.as_ref()).map(|g| g.rays).sum();
-        report.accepted = edits.accepted.len() as u64;
-        report.refused = edits.refused.len() as u64;
         report.probes = probes as u64;
-        report.buried = buried as u64;
-        report.scene_version = scene.version;
-        report.scene_time = scene.time;
-        // Clients ask for files then that they did not need before.
-        report.files_changed = edits.accepted.iter().any(|accepted| accepted.edit.file().is_some());
+        report.buried = self.solver.buried_count() as u64;
         report.late = self.budget.record(report.stage(Stage::Gather), report.total_seconds());
         if report.late {
             tracing::debug!(tick = self.number, seconds = report.total_seconds(), "late");
@@ -408,7 +418,6 @@ impl Tick {
             self.budget.rest();
         }
         self.number += 1;
-        self.last_now = Some(now);
         self.last = report.clone();
         report
     }

@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use glam::{DVec3, Vec3};
-use lumencast_codec::{Catalog, EncodedRegion, Epoch, ProbeDecoder, StateFrame, VolumeShape};
+use lumencast_codec::{
+    Catalog, EncodedRegion, Epoch, ProbeDecoder, ProbeHeader, StateFrame, VolumeShape,
+};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Gathered, Job, Progress, Ticket};
 use lumencast_light::ProbeVolume;
@@ -498,6 +500,46 @@ fn a_late_tick_takes_fewer_samples_next_time() {
     assert_eq!(stepped.kept.states.last().map(|s| s.samples), Some(20.0), "of the last tick");
     stepped.steps(1);
     assert_eq!(stepped.kept.states.last().map(|s| s.samples), Some(next.samples_a_probe.into()));
+}
+
+/// Volumes come and go while ticks go on: clients are told in the next catalog, what stays keeps its
+/// light and its updates, and numbers are never used again.
+#[test]
+fn fields_come_and_go() {
+    let mut stepped = Stepped::new(options());
+    stepped.steps(3);
+    let mut first: VolumeSpec = Scene::builtin("cornell").unwrap().volumes()[0];
+    let own = stepped.volume();
+    (first.grid, first.order) = (own.grid, own.order);
+    let mut second = first;
+    second.grid.center.x += 0.5;
+    let ids = |stepped: &Stepped| -> Vec<u32> {
+        stepped.tick.catalog().fields.iter().map(|field| field.id).collect()
+    };
+    let updates = |stepped: &Stepped, field: u32| -> Vec<u64> {
+        let of_field = stepped.kept.frames.iter().filter(|(id, _)| *id == field);
+        let update = |frame: &EncodedRegion| ProbeHeader::read(&frame.bytes).unwrap().info.update;
+        of_field.map(|(_, frame)| update(frame)).collect()
+    };
+
+    stepped.tick.set_volumes(&[first, second]).unwrap();
+    let before = stepped.kept.catalogs.len();
+    stepped.steps(1);
+    assert_eq!(ids(&stepped), [0, 1]);
+    assert_eq!(stepped.kept.catalogs[before].fields.len(), 2, "told before their light");
+    assert_eq!((updates(&stepped, 0), updates(&stepped, 1)), (vec![0, 1, 2, 3], vec![0]));
+
+    stepped.tick.set_volumes(&[second]).unwrap();
+    stepped.steps(1);
+    stepped.tick.set_volumes(&[second, first]).unwrap();
+    stepped.steps(1);
+    assert_eq!(ids(&stepped), [1, 2]);
+    assert_eq!(updates(&stepped, 1), [0, 1, 2]);
+    assert_eq!((updates(&stepped, 0).len(), updates(&stepped, 2)), (4, vec![0]));
+
+    second.grid.resolution.x = 0;
+    assert!(stepped.tick.set_volumes(&[second]).is_err());
+    assert_eq!(ids(&stepped), [1, 2]);
 }
 
 #[test]

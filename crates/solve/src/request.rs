@@ -14,7 +14,7 @@ pub struct Request {
 /// What sums belong to.
 #[derive(Clone, Debug)]
 pub struct Asked {
-    /// The field's number, in the order of the solver's fields.
+    /// The field's place in the order of the solver's fields.
     pub field: usize,
     pub(crate) what: What,
 }

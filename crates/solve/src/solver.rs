@@ -21,6 +21,8 @@ pub struct Solver {
     options: GatherOptions,
     /// What is published.
     light: Light,
+    /// The number of the next new field.
+    next: FieldId,
 }
 
 /// A field, by its kind.
@@ -45,14 +47,39 @@ impl Solver {
     /// # Errors
     /// [`SolveError::Volume`]; no memory is taken for any then.
     pub fn new(volumes: &[VolumeSpec], options: GatherOptions) -> Result<Self, SolveError> {
+        let mut empty =
+            Self { fields: Vec::new(), options, light: Light::default(), next: FieldId(0) };
+        empty.set_volumes(volumes)?;
+        Ok(empty)
+    }
+
+    /// Keeps these volumes from now on. Those that it kept already go on under their numbers, with all
+    /// that is known of their light; others get numbers that none has had.
+    ///
+    /// # Errors
+    /// [`SolveError::Volume`]; nothing has changed then.
+    pub fn set_volumes(&mut self, volumes: &[VolumeSpec]) -> Result<(), SolveError> {
         for (volume, spec) in (0..).zip(volumes) {
             spec.check().map_err(|reason| SolveError::Volume { volume, reason })?;
         }
-        let pieces = volumes.iter().flat_map(|spec| spec.split());
-        let new = |(id, spec)| VolumeSolver::new(FieldId(id), spec, &options);
-        let volumes: Vec<VolumeSolver> = (0..).zip(pieces).map(new).collect();
-        let light = Light::new(volumes.iter().map(|volume| volume.arriving().clone()));
-        Ok(Self { fields: volumes.into_iter().map(FieldSolver::Volume).collect(), options, light })
+        let mut before = std::mem::take(&mut self.fields);
+        for spec in volumes.iter().flat_map(|spec| spec.split()) {
+            let same = before
+                .iter()
+                .position(|FieldSolver::Volume(volume)| volume.spec() == spec)
+                .map(|at| before.remove(at));
+            self.fields.push(same.unwrap_or_else(|| {
+                let FieldId(id) = self.next;
+                self.next = FieldId(id + 1);
+                FieldSolver::Volume(VolumeSolver::new(FieldId(id), spec, &self.options))
+            }));
+        }
+        let light = Light::new(self.volumes().map(|volume| {
+            let known = self.light.field(volume.id()).cloned();
+            known.unwrap_or_else(|| volume.arriving().clone().into())
+        }));
+        self.light = light;
+        Ok(())
     }
 
     /// Numbers of the fields, in the order in which they were asked for; pieces of a volume follow one

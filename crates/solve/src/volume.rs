@@ -39,6 +39,10 @@ impl VolumeSolver {
         }
     }
 
+    pub(crate) fn spec(&self) -> VolumeSpec {
+        VolumeSpec { grid: self.arriving.grid, order: self.arriving.order }
+    }
+
     pub(crate) fn id(&self) -> FieldId {
         self.arriving.id
     }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use lumencast_gather::measure::{RayBench, build_peak_bytes, build_seconds, top_level_seconds};
-use lumencast_gather::path_trace::{Levels, Trees};
+use lumencast_gather::path_trace::{Levels, Options, Trees};
 use serde_json::json;
 
 use super::Spread;
@@ -61,7 +61,8 @@ impl BenchRays {
         let peak = build_peak_bytes(&snapshot, levels);
         let spinner = output::spinner("Finding rays".into());
         let rays = self.rays as usize;
-        let bench = RayBench::new(&snapshot, view, rays, self.threads, levels, Trees::Improved)
+        let options = Options { threads: self.threads, levels, ..Options::default() };
+        let bench = RayBench::new(&snapshot, view, rays, &options, Trees::Improved)
             .context("cannot start the threads that trace")?;
         spinner.finish_and_clear();
         ensure!(

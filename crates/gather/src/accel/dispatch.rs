@@ -10,7 +10,7 @@ use super::{Accel, Hit, Ray};
 
 /// Calls a function by its twin that is compiled for the kernel's instructions.
 macro_rules! dispatch {
-    ($kernel:expr, $twin:ident::<$($generic:ident),*>($($argument:expr),*), $portable:expr) => {
+    ($kernel:expr, $twin:ident$(::<$($generic:ident),*>)?($($argument:expr),*), $portable:expr) => {
         match $kernel {
             Kernel::Portable => $portable,
             #[cfg(target_arch = "x86_64")]
@@ -18,7 +18,7 @@ macro_rules! dispatch {
                 #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
                 // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for what it needs.
                 unsafe {
-                    super::kernel_avx2::$twin::<$($generic),*>($($argument),*);
+                    super::kernel_avx2::$twin$(::<$($generic),*>)?($($argument),*);
                 }
             }
             #[cfg(target_arch = "aarch64")]
@@ -26,11 +26,20 @@ macro_rules! dispatch {
                 #[expect(unsafe_code, reason = "calls code compiled for NEON")]
                 // SAFETY: `kernel_neon` refuses to compile for a target without NEON.
                 unsafe {
-                    super::kernel_neon::$twin::<$($generic),*>($($argument),*);
+                    super::kernel_neon::$twin$(::<$($generic),*>)?($($argument),*);
                 }
             }
         }
     };
+}
+
+impl Kernel {
+    /// Runs `work`, compiled for the kernel's instructions. It has to be a closure that is always inlined,
+    /// of functions that are: what is called in it keeps the target's.
+    #[inline(always)]
+    pub(crate) fn run(self, work: impl FnOnce()) {
+        dispatch!(self, run(work), work());
+    }
 }
 
 /// Finds the nearest hit of each ray, or with `ANY` the first found, and tells of each ray as soon as
@@ -62,38 +71,38 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
 
 impl ItemBuffer {
     /// Finds the nearest surface that `accept` lets count on each of the rays, like [`Accel::closest`].
-    /// Rays that it cannot tell of are passed to `left`.
+    /// Rays that it cannot tell of are passed to `undecided`.
     #[inline]
     pub(crate) fn closest<T: Copy>(
         &self,
         rays: impl Iterator<Item = (Ray, T)>,
         accept: impl Fn(&T, &Hit) -> bool,
         found: impl FnMut(T, Option<Hit>),
-        left: impl FnMut(Ray, T),
+        undecided: impl FnMut(Ray, T),
     ) {
         dispatch!(
             self.kernel(),
-            closest_seen::<T>(self, rays, accept, found, left),
-            self.closest_with(rays, accept, found, left, triangles_portable)
+            closest_seen::<T>(self, rays, accept, found, undecided),
+            self.closest_with(rays, accept, found, undecided, triangles_portable)
         );
     }
 }
 
 impl LightBuffer {
     /// Whether any surface that `accept` lets count lies on each of the rays, which it must be for;
-    /// otherwise like [`Accel::occluded`]. Rays that it cannot tell of are passed to `left`.
+    /// otherwise like [`Accel::occluded`]. Rays that it cannot tell of are passed to `undecided`.
     #[inline]
     pub(crate) fn occluded<T: Copy>(
         &self,
         rays: impl Iterator<Item = (Ray, T)>,
         accept: impl Fn(&T, &Hit) -> bool,
         found: impl FnMut(T, bool),
-        left: impl FnMut(Ray, T),
+        undecided: impl FnMut(Ray, T),
     ) {
         dispatch!(
             self.kernel(),
-            occluded::<T>(self, rays, accept, found, left),
-            self.occluded_with(rays, accept, found, left, triangles_portable)
+            occluded::<T>(self, rays, accept, found, undecided),
+            self.occluded_with(rays, accept, found, undecided, triangles_portable)
         );
     }
 }

@@ -90,7 +90,7 @@ impl ItemBuffer {
         mut rays: impl Iterator<Item = (Ray, T)>,
         accept: impl Fn(&T, &Hit) -> bool,
         mut found: impl FnMut(T, Option<Hit>),
-        mut left: impl FnMut(Ray, T),
+        mut undecided: impl FnMut(Ray, T),
         triangles: impl Fn(&Block, &Setup, f32) -> TriangleHits,
     ) {
         let mut queries: Vec<Query<T>> = Vec::with_capacity(AHEAD);
@@ -109,7 +109,7 @@ impl ItemBuffer {
                 if hit.is_some() || is_listed && !query.covered {
                     found(query.with, hit);
                 } else {
-                    left(query.ray, query.with);
+                    undecided(query.ray, query.with);
                 }
             }
         }

@@ -64,10 +64,10 @@ pub(super) fn occluded<T: Copy>(
     rays: impl Iterator<Item = (Ray, T)>,
     accept: impl Fn(&T, &Hit) -> bool,
     found: impl FnMut(T, bool),
-    left: impl FnMut(Ray, T),
+    undecided: impl FnMut(Ray, T),
 ) {
     let triangles = |block: &Block, ray: &Setup, t_max| triangles(block, ray, t_max);
-    buffer.occluded_with(rays, accept, found, left, triangles);
+    buffer.occluded_with(rays, accept, found, undecided, triangles);
 }
 
 /// [`ItemBuffer::closest`] compiled for AVX2.
@@ -77,10 +77,10 @@ pub(super) fn closest_seen<T: Copy>(
     rays: impl Iterator<Item = (Ray, T)>,
     accept: impl Fn(&T, &Hit) -> bool,
     found: impl FnMut(T, Option<Hit>),
-    left: impl FnMut(Ray, T),
+    undecided: impl FnMut(Ray, T),
 ) {
     let triangles = |block: &Block, ray: &Setup, t_max| triangles(block, ray, t_max);
-    buffer.closest_with(rays, accept, found, left, triangles);
+    buffer.closest_with(rays, accept, found, undecided, triangles);
 }
 
 /// [`slabs`] as tests want it.
@@ -234,4 +234,10 @@ fn permuted_bits(lanes: &[u32; 8], permutation: __m256i) -> __m256i {
     // SAFETY: the reference is valid for reads of eight numbers.
     let lanes = unsafe { _mm256_loadu_si256(lanes.as_ptr().cast()) };
     _mm256_permutevar8x32_epi32(lanes, permutation)
+}
+
+/// Work that is compiled for this processor as it stands, where it is inlined.
+#[target_feature(enable = "avx2,fma,popcnt")]
+pub(super) fn run(work: impl FnOnce()) {
+    work();
 }

@@ -43,10 +43,10 @@ pub(super) fn occluded<T: Copy>(
     rays: impl Iterator<Item = (Ray, T)>,
     accept: impl Fn(&T, &Hit) -> bool,
     found: impl FnMut(T, bool),
-    left: impl FnMut(Ray, T),
+    undecided: impl FnMut(Ray, T),
 ) {
     let triangles = |block: &Block, ray: &Setup, t_max| triangles(block, ray, t_max);
-    buffer.occluded_with(rays, accept, found, left, triangles);
+    buffer.occluded_with(rays, accept, found, undecided, triangles);
 }
 
 /// [`ItemBuffer::closest`] compiled for NEON.
@@ -56,10 +56,10 @@ pub(super) fn closest_seen<T: Copy>(
     rays: impl Iterator<Item = (Ray, T)>,
     accept: impl Fn(&T, &Hit) -> bool,
     found: impl FnMut(T, Option<Hit>),
-    left: impl FnMut(Ray, T),
+    undecided: impl FnMut(Ray, T),
 ) {
     let triangles = |block: &Block, ray: &Setup, t_max| triangles(block, ray, t_max);
-    buffer.closest_with(rays, accept, found, left, triangles);
+    buffer.closest_with(rays, accept, found, undecided, triangles);
 }
 
 /// Minima and maxima are those that pass over a NaN, as `f32::min` and `f32::max` do: of a ray that
@@ -158,4 +158,10 @@ fn load4(lanes: &[f32; LANES]) -> float32x4_t {
 #[inline]
 fn load8(lanes: &[f32; 8]) -> [float32x4_t; 2] {
     bytemuck::cast(*lanes)
+}
+
+/// Work that is compiled for this processor as it stands, where it is inlined.
+#[target_feature(enable = "neon")]
+pub(super) fn run(work: impl FnOnce()) {
+    work();
 }

@@ -77,7 +77,7 @@ impl LightBuffer {
         mut rays: impl Iterator<Item = (Ray, T)>,
         accept: impl Fn(&T, &Hit) -> bool,
         mut found: impl FnMut(T, bool),
-        mut left: impl FnMut(Ray, T),
+        mut undecided: impl FnMut(Ray, T),
         triangles: impl Fn(&Block, &Setup, f32) -> TriangleHits,
     ) {
         let mut queries: Vec<Query<T>> = Vec::with_capacity(AHEAD);
@@ -97,7 +97,7 @@ impl LightBuffer {
                 let highest = &query.listed[0];
                 match self.cells.bvh.blocks.get(highest.block as usize) {
                     Some(block) => fetch_ahead(block),
-                    None => left(query.ray, query.with),
+                    None => undecided(query.ray, query.with),
                 }
                 !highest.is_too_many()
             });

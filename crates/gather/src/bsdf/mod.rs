@@ -22,6 +22,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
+use crate::numbers::numbers;
 use crate::sampling::{cosine_hemisphere, luminance};
 
 /// A surface's scattering at one point. Directions point away from it; the viewer's has z > 0.
@@ -80,30 +81,9 @@ impl Chosen {
     pub(crate) const NONE: Self = Self { direction: Vec3::ZERO, weight: Vec3::ZERO, pdf: 0.0 };
 }
 
+numbers!(Bsdf of f32 { diffuse: Vec3, transmission: Vec3, f0: Vec3, f90: f32, dielectric_f0: f32, dielectric_f90: f32, alpha: f32 });
+
 impl Bsdf {
-    pub(crate) const NUMBERS: usize = 13;
-
-    #[inline(always)]
-    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
-        let Self { diffuse: d, transmission: t, f0, .. } = self;
-        let (f90, g0, g90) = (self.f90, self.dielectric_f0, self.dielectric_f90);
-        [d.x, d.y, d.z, t.x, t.y, t.z, f0.x, f0.y, f0.z, f90, g0, g90, self.alpha]
-    }
-
-    #[inline(always)]
-    pub(crate) fn from_array(numbers: [f32; Self::NUMBERS]) -> Self {
-        let [dx, dy, dz, tx, ty, tz, x, y, z, f90, dielectric_f0, dielectric_f90, alpha] = numbers;
-        Self {
-            diffuse: Vec3::new(dx, dy, dz),
-            transmission: Vec3::new(tx, ty, tz),
-            f0: Vec3::new(x, y, z),
-            f90,
-            dielectric_f0,
-            dielectric_f90,
-            alpha,
-        }
-    }
-
     /// A Lambert surface.
     #[inline]
     pub(crate) fn lambert(albedo: Vec3) -> Self {

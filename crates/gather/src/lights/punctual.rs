@@ -24,6 +24,7 @@ use lumencast_scene::{LightKind, PlacedLight};
 
 use crate::accel::Ray;
 use crate::bsdf::{Scatter, frame};
+use crate::numbers::numbers;
 use crate::sampling::{Table, luminance, power_heuristic, turned};
 
 /// Up to so many lights are all looked at before one is chosen.
@@ -117,9 +118,9 @@ pub(crate) struct Source {
     is_directional: bool,
 }
 
-impl Source {
-    pub(crate) const NUMBERS: usize = 14;
+numbers!(Source of f32 { position: Vec3, direction: Vec3, intensity: Vec3, range: f32, cone: pair, size: f32, is_directional: bool });
 
+impl Source {
     pub(crate) fn new(placed: &PlacedLight) -> Self {
         let light = &placed.light;
         let (size, cone) = match light.kind {
@@ -138,28 +139,6 @@ impl Source {
             cone,
             size,
             is_directional: matches!(light.kind, LightKind::Directional { .. }),
-        }
-    }
-
-    #[inline(always)]
-    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
-        let Self { position: p, direction: d, intensity: i, range, cone, size, is_directional } =
-            self;
-        let directional = f32::from(is_directional);
-        [p.x, p.y, p.z, d.x, d.y, d.z, i.x, i.y, i.z, range, cone[0], cone[1], size, directional]
-    }
-
-    #[inline(always)]
-    pub(crate) fn from_array(numbers: [f32; Self::NUMBERS]) -> Self {
-        let [x, y, z, dx, dy, dz, r, g, b, range, scale, offset, size, directional] = numbers;
-        Self {
-            position: Vec3::new(x, y, z),
-            direction: Vec3::new(dx, dy, dz),
-            intensity: Vec3::new(r, g, b),
-            range,
-            cone: [scale, offset],
-            size,
-            is_directional: directional != 0.0,
         }
     }
 
@@ -260,20 +239,7 @@ pub(crate) struct Candidate {
     pub(crate) light: Vec3,
 }
 
-impl Candidate {
-    pub(crate) const NUMBERS: usize = 7;
-
-    #[inline(always)]
-    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
-        let Self { direction: d, distance, light } = self;
-        [d.x, d.y, d.z, distance, light.x, light.y, light.z]
-    }
-
-    #[inline(always)]
-    pub(crate) fn from_array([x, y, z, distance, r, g, b]: [f32; Self::NUMBERS]) -> Self {
-        Self { direction: Vec3::new(x, y, z), distance, light: Vec3::new(r, g, b) }
-    }
-}
+numbers!(Candidate of f32 { direction: Vec3, distance: f32, light: Vec3 });
 
 /// The punctual lights of a snapshot.
 #[derive(Debug)]

@@ -8,7 +8,7 @@ use lumencast_light::{Light, OnTriangle, Place};
 
 use super::beam::{Found, Lit};
 use super::columns::{Columns, GROUP};
-use super::paths::{Connection, Part, Path, Paths, Segment};
+use super::paths::{Connection, Part, Path, Paths, Segment, Start};
 use super::vertex::{Scattered, Vertices};
 use crate::accel::{Hit, Ray};
 use crate::bsdf::Scatter;
@@ -131,7 +131,7 @@ impl Shader<'_, '_> {
         if !are_points {
             self.reach_for_area();
         }
-        if self.limits.beam.is_some() && self.depth + 2 <= self.limits.bounces {
+        if self.limits.shortcuts.beam.is_some() && self.depth + 2 <= self.limits.bounces {
             self.reach_for_lit();
         }
         let only_sources = self.depth + 1 == self.limits.bounces && self.limits.previous.is_none();
@@ -251,16 +251,26 @@ impl Shader<'_, '_> {
     /// ray will meet it by chance.
     #[inline(always)]
     fn reach_for_punctual(&mut self, is_last: bool) {
-        let (world, depth, model) = (self.world, self.depth, self.world.model);
-        let lights = &world.lights.punctual;
-        let count = lights.candidates();
-        let sized = lights.have_size();
+        let count = self.world.lights.punctual.candidates();
+        self.draw_for_punctual();
+        for k in 0..count {
+            self.choose_source(k);
+            self.weigh_candidate(k, is_last);
+        }
+        for vertex in 0..self.group.met.len().min(GROUP) {
+            self.connect_to_punctual(vertex, count);
+        }
+    }
+
+    /// Draws a number for each vertex and, where lights have a size, a point on their discs.
+    #[inline(always)]
+    fn draw_for_punctual(&mut self) {
+        let sized = self.world.lights.punctual.have_size();
         self.draw(0, |sampler| sampler.draw());
         if sized {
             self.draw(1, |sampler| sampler.draw());
         }
-        let Group { met, vertices, draws, numbers, squares, sources, copies, candidates, .. } =
-            &mut *self.group;
+        let Group { draws, numbers, squares, .. } = &mut *self.group;
         for vertex in 0..GROUP {
             numbers.set(vertex, [Draw::from_array(draws[0].get(vertex)).number()]);
             if sized {
@@ -268,61 +278,76 @@ impl Shader<'_, '_> {
                 squares.set(vertex, square.to_array());
             }
         }
-        for (k, candidates) in candidates.iter_mut().enumerate().take(count) {
-            if let Some(source) = lights.shared_candidate(k) {
-                sources.fill(source.to_array());
-                copies.fill([1.0]);
-            } else {
-                for vertex in 0..met.len().min(GROUP) {
-                    let [u] = numbers.get(vertex);
-                    let (source, count) = lights.candidate(k, u);
-                    sources.set(vertex, source.to_array());
-                    copies.set(vertex, [count]);
-                }
-            }
-            for vertex in 0..GROUP {
-                let v = vertices.get(vertex);
-                let [copies] = copies.get(vertex);
-                let on_disc = squares.get(vertex).into();
-                let source = Source::from_array(sources.get(vertex));
-                let point = source.point_for(v.place.position, copies, on_disc);
-                let found = v.eval(point.direction, model);
-                let pdf = if is_last { 0.0 } else { found.pdf };
-                let candidate = point.scattered(Scatter { pdf, ..found });
-                candidates.set(vertex, candidate.to_array());
+    }
+
+    /// Chooses the light of each vertex that is its candidate of this number.
+    #[inline(always)]
+    fn choose_source(&mut self, k: usize) {
+        let lights = &self.world.lights.punctual;
+        let Group { met, numbers, sources, copies, .. } = &mut *self.group;
+        if let Some(source) = lights.shared_candidate(k) {
+            sources.fill(source.to_array());
+            copies.fill([1.0]);
+        } else {
+            for vertex in 0..met.len().min(GROUP) {
+                let [u] = numbers.get(vertex);
+                let (source, count) = lights.candidate(k, u);
+                sources.set(vertex, source.to_array());
+                copies.set(vertex, [count]);
             }
         }
-        for vertex in 0..self.group.met.len().min(GROUP) {
-            let Group { met, going, vertices, numbers, candidates, .. } = &*self.group;
-            let Met { index, hit, .. } = met[vertex];
-            let candidate = |k: usize| Candidate::from_array(candidates[k].get(vertex));
-            let [u] = numbers.get(vertex);
-            let luminances = (0..count).map(|k| luminance(candidate(k).light));
-            let Some((k, scale)) = lights.pick(u, luminances).filter(|_| going[vertex]) else {
-                continue;
-            };
-            let Candidate { direction, distance, light } = candidate(k);
-            let place = vertices.place(vertex);
-            let path = &self.paths[index as usize];
-            let mut light = path.throughput * (light * scale);
-            if let Some(beam) = self.limits.beam.filter(|beam| beam.is_of(k)) {
-                let chosen = path.segment.density_on(hit.t, place.normal);
-                light *= beam.weight(place.position, place.normal, direction, chosen);
-            }
-            if depth > 0 && self.limits.learn == Some(k) {
-                let found = Found { at: place.position, luminance: luminance(light) };
-                self.noted.push((self.connections.len() as u32, found));
-            }
-            let light = self.limited(depth + 1, light);
-            let key = path.key(depth) + 1;
-            self.connections.push(Connection {
-                path: index,
-                part: Part::after(depth),
-                light,
-                ray: place.reach(direction, distance),
-                passing: Passing { ends: [Some(itself(&hit)), None], key },
-            });
+    }
+
+    /// Computes what each vertex scatters of its candidate.
+    #[inline(always)]
+    fn weigh_candidate(&mut self, k: usize, is_last: bool) {
+        let model = self.world.model;
+        let Group { vertices, squares, sources, copies, candidates, .. } = &mut *self.group;
+        for vertex in 0..GROUP {
+            let v = vertices.get(vertex);
+            let [copies] = copies.get(vertex);
+            let on_disc = squares.get(vertex).into();
+            let source = Source::from_array(sources.get(vertex));
+            let point = source.point_for(v.place.position, copies, on_disc);
+            let found = v.eval(point.direction, model);
+            let pdf = if is_last { 0.0 } else { found.pdf };
+            let candidate = point.scattered(Scatter { pdf, ..found });
+            candidates[k].set(vertex, candidate.to_array());
         }
+    }
+
+    /// Picks one of a vertex's candidates, by how much it scatters of each, and connects to it.
+    #[inline(always)]
+    fn connect_to_punctual(&mut self, vertex: usize, count: usize) {
+        let depth = self.depth;
+        let Group { met, going, vertices, numbers, candidates, .. } = &*self.group;
+        let Met { index, hit, .. } = met[vertex];
+        let candidate = |k: usize| Candidate::from_array(candidates[k].get(vertex));
+        let [u] = numbers.get(vertex);
+        let luminances = (0..count).map(|k| luminance(candidate(k).light));
+        let picked = self.world.lights.punctual.pick(u, luminances);
+        let Some((k, scale)) = picked.filter(|_| going[vertex]) else { return };
+        let Candidate { direction, distance, light } = candidate(k);
+        let place = vertices.place(vertex);
+        let path = &self.paths[index as usize];
+        let mut light = path.throughput * (light * scale);
+        if let Some(beam) = self.limits.shortcuts.beam.filter(|beam| beam.is_of(k)) {
+            let chosen = path.segment.density_on(hit.t, place.normal);
+            light *= beam.weight(place.position, place.normal, direction, chosen);
+        }
+        if depth > 0 && self.limits.shortcuts.learn == Some(k) {
+            let found = Found { at: place.position, luminance: luminance(light) };
+            self.noted.push((self.connections.len() as u32, found));
+        }
+        let light = self.limited(depth + 1, light);
+        let key = path.key(depth) + 1;
+        self.connections.push(Connection {
+            path: index,
+            part: Part::after(depth),
+            light,
+            ray: place.reach(direction, distance),
+            passing: Passing { ends: [Some(itself(&hit)), None], key },
+        });
     }
 
     /// Reaches from each vertex for one point of an emissive triangle or of the environment.
@@ -411,7 +436,7 @@ impl Shader<'_, '_> {
 
     /// Draws what the next rays are chosen by, and chooses them.
     #[inline(always)]
-    fn choose_rays(&mut self) -> Columns<10> {
+    fn choose_rays(&mut self) -> Columns<{ Scattered::NUMBERS }> {
         self.draw(0, Sampler::draw);
         self.draw(1, Sampler::draw);
         let model = self.world.model;
@@ -435,10 +460,10 @@ impl Shader<'_, '_> {
             let going = &mut going[vertex];
             *going &= pdf > 0.0;
             let path = &mut self.paths[met.index as usize];
-            let mut left = path.segment.left;
-            if self.limits.beam.is_some() {
+            let mut start = path.segment.start;
+            if self.limits.shortcuts.beam.is_some() {
                 let normal = vertices.place(vertex).normal;
-                left = (normal, path.segment.density_on(met.hit.t, normal));
+                start = Start { normal, density: path.segment.density_on(met.hit.t, normal) };
             }
             path.throughput *= weight;
             if *going && self.depth + 1 >= self.limits.roulette_from {
@@ -447,7 +472,7 @@ impl Shader<'_, '_> {
                 path.throughput /= survival;
             }
             let ray = Ray { origin, direction, t_max: f32::INFINITY };
-            path.segment = Segment { ray, from: Some(itself(&met.hit)), pdf, left };
+            path.segment = Segment { ray, from: Some(itself(&met.hit)), pdf, start };
         }
     }
 
@@ -487,10 +512,10 @@ impl Shader<'_, '_> {
     /// Punctual lights with a size that a scattered ray meets before `end` metres.
     fn discs(&self, segment: &Segment, end: f32) -> Vec3 {
         let Ray { origin, direction, .. } = segment.ray;
-        let (normal, chosen) = segment.left;
-        let beam = |light: usize| self.limits.beam.filter(|beam| beam.is_of(light));
+        let Start { normal, density } = segment.start;
+        let beam = |light: usize| self.limits.shortcuts.beam.filter(|beam| beam.is_of(light));
         let weight = |light: usize| {
-            beam(light).map_or(1.0, |beam| beam.weight(origin, normal, direction, chosen))
+            beam(light).map_or(1.0, |beam| beam.weight(origin, normal, direction, density))
         };
         self.world.lights.punctual.met(origin, direction, end, segment.pdf, weight)
     }

@@ -9,8 +9,8 @@ use glam::Vec3;
 
 use super::beam::{Found, Lit};
 use super::group::{Group, Shader};
-use super::paths::{Connection, Look, Path, Paths, Seen, Segment};
-use crate::accel::{Hit, Kernel, Ray, Stacks};
+use super::paths::{Connection, Look, Path, Paths, Seen, Segment, Start};
+use crate::accel::{Hit, Ray, Stacks};
 use crate::world::{Passing, World};
 
 /// Follows paths through a world, many at a time: all their rays are traced, then all that they met
@@ -88,7 +88,7 @@ impl<'a> Integrator<'a> {
                 ray: Ray { origin: look.origin, direction: look.direction, t_max: f32::INFINITY },
                 from: None,
                 pdf: look.pdf,
-                left: (Vec3::ZERO, f32::INFINITY),
+                start: Start::OF_PATH,
             },
             throughput: Vec3::ONE,
             seen: Seen::NOTHING,
@@ -116,7 +116,7 @@ impl<'a> Integrator<'a> {
     /// Gives each path a point that the beam lights.
     fn follow_beam(&mut self) {
         let Self { world, limits, paths, hits, lit, stacks, .. } = self;
-        let Some(beam) = limits.beam else { return };
+        let Some(beam) = limits.shortcuts.beam else { return };
         self.rays += paths.len() as u64;
         let sources: Vec<_> = paths.iter().map(|path| beam.ray(path.sampler.aside())).collect();
         let rays = sources.iter().zip(0..).map(|((ray, _), n)| (*ray, n));
@@ -143,7 +143,7 @@ impl<'a> Integrator<'a> {
             hit.iter().for_each(|hit| world.fetch_triangle(hit));
             hits[index as usize] = hit;
         };
-        match limits.items.filter(|_| depth == 0) {
+        match limits.shortcuts.items.filter(|_| depth == 0) {
             Some(items) => world.closest_seen(items, rays, stacks, passing, found),
             None => world.closest(rays, stacks, passing, found),
         }
@@ -168,17 +168,10 @@ impl<'a> Integrator<'a> {
 
     /// Goes one scattering event further on every path.
     fn shade(&mut self, depth: u32) {
-        match self.world.kernel() {
-            #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2(_) => {
-                #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
-                // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for what it needs.
-                unsafe {
-                    shade_avx2(self, depth);
-                }
-            }
-            _ => self.shade_with(depth),
-        }
+        self.world.kernel().run(
+            #[inline(always)]
+            || self.shade_with(depth),
+        );
     }
 
     #[inline(always)]
@@ -200,13 +193,6 @@ impl<'a> Integrator<'a> {
     }
 }
 
-/// [`Integrator::shade_with`] compiled for AVX2.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,popcnt")]
-fn shade_avx2(integrator: &mut Integrator<'_>, depth: u32) {
-    integrator.shade_with(depth);
-}
-
 impl Path {
     /// Four keys for each segment, for decisions about surfaces that cover in part.
     pub(super) fn key(&self, depth: u32) -> u64 {
@@ -220,7 +206,9 @@ mod tests {
     use lumencast_testkit::scenes::{Stage, lambert};
 
     use super::super::beam::Beam;
+    use super::super::paths::Shortcuts;
     use super::*;
+    use crate::accel::Kernel;
     use crate::sampling::{Sampler, sphere};
     use crate::surface::MaterialModel;
     use crate::world::WorldCache;
@@ -271,7 +259,8 @@ mod tests {
             let beam = Beam::light(&world)
                 .and_then(|light| Beam::new(&world, light, &found.collect::<Vec<_>>()));
             assert_eq!(beam.is_some(), lights == 3, "{lights}");
-            let limits = Paths { beam: beam.as_ref(), ..Paths::new(3) };
+            let shortcuts = Shortcuts { beam: beam.as_ref(), ..Shortcuts::default() };
+            let limits = Paths { shortcuts, ..Paths::new(3) };
             let [mut one, mut eight] = [0, 1].map(|_| Integrator::new(&world, limits));
             for integrator in [&mut one, &mut eight] {
                 integrator.begin(looks());

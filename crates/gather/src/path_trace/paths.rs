@@ -23,6 +23,13 @@ pub(crate) struct Paths<'a> {
     /// The light that the last surface of a path scatters, beside that of punctual lights; without
     /// it, that surface only shines itself.
     pub(crate) previous: Option<&'a Light>,
+    /// What finds the same light sooner.
+    pub(crate) shortcuts: Shortcuts<'a>,
+}
+
+/// Ways on which paths find the same light sooner.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Shortcuts<'a> {
     /// The rays of a light that paths are connected to.
     pub(crate) beam: Option<&'a Beam>,
     /// What most paths' first rays meet.
@@ -40,9 +47,7 @@ impl Paths<'_> {
             clamp_from: 1,
             roulette_from: u32::MAX,
             previous: None,
-            beam: None,
-            items: None,
-            learn: None,
+            shortcuts: Shortcuts::default(),
         }
     }
 }
@@ -126,9 +131,22 @@ pub(super) struct Segment {
     /// Density per steradian with which the BSDF chose it; infinite where nothing else could have
     /// found the same light.
     pub(super) pdf: f32,
-    /// Unit normal of the triangle that it starts at, and density per square metre with which the path
-    /// chose the point there, infinite at its beginning; of use only beside a [`Beam`].
-    pub(super) left: (Vec3, f32),
+    /// Where it starts; of use only beside a [`Beam`].
+    pub(super) start: Start,
+}
+
+/// Where a segment starts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    /// Unit normal of the triangle; zero at a path's beginning.
+    pub(super) normal: Vec3,
+    /// Density per square metre with which the path chose the point; infinite at its beginning.
+    pub(super) density: f32,
+}
+
+impl Start {
+    /// A path's beginning.
+    pub(super) const OF_PATH: Self = Self { normal: Vec3::ZERO, density: f32::INFINITY };
 }
 
 impl Segment {

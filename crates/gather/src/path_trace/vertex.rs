@@ -4,6 +4,7 @@ use glam::{Mat3, Vec3};
 
 use super::columns::{Columns, GROUP};
 use crate::bsdf::{Bsdf, Chosen, Scatter, frame};
+use crate::numbers::numbers;
 use crate::sampling::Draw;
 use crate::surface::{HitPoint, MaterialModel, Point};
 
@@ -54,23 +55,7 @@ pub(super) struct Scattered {
     pub(super) pdf: f32,
 }
 
-impl Scattered {
-    #[inline(always)]
-    pub(super) fn to_array(self) -> [f32; 10] {
-        let Self { origin: o, direction: d, weight: w, pdf } = self;
-        [o.x, o.y, o.z, d.x, d.y, d.z, w.x, w.y, w.z, pdf]
-    }
-
-    #[inline(always)]
-    pub(super) fn from_array([x, y, z, dx, dy, dz, r, g, b, pdf]: [f32; 10]) -> Self {
-        Self {
-            origin: Vec3::new(x, y, z),
-            direction: Vec3::new(dx, dy, dz),
-            weight: Vec3::new(r, g, b),
-            pdf,
-        }
-    }
-}
+numbers!(Scattered of f32 { origin: Vec3, direction: Vec3, weight: Vec3, pdf: f32 });
 
 impl Vertex {
     /// What is scattered of light from a direction.

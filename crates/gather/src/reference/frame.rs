@@ -7,7 +7,7 @@ use super::Renderer;
 use super::picture::assemble;
 use crate::accel::{Hit, Ray, Stacks};
 use crate::path_trace::integrator::Integrator;
-use crate::path_trace::paths::Look;
+use crate::path_trace::paths::{Look, Shortcuts};
 use crate::world::{Passing, World};
 
 /// One sample a pixel, row by row from the upper left.
@@ -48,8 +48,9 @@ impl Renderer {
     /// judge one by the other, give them different seeds.
     #[must_use]
     pub fn frame(&self, number: u32) -> Frame {
-        let tiles =
-            self.tiles(self.paths(), |integrator, corner| self.samples(integrator, corner, number));
+        let tiles = self.tiles(self.paths(Shortcuts::default()), |integrator, corner| {
+            self.samples(integrator, corner, number)
+        });
         let size = self.settings.size;
         Frame { size, samples: assemble(size, &tiles) }
     }

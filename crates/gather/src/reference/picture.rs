@@ -12,7 +12,7 @@ use super::{Film, Filter};
 use crate::accel::{ItemBuffer, Kernel, Pyramid};
 use crate::path_trace::beam::Beam;
 use crate::path_trace::integrator::Integrator;
-use crate::path_trace::paths::{Look, Paths, Seen};
+use crate::path_trace::paths::{Look, Paths, Seen, Shortcuts};
 use crate::path_trace::{Levels, MaterialModel};
 use crate::sampling::Sampler;
 use crate::world::{World, WorldCache};
@@ -173,7 +173,7 @@ impl Renderer {
         let samples = share.saturating_sub(first).min(PASS);
         let places: Vec<u32> = (first..first + samples).map(|n| film.place(half, n)).collect();
         let tiles = self.tile_count();
-        let paths = Paths { items: self.items(), ..self.paths() };
+        let paths = self.paths(Shortcuts { items: self.items(), ..Shortcuts::default() });
         let (done, stopped, rays) = (AtomicU64::new(0), AtomicBool::new(false), AtomicU64::new(0));
         let found = self.tiles(paths, |integrator, corner| {
             if stopped.load(Ordering::Relaxed) {
@@ -223,7 +223,8 @@ impl Renderer {
         of: impl Fn(&mut Integrator<'_>, UVec2) -> Vec<T> + Sync,
     ) -> Vec<Vec<T>> {
         let across = self.settings.size.x.div_ceil(TILE);
-        let paths = Paths { beam: self.beam(), ..paths };
+        let shortcuts = Shortcuts { beam: self.beam(), ..paths.shortcuts };
+        let paths = Paths { shortcuts, ..paths };
         self.batches(paths, self.tile_count(), |integrator, tile| {
             of(integrator, TILE * UVec2::new(tile % across, tile / across))
         })
@@ -241,13 +242,14 @@ impl Renderer {
         self.items.get_or_init(find).as_ref()
     }
 
-    /// The paths to follow, without a beam.
-    pub(super) fn paths(&self) -> Paths<'_> {
+    /// The paths to follow, on these shortcuts.
+    pub(super) fn paths<'a>(&self, shortcuts: Shortcuts<'a>) -> Paths<'a> {
         let s = &self.settings;
         Paths {
             clamp: s.clamp,
             clamp_from: 2,
             roulette_from: s.roulette_from,
+            shortcuts,
             ..Paths::new(s.bounces)
         }
     }

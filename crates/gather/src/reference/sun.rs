@@ -7,7 +7,7 @@ use glam::UVec2;
 
 use super::Renderer;
 use crate::path_trace::beam::{Beam, Found};
-use crate::path_trace::paths::Paths;
+use crate::path_trace::paths::{Paths, Shortcuts};
 use crate::sampling::{Sampler, luminance, mix};
 
 /// Pixels that are looked at, each twice; some more often where a picture has fewer.
@@ -37,9 +37,10 @@ impl Renderer {
         let s = &self.settings;
         let is_seen = s.follow_sun && s.bounces > 1 && s.parts != super::Parts::Direct;
         let light = Beam::light(&self.world).filter(|_| is_seen)?;
-        let without = self.trial(Paths { learn: Some(light), ..self.paths() });
+        let without =
+            self.trial(self.paths(Shortcuts { learn: Some(light), ..Shortcuts::default() }));
         let beam = Beam::new(&self.world, light, &without.found)?;
-        let with = self.trial(Paths { beam: Some(&beam), ..self.paths() });
+        let with = self.trial(self.paths(Shortcuts { beam: Some(&beam), ..Shortcuts::default() }));
         (with.cost() < without.cost()).then_some(beam)
     }
 

@@ -8,6 +8,8 @@ use glam::Vec2;
 
 use super::{ONE_MINUS_EPSILON, mix, mix2};
 
+use crate::numbers::numbers;
+
 /// The numbers of one path.
 #[derive(Clone, Debug)]
 pub(crate) struct Sampler {
@@ -69,19 +71,9 @@ pub(crate) struct Draw {
     scramble: [u32; 2],
 }
 
+numbers!(Draw of u32 { reversed: u32, order: u32, scramble: pair });
+
 impl Draw {
-    pub(crate) const NUMBERS: usize = 4;
-
-    #[inline(always)]
-    pub(crate) fn to_array(self) -> [u32; Self::NUMBERS] {
-        [self.reversed, self.order, self.scramble[0], self.scramble[1]]
-    }
-
-    #[inline(always)]
-    pub(crate) fn from_array([reversed, order, a, b]: [u32; Self::NUMBERS]) -> Self {
-        Self { reversed, order, scramble: [a, b] }
-    }
-
     #[inline(always)]
     pub(crate) fn number(self) -> f32 {
         let i = shuffled(self.reversed, self.order);

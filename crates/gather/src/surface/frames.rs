@@ -3,6 +3,7 @@
 use glam::{Affine3A, Mat3, Vec3, Vec3A};
 
 use crate::accel::abs;
+use crate::numbers::numbers;
 
 /// γ(n) of Higham: bound of the relative error of n roundings.
 pub(crate) const fn gamma(n: f32) -> f32 {
@@ -27,9 +28,9 @@ pub(crate) struct Frames {
     rounding: Vec3,
 }
 
-impl Frames {
-    pub(crate) const NUMBERS: usize = 27;
+numbers!(Frames of f32 { world_from_object: Mat3, translation: Vec3, normal_from_object: Mat3, rounding_by_place: Vec3, rounding: Vec3 });
 
+impl Frames {
     pub(crate) fn new(world_from_object: Affine3A) -> Self {
         let object_from_world = world_from_object.inverse();
         let (to_world, to_object) =
@@ -41,34 +42,6 @@ impl Frames {
             normal_from_object: Mat3::from(object_from_world.matrix3).transpose(),
             rounding_by_place: (OF_TRANSFORMS * (to_world * (to_object * Vec3A::ONE))).into(),
             rounding: (OF_TRANSFORMS * (moved + world_from_object.translation.abs())).into(),
-        }
-    }
-
-    #[inline(always)]
-    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
-        bytemuck::cast([
-            self.world_from_object.x_axis,
-            self.world_from_object.y_axis,
-            self.world_from_object.z_axis,
-            self.translation,
-            self.normal_from_object.x_axis,
-            self.normal_from_object.y_axis,
-            self.normal_from_object.z_axis,
-            self.rounding_by_place,
-            self.rounding,
-        ])
-    }
-
-    #[inline(always)]
-    pub(crate) fn from_array(numbers: [f32; Self::NUMBERS]) -> Self {
-        let [a, b, c, translation, d, e, f, rounding_by_place, rounding]: [Vec3; 9] =
-            bytemuck::cast(numbers);
-        Self {
-            world_from_object: Mat3::from_cols(a, b, c),
-            translation,
-            normal_from_object: Mat3::from_cols(d, e, f),
-            rounding_by_place,
-            rounding,
         }
     }
 

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::Frames;
 use crate::accel::Ray;
+use crate::numbers::numbers;
 
 /// Where on a surface a ray has arrived.
 #[derive(Clone, Copy, Debug)]
@@ -19,9 +20,9 @@ pub(crate) struct HitPoint {
     side: f32,
 }
 
-impl HitPoint {
-    pub(crate) const NUMBERS: usize = 8;
+numbers!(HitPoint of f32 { position: Vec3, normal: Vec3, offset: f32, side: f32 });
 
+impl HitPoint {
     /// The place on a triangle with these corners (object space) and weights; `direction` is the unit
     /// direction of the ray.
     #[inline(always)]
@@ -32,17 +33,6 @@ impl HitPoint {
         let side = if front.dot(direction) < 0.0 { 1.0 } else { -1.0 };
         let normal = side * front;
         Self { position, normal, offset: frames.error(corners, position).dot(normal.abs()), side }
-    }
-
-    #[inline(always)]
-    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
-        let Self { position: p, normal: n, offset, side } = self;
-        [p.x, p.y, p.z, n.x, n.y, n.z, offset, side]
-    }
-
-    #[inline(always)]
-    pub(crate) fn from_array([x, y, z, nx, ny, nz, offset, side]: [f32; Self::NUMBERS]) -> Self {
-        Self { position: Vec3::new(x, y, z), normal: Vec3::new(nx, ny, nz), offset, side }
     }
 
     /// Whether the ray came from the front.
@@ -116,21 +106,11 @@ pub(crate) struct Bump {
     pub(super) normal: Vec3,
 }
 
+numbers!(Bump of f32 { tangent: Vec3, sign: f32, normal: Vec3 });
+
 impl Bump {
-    pub(crate) const NUMBERS: usize = 7;
     /// Leaves normals as they are.
     pub(crate) const FLAT: Self = Self { tangent: Vec3::ZERO, sign: 1.0, normal: Vec3::Z };
-
-    #[inline(always)]
-    pub(crate) fn to_array(self) -> [f32; Self::NUMBERS] {
-        let Self { tangent: t, sign, normal: n } = self;
-        [t.x, t.y, t.z, sign, n.x, n.y, n.z]
-    }
-
-    #[inline(always)]
-    pub(crate) fn from_array([x, y, z, sign, nx, ny, nz]: [f32; Self::NUMBERS]) -> Self {
-        Self { tangent: Vec3::new(x, y, z), sign, normal: Vec3::new(nx, ny, nz) }
-    }
 
     /// The shading normal in object space, of any length.
     #[inline(always)]
