@@ -88,3 +88,35 @@ pub(crate) fn parse_rate(text: &str) -> Result<f64> {
     ensure!((0.1..=1000.0).contains(&rate), "0.1 to 1000 ticks a second");
     Ok(rate)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_finite() {
+        assert_eq!(parse_point("0, -1.5,2").expect("a point"), Vec3::new(0.0, -1.5, 2.0));
+        for wrong in ["", "1,2", "1,2,3,4", "1,2,inf"] {
+            assert!(parse_point(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn samples() {
+        assert_eq!(parse_samples("16").expect("one number"), SampleRange { min: 16, max: 16 });
+        assert_eq!(parse_samples("4..64").expect("a range"), SampleRange { min: 4, max: 64 });
+        for wrong in ["", "0", "64..4", "..", "-1", "4..x", "99999999"] {
+            assert!(parse_samples(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn offsets() {
+        assert_eq!(parse_offset("none"), Ok(Offset::NONE));
+        assert_eq!(parse_offset("half-cell"), parse_offset("0.5-cells"));
+        assert_eq!(parse_offset("0.25"), Ok(Offset::Metres(0.25)));
+        for wrong in ["inf", "half", "-cells", "nan-cells", "0.5-metres"] {
+            assert!(parse_offset(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! How long light is computed.
+
+use std::str::FromStr;
+
+use clap::Args;
+use lumencast_solve::Effort;
+
+use crate::values::parse_positive;
+
+/// Samples of a probe, at most, unless told otherwise.
+pub(crate) const MOST_SAMPLES: u32 = 32_768;
+/// How noisy light may be that is computed once, unless told otherwise: codes of 0 to 255.
+const NOISE: &str = "0.5";
+
+/// The noise at which computing ends, if it is to end by that.
+#[derive(Clone, Copy, Debug)]
+struct NoiseArgument(Option<f32>);
+
+impl FromStr for NoiseArgument {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "off" => Ok(Self(None)),
+            _ => Ok(Self(Some(parse_positive(text).map_err(|why| format!("{why}, or off"))?))),
+        }
+    }
+}
+
+/// How long light is computed that is computed once.
+#[derive(Debug, Args)]
+pub(crate) struct EffortArguments {
+    /// The noise at which computing ends: root of the mean square of what noise adds to surfaces as
+    /// they are displayed, in codes of 0 to 255; off to take all samples.
+    #[arg(long, value_name = "CODES|off", default_value = NOISE)]
+    noise: NoiseArgument,
+}
+
+impl EffortArguments {
+    /// With so many samples a probe at most.
+    pub(crate) fn with(&self, samples: u32) -> Effort {
+        Effort { samples, noise: self.noise.0 }
+    }
+}
