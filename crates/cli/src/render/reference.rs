@@ -13,10 +13,9 @@ use lumencast_scene::{Scene, View};
 use serde_json::{Value, json};
 
 use super::{FilterArgument, PartsArgument, Render};
-use crate::{
-    film_file, fingerprint, interrupt,
-    output::{self, say, tell},
-};
+use crate::film_file::{FilmFile, KeptFilm};
+use crate::output::{self, say, tell};
+use crate::{fingerprint, interrupt};
 
 /// Samples a pixel unless told otherwise.
 const SAMPLES: u32 = 64;
@@ -26,21 +25,21 @@ impl Render {
         let settings = self.settings();
         let key = self.key(scene, view, settings)?;
         let partial = unfinished(&self.output[0]);
-        let mut film = self.begun(&partial, key);
-        let before = film.samples();
+        let mut kept = self.begun(FilmFile { path: partial.clone(), key });
+        let before = kept.film.samples();
         let spinner = output::spinner("Building".into());
         let renderer = Renderer::new(&scene.snapshot(), view, settings)
             .context("cannot start the threads that trace")?;
         spinner.finish_and_clear();
 
         let start = Instant::now();
-        let rays = match self.trace(&renderer, &mut film, &partial, key)? {
+        let rays = match self.trace(&renderer, &mut kept)? {
             Some(rays) => rays,
             None => {
-                if film.samples() > before {
-                    film_file::write(&partial, key, &film)?;
+                if kept.film.samples() > before {
+                    kept.keep()?;
                 }
-                match film.samples() {
+                match kept.film.samples() {
                     0 => tell!("Stopped before the first samples were done."),
                     samples => tell!(
                         "Stopped at {samples} of {} samples; the same command goes on from {}.",
@@ -52,6 +51,7 @@ impl Render {
             }
         };
         let seconds = start.elapsed().as_secs_f64();
+        let film = kept.film;
         let picture = Picture::new(self.picture.size.x, self.picture.size.y, film.picture())?;
         let exposure = self.exposure.0.unwrap_or_else(|| exposure(&picture));
         self.write(&picture, exposure)?;
@@ -100,48 +100,36 @@ impl Render {
     }
 
     /// The film to go on with.
-    fn begun(&self, partial: &Path, key: u64) -> Film {
-        let (size, samples) = (self.picture.size, self.reference_samples());
-        if self.restart {
-            Film::new(size, samples)
-        } else {
-            film_file::begun(partial, key, size, samples)
-        }
+    fn begun(&self, partial: FilmFile) -> KeptFilm {
+        let begin = if self.restart { KeptFilm::anew } else { KeptFilm::begun };
+        begin(Some(partial), self.picture.size, self.reference_samples())
     }
 
     /// Traces until all samples are there and returns the number of rays; `None` when interrupted.
-    fn trace(
-        &self,
-        renderer: &Renderer,
-        film: &mut Film,
-        partial: &Path,
-        key: u64,
-    ) -> Result<Option<u64>> {
+    fn trace(&self, renderer: &Renderer, kept: &mut KeptFilm) -> Result<Option<u64>> {
         let interrupted = interrupt::flag()?;
         let bar = output::share_bar("Rendering");
         let share = |samples: f64| samples / f64::from(self.reference_samples());
-        bar.set_position((share(film.samples().into()) * output::SHARE_BAR_LENGTH) as u64);
+        bar.set_position((share(kept.film.samples().into()) * output::SHARE_BAR_LENGTH) as u64);
         bar.reset_eta();
-        let mut kept = Instant::now();
         let mut rays = 0;
-        while film.samples() < self.reference_samples() {
-            let samples = film.samples();
+        while kept.film.samples() < self.reference_samples() {
+            let samples = kept.film.samples();
             let going = |done: f32| {
                 let pass = PASS.min(self.reference_samples() - samples);
                 let at = share(f64::from(samples) + f64::from(done) * f64::from(pass));
                 bar.set_position((at * output::SHARE_BAR_LENGTH) as u64);
                 !interrupted.load(Ordering::Relaxed)
             };
-            match renderer.pass(film, self.reference_samples(), &going) {
+            match renderer.pass(&mut kept.film, self.reference_samples(), &going) {
                 Some(traced) => rays += traced.rays,
                 None => {
                     bar.abandon();
                     return Ok(None);
                 }
             }
-            if kept.elapsed() > film_file::KEEP_EVERY && film.samples() < self.reference_samples() {
-                film_file::write(partial, key, film)?;
-                kept = Instant::now();
+            if kept.film.samples() < self.reference_samples() {
+                kept.keep_at_times()?;
             }
         }
         bar.finish_and_clear();

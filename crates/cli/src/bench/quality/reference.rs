@@ -1,7 +1,5 @@
 //! The reference: traced or kept, and judging by it.
 
-use std::time::Instant;
-
 use anyhow::{Context, Result};
 use glam::UVec2;
 use lumencast_gather::reference::{Film, Parts, PictureSettings, Renderer};
@@ -10,7 +8,8 @@ use serde::Serialize;
 
 use super::{BenchQuality, Subject};
 use crate::bench::drawing::sum;
-use crate::{film_file, fingerprint, output};
+use crate::film_file::{FilmFile, KeptFilm};
+use crate::fingerprint;
 
 /// The two parts of a path-traced picture.
 pub(super) struct Reference {
@@ -63,9 +62,8 @@ impl BenchQuality {
     ) -> Result<Reference> {
         // Reads all of the scene's files.
         let key = self.keep.is_some().then(|| self.key(subject)).transpose()?;
-        let (direct_film, for_direct) = self.trace(subject, size, key, Parts::Direct, "direct")?;
-        let (indirect_film, for_indirect) =
-            self.trace(subject, size, key, Parts::Indirect, "indirect")?;
+        let (direct_film, for_direct) = self.trace(subject, size, key, Parts::Direct)?;
+        let (indirect_film, for_indirect) = self.trace(subject, size, key, Parts::Indirect)?;
         let picture = |film: &Film| Picture::new(size.x, size.y, film.picture());
         let (direct, indirect) = (picture(&direct_film)?, picture(&indirect_film)?);
         let own = || lumencast_picture::exposure(&sum(&direct, &indirect));
@@ -77,7 +75,7 @@ impl BenchQuality {
         Ok(Reference { direct, indirect, told })
     }
 
-    /// One part of it, by whose name its file is called, and what a sample a pixel took; nothing where all
+    /// One part of the reference, and the seconds that a sample a pixel took; nothing where all samples
     /// were there already.
     fn trace(
         &self,
@@ -85,20 +83,17 @@ impl BenchQuality {
         size: UVec2,
         key: Option<u64>,
         parts: Parts,
-        name: &'static str,
     ) -> Result<(Film, Option<f64>)> {
+        let name = if parts == Parts::Direct { "direct" } else { "indirect" };
         let scene = subject.scene.name();
-        let kept = self.keep.as_ref().zip(key).map(|(folder, key)| {
+        let file = self.keep.as_ref().zip(key).map(|(folder, key)| {
             let file = format!("{scene}-{}x{}-{key:016x}.{name}.film", size.x, size.y);
-            (folder.join(file), key)
+            FilmFile { path: folder.join(file), key }
         });
-        let mut film = match &kept {
-            Some((path, key)) => film_file::begun(path, *key, size, self.reference_spp),
-            None => Film::new(size, self.reference_spp),
-        };
-        let before = film.samples();
+        let mut kept = KeptFilm::begun(file, size, self.reference_spp);
+        let before = kept.film.samples();
         if before >= self.reference_spp {
-            return Ok((film, None));
+            return Ok((kept.film, None));
         }
 
         let bounces = if parts == Parts::Direct { 1 } else { self.picture.bounces };
@@ -106,28 +101,10 @@ impl BenchQuality {
             PictureSettings { size, bounces, parts, clamp: self.clamp, ..self.picture.settings() };
         let renderer = Renderer::new(&subject.snapshot, subject.view, settings)
             .context("cannot start the threads that trace")?;
-        let bar = output::bar(self.reference_spp.into(), format!("Tracing {name} light"));
-        bar.set_position(before.into());
-        bar.reset_eta();
-        let mut written = Instant::now();
-        let mut seconds = 0.0;
-        while film.samples() < self.reference_spp {
-            let start = Instant::now();
-            // Never told to stop.
-            renderer.pass(&mut film, self.reference_spp, &|_| true);
-            seconds += start.elapsed().as_secs_f64();
-            bar.set_position(film.samples().into());
-            let done = film.samples() >= self.reference_spp;
-            if let Some((path, key)) = &kept
-                && (done || written.elapsed() > film_file::KEEP_EVERY)
-            {
-                film_file::write(path, *key, &film)?;
-                written = Instant::now();
-            }
-        }
-        bar.finish_and_clear();
-        let traced = film.samples() - before;
-        Ok((film, Some(seconds / f64::from(traced))))
+        let what = format!("Tracing {name} light");
+        let seconds = kept.refine(&renderer, self.reference_spp, what)?;
+        let traced = kept.film.samples() - before;
+        Ok((kept.film, Some(seconds / f64::from(traced))))
     }
 
     /// All that a sample of the reference depends on, but the size.

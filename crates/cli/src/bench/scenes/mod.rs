@@ -24,9 +24,10 @@ use super::judge::{Judge, covered};
 use super::peers::{SIZE, SUBJECTS};
 use super::section::Section;
 use crate::arguments::{EffortArguments, MOST_SAMPLES, Reading, ReadingArguments};
+use crate::film_file::{FilmFile, KeptFilm};
 use crate::light_source::Computed;
 use crate::output::{self, tell};
-use crate::{camera, film_file, fingerprint, out_file, warnings};
+use crate::{camera, fingerprint, out_file, warnings};
 use report::{Beside, Report, Row};
 
 /// Bounces of the reference; probes have one fewer.
@@ -151,14 +152,14 @@ impl BenchScenes {
         settings: &Settings,
     ) -> Result<Row> {
         let covered = covered(renderer, &subject.snapshot, subject.view, settings)?;
-        let mut film = Tracing::new(self, &subject, Parts::Indirect)?;
-        film.to(FIRST_SPP)?;
+        let mut indirect = Tracing::new(self, &subject, Parts::Indirect)?;
+        indirect.to(FIRST_SPP)?;
         let exposure = match subject.exposure {
             Some(exposure) => exposure,
             None => {
                 let mut direct = Tracing::new(self, &subject, Parts::Direct)?;
                 direct.to(FIRST_SPP)?;
-                exposure(&sum(&direct.picture()?, &film.picture()?))
+                exposure(&sum(&direct.picture()?, &indirect.picture()?))
             }
         };
         let settings = Settings { pre_exposure: exposure, ..*settings };
@@ -175,13 +176,13 @@ impl BenchScenes {
         let picture = picture_of(baked.fields)?;
         let mut judge;
         loop {
-            judge = Judge::new(film.picture()?, covered.clone(), exposure)?;
+            judge = Judge::new(indirect.picture()?, covered.clone(), exposure)?;
             let error = judge.psnr(&picture)?.filtered;
-            let enough = judge.noise(&film.film)? >= error + BELOW;
-            if enough || film.film.samples() >= self.reference_spp {
+            let enough = judge.noise(indirect.film())? >= error + BELOW;
+            if enough || indirect.film().samples() >= self.reference_spp {
                 break;
             }
-            film.to(2 * film.film.samples())?;
+            indirect.to(2 * indirect.film().samples())?;
         }
         if let Some(folder) = &self.output {
             let write = |what: &str, picture: &Picture, exposure: f32| {
@@ -219,8 +220,8 @@ impl BenchScenes {
         }
         Ok(Row {
             psnr: judge.psnr(&picture)?,
-            reference_noise: judge.noise(&film.film)?,
-            reference_samples: film.film.samples(),
+            reference_noise: judge.noise(indirect.film())?,
+            reference_samples: indirect.film().samples(),
             scene: subject.name,
             under_sky: subject.under_sky,
             grids: specs.iter().map(cells).collect(),
@@ -281,8 +282,7 @@ fn subject(path: &Path) -> Result<Subject> {
 /// A part of a reference, while it is refined.
 struct Tracing {
     renderer: reference::Renderer,
-    film: Film,
-    kept: Option<(PathBuf, u64)>,
+    kept: KeptFilm,
 }
 
 impl Tracing {
@@ -296,40 +296,27 @@ impl Tracing {
         };
         let renderer = reference::Renderer::new(&subject.snapshot, subject.view, settings)
             .context("cannot start the threads that trace")?;
-        let kept = match &bench.keep {
+        let file = match &bench.keep {
             Some(folder) => {
                 let key = fingerprint::of(&subject.scene, format!("{BOUNCES} {parts:?}"))?;
                 let file = format!("{}-{key:016x}.film", subject.name);
-                Some((folder.join(file), key))
+                Some(FilmFile { path: folder.join(file), key })
             }
             None => None,
         };
-        let film = match &kept {
-            Some((path, key)) => film_file::begun(path, *key, SIZE, FIRST_SPP),
-            None => Film::new(SIZE, FIRST_SPP),
-        };
-        Ok(Self { renderer, film, kept })
+        Ok(Self { renderer, kept: KeptFilm::begun(file, SIZE, FIRST_SPP) })
     }
 
     /// Refines it to so many samples a pixel.
     fn to(&mut self, samples: u32) -> Result<()> {
-        if self.film.samples() >= samples {
-            return Ok(());
-        }
-        let bar = output::bar(samples.into(), "Tracing the reference");
-        while self.film.samples() < samples {
-            // Never told to stop.
-            self.renderer.pass(&mut self.film, samples, &|_| true);
-            bar.set_position(self.film.samples().into());
-        }
-        bar.finish_and_clear();
-        match &self.kept {
-            Some((path, key)) => film_file::write(path, *key, &self.film),
-            None => Ok(()),
-        }
+        self.kept.refine(&self.renderer, samples, "Tracing the reference").map(drop)
+    }
+
+    fn film(&self) -> &Film {
+        &self.kept.film
     }
 
     fn picture(&self) -> Result<Picture> {
-        Ok(Picture::new(SIZE.x, SIZE.y, self.film.picture())?)
+        Ok(Picture::new(SIZE.x, SIZE.y, self.film().picture())?)
     }
 }
