@@ -8,7 +8,7 @@ use lumencast_light::{Field, Light};
 use lumencast_picture::{Picture, exposure};
 use lumencast_scene::{Scene, View};
 use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Settings, Shading, Shadows, Transparency};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::raster_arguments::{RasterArguments, ShadingArgument, TransparencyArgument};
 use super::{Lighting, PartsArgument, Render};
@@ -50,7 +50,7 @@ impl Render {
             let (offset, window) = (self.raster.reading.offset, self.raster.window);
             renderer.set_light(&light.seen(offset, window))?;
         }
-        let grid = self.raster.views.unwrap_or(UVec2::ONE);
+        let grid = self.grid();
         let views = views(&view, grid, self.raster.view_spacing);
         let (exposure, before) = match self.exposure.0 {
             Some(exposure) => (exposure, None),
@@ -66,7 +66,18 @@ impl Render {
         }
         let picture = side_by_side(&pictures, settings.size, grid)?;
         self.write(&picture, exposure)?;
-        self.report_drawn(&adapter, &drawn, probes, seconds, exposure)
+        if drawn.lights_without_shadow > 0 {
+            tell!(
+                "warning: {} lights cast no shadow: there is no room for their maps",
+                drawn.lights_without_shadow
+            );
+        }
+        let done = Done { adapter, drawn, probes, seconds, exposure };
+        if self.json {
+            return output::json(&self.report_drawn(&done));
+        }
+        self.print_drawn(&done);
+        Ok(())
     }
 
     fn raster_settings(&self) -> Settings {
@@ -118,49 +129,19 @@ impl Render {
         Ok(computed.volumes(&scene.snapshot(), &specs, &mut tracer)?.fields)
     }
 
-    fn report_drawn(
-        &self,
-        adapter: &str,
-        drawn: &Drawn,
-        probes: usize,
-        seconds: f64,
-        exposure: f32,
-    ) -> Result<()> {
-        if drawn.lights_without_shadow > 0 {
-            tell!(
-                "warning: {} lights cast no shadow: there is no room for their maps",
-                drawn.lights_without_shadow
-            );
-        }
+    /// Columns and rows of views.
+    fn grid(&self) -> UVec2 {
+        self.raster.views.unwrap_or(UVec2::ONE)
+    }
+
+    fn print_drawn(&self, done: &Done) {
+        let Done { adapter, drawn, probes, seconds, exposure } = done;
         let UVec2 { x: width, y: height } = self.picture.size;
-        let views = self.raster.views.unwrap_or(UVec2::ONE).element_product();
-        if self.json {
-            return output::json(&json!({
-                "files": self.output,
-                "adapter": adapter,
-                "width": width,
-                "height": height,
-                "views": views,
-                "frames": drawn.frames,
-                "samples": drawn.frames * drawn.samples,
-                "shadow_maps": drawn.shadow_maps,
-                "shadow_resolution": drawn.shadow_resolution,
-                "lights_without_shadow": drawn.lights_without_shadow,
-                "probes": probes,
-                "seconds": seconds,
-                "device_seconds": drawn.time.map(|time| json!({
-                    "deformation": time.deformation,
-                    "shadows": time.shadows,
-                    "occlusion": time.occlusion,
-                    "pictures": time.pictures,
-                })),
-                "exposure": exposure,
-            }));
-        }
         let files: Vec<_> = self.output.iter().map(|path| path.display().to_string()).collect();
         say!("{}", files.join(", "));
         say!(
-            "views: {views} of {width} × {height}, samples a pixel: {} in {} frames, {seconds:.2} s",
+            "views: {} of {width} × {height}, samples a pixel: {} in {} frames, {seconds:.2} s",
+            self.grid().element_product(),
             drawn.frames * drawn.samples,
             drawn.frames,
         );
@@ -181,8 +162,42 @@ impl Render {
             ),
             None => say!("{adapter}"),
         }
-        Ok(())
     }
+
+    fn report_drawn(&self, done: &Done) -> Value {
+        let drawn = &done.drawn;
+        json!({
+            "files": self.output,
+            "adapter": done.adapter,
+            "width": self.picture.size.x,
+            "height": self.picture.size.y,
+            "views": self.grid().element_product(),
+            "frames": drawn.frames,
+            "samples": drawn.frames * drawn.samples,
+            "shadow_maps": drawn.shadow_maps,
+            "shadow_resolution": drawn.shadow_resolution,
+            "lights_without_shadow": drawn.lights_without_shadow,
+            "probes": done.probes,
+            "seconds": done.seconds,
+            "device_seconds": drawn.time.map(|time| json!({
+                "deformation": time.deformation,
+                "shadows": time.shadows,
+                "occlusion": time.occlusion,
+                "pictures": time.pictures,
+            })),
+            "exposure": done.exposure,
+        })
+    }
+}
+
+/// A picture that was drawn, and what it took.
+struct Done {
+    adapter: String,
+    drawn: Drawn,
+    /// The light's.
+    probes: usize,
+    seconds: f64,
+    exposure: f32,
 }
 
 /// The exposure of a first, small picture, and what that took.

@@ -138,12 +138,8 @@ impl BenchQuality {
         renderer.set_scene(&subject.snapshot);
         let fields = self.fields(&subject, &grids)?;
         let table = self.table(&subject, &mut renderer, &fields)?;
-        let mut resolutions = Vec::new();
-        for &side in &self.resolutions {
-            let first = &fields[0];
-            let exposure = table.exposure;
-            resolutions.push(self.at_resolution(&subject, &mut renderer, first, side, exposure)?);
-        }
+        let resolutions =
+            self.by_resolution(&subject, &mut renderer, &fields[0], table.exposure)?;
         let report = Report {
             scene: scene.name().to_owned(),
             adapter: renderer.gpu().name(),
@@ -216,25 +212,29 @@ impl BenchQuality {
         })
     }
 
-    fn at_resolution(
+    /// Square pictures under one field, of each of the sizes asked for.
+    fn by_resolution(
         &self,
         subject: &Subject<'_>,
         renderer: &mut Renderer,
         field: &Field,
-        side: u32,
         exposure: f32,
-    ) -> Result<AtResolution> {
-        let size = UVec2::splat(side);
+    ) -> Result<Vec<AtResolution>> {
         let exposure = Some(exposure);
-        let judge = Judge::new(self.reference(subject, size, exposure)?, exposure);
-        let settings = self.settings(size, Shading::Pixels, &judge);
-        let mut canvas = Canvas { renderer, view: subject.view, settings };
-        Ok(AtResolution {
-            side,
-            field: canvas.row(field, &judge)?,
-            baseline: self.baseline(subject, size, &judge)?.pop(),
-            reference: judge.reference.told,
-        })
+        let mut rows = Vec::new();
+        for &side in &self.resolutions {
+            let size = UVec2::splat(side);
+            let judge = Judge::new(self.reference(subject, size, exposure)?, exposure);
+            let settings = self.settings(size, Shading::Pixels, &judge);
+            let mut canvas = Canvas { renderer: &mut *renderer, view: subject.view, settings };
+            rows.push(AtResolution {
+                side,
+                field: canvas.row(field, &judge)?,
+                baseline: self.baseline(subject, size, &judge)?.pop(),
+                reference: judge.reference.told,
+            });
+        }
+        Ok(rows)
     }
 
     fn settings(&self, size: UVec2, shading: Shading, judge: &Judge) -> Settings {

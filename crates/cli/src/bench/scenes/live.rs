@@ -4,28 +4,18 @@ use anyhow::Result;
 use lumencast_codec::{Catalog, EncodedRegion, Epoch};
 use lumencast_gather::path_trace::CpuPathTracer;
 use lumencast_light::Field;
-use lumencast_scene::{Scene, VolumeSpec};
-use lumencast_server::{Mail, Outlet, SampleRange, Tick, TickOptions};
-use lumencast_solve::GatherOptions;
+use lumencast_scene::Scene;
+use lumencast_server::{Mail, Outlet, Tick, TickOptions};
 
 use crate::output;
 
-/// The light of a server's ticks for so many seconds, a fixed number of samples a probe and tick. The
-/// scene's time stands still.
+/// The light of a server's ticks after so many seconds. The scene's time stands still.
 pub(super) fn light(
     scene: Scene,
     tracer: CpuPathTracer,
-    volumes: &[VolumeSpec],
-    gather: GatherOptions,
-    samples: u32,
+    options: TickOptions,
     seconds: f64,
 ) -> Result<Vec<Field>> {
-    let options = TickOptions {
-        samples: SampleRange::fixed(samples),
-        gather,
-        volumes: volumes.to_vec(),
-        ..TickOptions::default()
-    };
     let ticks = (seconds / options.period).ceil() as u64;
     let mut tick = Tick::new(scene, Box::new(tracer), options, Epoch(0))?;
     let bar = output::bar(ticks, "Ticks");

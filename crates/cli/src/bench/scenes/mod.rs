@@ -15,6 +15,7 @@ use lumencast_gather::reference::{self, Film, Parts, PictureSettings};
 use lumencast_light::{Field, Light};
 use lumencast_picture::{Picture, ToneMap, exposure};
 use lumencast_scene::{Edit, Environment, Scene, Snapshot, View};
+use lumencast_server::{SampleRange, TickOptions};
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading, Shadows};
 use lumencast_solve::Effort;
 use lumencast_solve::blend::BlendSettings;
@@ -210,9 +211,14 @@ impl BenchScenes {
                 what: "as served, converged".to_owned(),
                 psnr: judge.psnr(&picture_of(converged.fields)?)?,
             });
-            let gather = served.gathered(BOUNCES - 1, f32::INFINITY, BlendSettings::default());
             let samples = self.live_samples;
-            let live = live::light(subject.scene, tracer, &specs, gather, samples, seconds.into())?;
+            let options = TickOptions {
+                samples: SampleRange::fixed(samples),
+                gather: served.gathered(BOUNCES - 1, f32::INFINITY, BlendSettings::default()),
+                volumes: specs.clone(),
+                ..TickOptions::default()
+            };
+            let live = live::light(subject.scene, tracer, options, seconds.into())?;
             beside.push(Beside {
                 what: format!("live, {samples} samples a tick, after {seconds} s"),
                 psnr: judge.psnr(&picture_of(live)?)?,
