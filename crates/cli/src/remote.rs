@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use lumencast_client::{Replica, Session, SessionOptions, current_tick, download};
+use lumencast_client::{Replica, SceneFiles, Session, SessionOptions, current_tick};
 use lumencast_codec::{Catalog, StateFrame};
 use lumencast_light::Field;
 use lumencast_scene::Scene;
@@ -96,14 +96,21 @@ async fn read(url: &str) -> Result<(Session, Seen)> {
     Ok((session, seen))
 }
 
-/// The server's scene as its edits have left it.
-fn scene(runtime: &Runtime, url: &str, session: &Session) -> Result<Scene> {
+/// Downloads the files of a server's scene under a bar that shows how many are here. They are removed
+/// with the result: edits may read them as long as it lives.
+pub(crate) fn download(runtime: &Runtime, url: &str) -> Result<SceneFiles> {
     let bar = output::bar(0, "Loading the scene");
-    let files = runtime.block_on(download(url, |done, all| {
+    let files = runtime.block_on(lumencast_client::download(url, |done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
-    }))?;
+    }));
     bar.finish_and_clear();
+    Ok(files?)
+}
+
+/// The server's scene as its edits have left it.
+fn scene(runtime: &Runtime, url: &str, session: &Session) -> Result<Scene> {
+    let files = download(runtime, url)?;
     let mut replica = Replica::new(Scene::load(files.root())?);
     replica.update(session, Instant::now());
     if replica.missed() > 0 {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::UVec2;
-use lumencast_client::{Session, SessionOptions, download};
+use lumencast_client::{Session, SessionOptions};
 use lumencast_gather::path_trace::Levels;
 use lumencast_light::Light;
 use lumencast_picture::ToneMap;
@@ -22,7 +22,7 @@ use crate::arguments::{Exposure, GatherArguments, SceneArguments, TickArguments,
 use crate::camera::{self, CameraArgument, parse_size};
 use crate::light_source::{self, is_address};
 use crate::values::{parse_occlusion, parse_positive};
-use crate::{out_file, output, warnings};
+use crate::{out_file, output, remote, warnings};
 
 /// How long threads may take to end once the window is closed.
 const GRACE: Duration = Duration::from_secs(2);
@@ -174,12 +174,7 @@ impl View {
     /// A server's scene, downloaded from it.
     fn of_server(&self, runtime: &Runtime, url: &str) -> Result<Box<dyn World>> {
         let session = runtime.block_on(connect(url))?;
-        let bar = output::bar(0, "Loading the scene");
-        let files = runtime.block_on(download(url, |done, all| {
-            bar.set_length(all as u64);
-            bar.set_position(done as u64);
-        }))?;
-        bar.finish_and_clear();
+        let files = remote::download(runtime, url)?;
         let scene = Scene::load(files.root())?;
         warnings::left_out(&scene);
         Ok(world(session, scene))
