@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::UVec2;
-use lumencast_client::{Session, SessionOptions};
+use lumencast_client::{SceneFiles, Session, SessionOptions};
 use lumencast_gather::path_trace::Levels;
 use lumencast_light::Light;
 use lumencast_picture::ToneMap;
@@ -93,9 +93,13 @@ impl View {
             .build()
             .context("cannot start the network threads")?;
         let mut server = None;
+        let mut files = None;
         let shown = match &self.light {
             None if is_address(&self.scene.source.scene) => {
-                self.of_server(&runtime, &self.scene.source.scene)
+                self.of_server(&runtime, &self.scene.source.scene).map(|(world, downloaded)| {
+                    files = Some(downloaded);
+                    world
+                })
             }
             None => self.here(&runtime).map(|(world, running)| {
                 server = Some(running);
@@ -112,6 +116,8 @@ impl View {
             }
             Ok(())
         });
+        // The server's edits may have named any of them while the scene was shown.
+        drop(files);
         let ended = server.map_or(Ok(()), |server| runtime.block_on(server.end()));
         runtime.shutdown_timeout(GRACE);
         opened.and(ended)
@@ -171,13 +177,13 @@ impl View {
         Ok(world(session, scene))
     }
 
-    /// A server's scene, downloaded from it.
-    fn of_server(&self, runtime: &Runtime, url: &str) -> Result<Box<dyn World>> {
+    /// A server's scene, and the files downloaded for it.
+    fn of_server(&self, runtime: &Runtime, url: &str) -> Result<(Box<dyn World>, SceneFiles)> {
         let session = runtime.block_on(connect(url))?;
         let files = remote::download(runtime, url)?;
         let scene = Scene::load(files.root())?;
         warnings::left_out(&scene);
-        Ok(world(session, scene))
+        Ok((world(session, scene), files))
     }
 
     /// A scene whose light is computed here, by a server of its own.

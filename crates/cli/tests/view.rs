@@ -88,6 +88,22 @@ fn pictures_of_a_field_and_a_server_need_no_display() {
     }
 }
 
+/// The edit that puts a scene under a picture reads it after the scene was loaded.
+#[test]
+fn files_of_a_servers_edits_are_there() {
+    let folder = Folder::new("view-environment");
+    let scene = folder.triangles("lit", &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 1.0);
+    let sky = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x81\x40\x40\x40\x81";
+    folder.file("sky.hdr", sky);
+    let volume = ["--volume", "1x1x1@0,1,0:2,2,2", "--environment", "sky.hdr"];
+    let server = Serving::start(&scene, &volume);
+    let picture = folder.0.join("lit.png");
+    let shot = ["--size", "64x48", "--screenshot", picture.to_str().expect("text")];
+    let ran = run_with(&[&["view", &server.url()][..], &shot].concat(), &NOWHERE);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    assert!(!ran.stderr.contains("cannot be followed"), "{ran:?}");
+}
+
 #[test]
 fn says_what_is_missing() {
     let folder = Folder::new("view-missing");
