@@ -14,8 +14,7 @@ use serde_json::{Value, json};
 use crate::arguments::scene_name;
 use crate::output::{self, say};
 use crate::remote::Seen;
-use crate::words::{entry_in_words, in_words, label};
-use crate::{light_source, remote, warnings};
+use crate::{light_source, remote, warnings, words};
 
 /// Says what is in a file (.light, .gltf, .glb), a built-in scene, or a running server.
 #[derive(Debug, Args)]
@@ -51,7 +50,9 @@ impl Inspect {
         if self.json {
             return output::json(&report);
         }
-        print_report(&report);
+        for line in words::lines(&report) {
+            say!("{line}");
+        }
         Ok(())
     }
 }
@@ -173,7 +174,7 @@ fn scene_report(scene: &mut Scene) -> Value {
         .collect();
     let dark = scene.is_dark().then(|| warnings::DARK.to_owned());
     let warnings: Vec<String> = scene.warnings().iter().cloned().chain(dark).collect();
-    let bounds = scene.bounds();
+    let (bounds, volumes) = (scene.bounds(), scene.volumes());
     json!({
         "scene": scene.name(),
         "root": scene.root_file(),
@@ -187,7 +188,9 @@ fn scene_report(scene: &mut Scene) -> Value {
         "cameras": cameras,
         "animations": animations,
         "environment": scene.environment(),
-        "volumes": scene.volumes(),
+        // Only rays tell where the default one is, and none are traced here.
+        "default_volume": volumes.is_empty(),
+        "volumes": volumes,
         "files": scene.files().into_iter().map(|file| file.name).collect::<Vec<_>>(),
         "warnings": warnings,
     })
@@ -200,25 +203,4 @@ fn lights(scene: &Scene) -> Vec<Value> {
         Some(json!({ "node": node.id, "name": node.name, "light": light }))
     };
     scene.drawn_nodes().filter_map(light).collect()
-}
-
-/// The report for people: a line for each plain value, a block for each list.
-fn print_report(report: &Value) {
-    const SHOWN: usize = 40;
-    let Some(report) = report.as_object() else { return };
-    for (key, value) in report {
-        match value {
-            Value::Null => {}
-            Value::Array(entries) => {
-                say!("{} ({})", label(key), entries.len());
-                for entry in entries.iter().take(SHOWN) {
-                    say!("  {}", entry_in_words(key, entry));
-                }
-                if entries.len() > SHOWN {
-                    say!("  … and {} more (--json lists all)", entries.len() - SHOWN);
-                }
-            }
-            _ => say!("{}: {}", label(key), in_words(key, report)),
-        }
-    }
 }

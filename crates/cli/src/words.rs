@@ -20,21 +20,59 @@ enum Unit {
     Of(&'static str),
 }
 
+/// What is said of a scene that asks for no volumes.
+const DEFAULT_VOLUME: &str = "none of its own; a default one is placed where the space is";
+
+/// A list shows so many entries at most.
+const SHOWN: usize = 40;
+
+/// A report's lines: one for each plain value, a block for each list.
+pub(crate) fn lines(report: &Value) -> Vec<String> {
+    let Some(report) = report.as_object() else { return Vec::new() };
+    let is_default =
+        |key: &str| key == "volumes" && report.get("default_volume") == Some(&Value::Bool(true));
+    let mut lines = Vec::new();
+    for (key, value) in report {
+        match value {
+            Value::Null => {}
+            // The volumes' own line says it.
+            _ if key == "default_volume" => {}
+            Value::Array(fields) if key == "unknown_fields" && fields.is_empty() => {}
+            Value::Array(_) if is_default(key) => {
+                lines.push(format!("{}: {DEFAULT_VOLUME}", label(key)));
+            }
+            Value::Array(entries) => {
+                lines.push(format!("{} ({})", label(key), entries.len()));
+                let shown = entries.iter().take(SHOWN);
+                lines.extend(shown.map(|entry| format!("  {}", entry_in_words(key, entry))));
+                if entries.len() > SHOWN {
+                    let more = entries.len() - SHOWN;
+                    lines.push(format!("  … and {more} more (--json lists all)"));
+                }
+            }
+            _ => lines.push(format!("{}: {}", label(key), in_words(key, report))),
+        }
+    }
+    lines
+}
+
 /// A value in words; `key` is its name in `map`.
-pub(crate) fn in_words(key: &str, map: &Map<String, Value>) -> String {
+fn in_words(key: &str, map: &Map<String, Value>) -> String {
     map.get(key).map(|value| words(value, unit(key, map, Unit::Plain))).unwrap_or_default()
 }
 
 /// An entry of a list that is called `key`.
-pub(crate) fn entry_in_words(key: &str, value: &Value) -> String {
-    words(value, unit(key, &Map::new(), Unit::Plain))
+fn entry_in_words(key: &str, value: &Value) -> String {
+    let words = words(value, unit(key, &Map::new(), Unit::Plain));
+    if words.is_empty() { "nothing is known of it".into() } else { words }
 }
 
 /// The name of a value, for people.
-pub(crate) fn label(key: &str) -> String {
+fn label(key: &str) -> String {
     match key {
         "tick_seconds" => "period".into(),
         "tick_ms" => "tick took".into(),
+        "unknown_fields" => "fields of unknown kinds".into(),
         key => key.replace('_', " "),
     }
 }
@@ -152,6 +190,32 @@ mod tests {
         }
         assert_eq!(thousands("1234567"), "1,234,567");
         assert_eq!(thousands("-123"), "-123");
+    }
+
+    #[test]
+    fn volumes_are_listed_or_the_default_one_is_told() {
+        let volume = json!({ "order": 2 });
+        let own = lines(&json!({ "volumes": [volume], "default_volume": false }));
+        assert_eq!(own, ["volumes (1)", "  order 2"]);
+        let none = lines(&json!({ "volumes": [], "default_volume": true }));
+        assert_eq!(none, [format!("volumes: {DEFAULT_VOLUME}")]);
+    }
+
+    #[test]
+    fn fields_of_unknown_kinds_are_told_where_there_are_some() {
+        assert_eq!(lines(&json!({ "unknown_fields": [] })), Vec::<String>::new());
+        let some = json!([{ "id": 5, "kind": "spheres" }, { "id": null, "kind": "" }]);
+        let told =
+            ["fields of unknown kinds (2)", "  id 5, kind spheres", "  nothing is known of it"];
+        assert_eq!(lines(&json!({ "unknown_fields": some })), told);
+    }
+
+    #[test]
+    fn lists_are_cut_and_nothing_is_left_out_silently() {
+        let all = lines(&json!({ "names": vec!["a"; SHOWN + 2], "none": null, "lights": [] }));
+        assert!(all.contains(&"  … and 2 more (--json lists all)".to_owned()), "{all:?}");
+        assert!(all.contains(&"lights (0)".to_owned()), "{all:?}");
+        assert_eq!(all.len(), 1 + SHOWN + 1 + 1, "{all:?}");
     }
 
     #[test]

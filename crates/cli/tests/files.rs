@@ -155,6 +155,21 @@ fn inspect_counts_what_is_shown() {
     assert_eq!(nodes.iter().map(|n| n["node"].clone()).collect::<Vec<_>>(), [2, 3]);
 }
 
+/// Only rays tell where a default volume is, and `inspect` traces none.
+#[test]
+fn inspect_tells_of_a_default_volume() {
+    let folder = Folder::new("default-volume");
+    let path = dark(&folder);
+    let report = run(&["inspect", &path, "--json"]).json();
+    assert_eq!((&report["volumes"], &report["default_volume"]), (&json!([]), &json!(true)));
+    let words = run(&["inspect", &path]).stdout;
+    assert!(words.contains("volumes: none of its own; a default one"), "{words}");
+    let report = run(&["inspect", "cornell", "--json"]).json();
+    assert_eq!(report["default_volume"], false, "{report}");
+    let words = run(&["inspect", "cornell"]).stdout;
+    assert!(words.contains("volumes (") && !words.contains("default volume"), "{words}");
+}
+
 #[cfg(unix)]
 #[test]
 fn a_name_that_is_not_utf8_is_said_to_be_so() {
