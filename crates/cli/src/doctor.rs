@@ -163,7 +163,7 @@ fn vulkan_drivers() -> Vec<PathBuf> {
 }
 
 /// The adapters, asked for in a process of its own: a broken driver may crash or hang, and to say
-/// so is what this command is for. Null then.
+/// so is what this command is for. The value is null then.
 fn adapters() -> Value {
     let program = env::current_exe().unwrap_or_else(|_| PathBuf::from("lumencast"));
     first_output(program, &["doctor", "--adapters"])

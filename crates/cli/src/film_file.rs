@@ -33,7 +33,7 @@ pub(crate) struct KeptFilm {
 
 impl KeptFilm {
     /// The film begins with what the file holds of its picture, or else empty, with so many `planned`
-    /// samples a pixel. People are told which where there is a file.
+    /// samples a pixel. People are told which of the two where there is a file.
     pub(crate) fn begun(file: Option<FilmFile>, size: UVec2, planned: u32) -> Self {
         let found = file.as_ref().and_then(|file| file.found(size));
         let film = found.unwrap_or_else(|| Film::new(size, planned));

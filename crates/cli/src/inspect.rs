@@ -143,7 +143,7 @@ fn c0_statistics(volume: &ProbeVolume) -> Value {
 }
 
 fn scene_report(scene: &mut Scene) -> Value {
-    // What is drawn: of two scenes in a file the one that it names, with each of a node's instances.
+    // Only what is drawn counts: the one scene that the file names, with each of a node's instances.
     let snapshot = scene.snapshot();
     let triangles: usize = snapshot.instances.iter().map(|i| i.mesh.triangle_count()).sum();
     let nodes: Vec<Value> = scene

@@ -16,7 +16,7 @@ use crate::arguments::Reading;
 use crate::output::{self, tell};
 use crate::remote::{self, Seen};
 
-/// Whether it is the address of a server's scene.
+/// Whether `what` is the address of a server's scene.
 pub(crate) fn is_address(what: &str) -> bool {
     what.starts_with("http://") || what.starts_with("https://")
 }
@@ -80,7 +80,7 @@ pub(crate) struct Computed {
 }
 
 impl Computed {
-    /// What traces it.
+    /// The path tracer that computes it.
     pub(crate) fn tracer(&self) -> Result<CpuPathTracer> {
         CpuPathTracer::new(self.tracing.clone()).context("cannot start the threads that trace")
     }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use lumencast_picture::{check_place, write_whole};
 
-/// Whether a file can be written there: said before hours of work, not after.
+/// Checks that a file can be written there: people learn that before hours of work, not after.
 pub(crate) fn check(path: &Path) -> Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
@@ -16,7 +16,7 @@ pub(crate) fn check(path: &Path) -> Result<()> {
     check_place(path).with_context(|| cannot_write(path))
 }
 
-/// Whether files can be written into a folder, which is made where it is missing.
+/// Checks that files can be written into a folder, which is made where it is missing.
 pub(crate) fn check_folder(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     check_place(&folder.join("file")).with_context(|| cannot_write(folder))

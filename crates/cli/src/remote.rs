@@ -25,16 +25,16 @@ const GRACE: Duration = Duration::from_secs(1);
 /// Longer than light takes to pass from one update to the next.
 const SETTLED: Duration = Duration::from_secs(3600);
 
-/// What there was to see.
+/// What a look at a server shows.
 pub(crate) struct Seen {
     pub(crate) catalog: Catalog,
     pub(crate) fields: Vec<Field>,
-    /// Where it was asked for, and could be had.
+    /// The scene, where it was asked for and could be had.
     pub(crate) scene: Option<Scene>,
     pub(crate) state: StateFrame,
-    /// Edits that made the scene what it is.
+    /// The number of edits that made the scene what it is.
     pub(crate) edits: usize,
-    /// Bytes of the frames read.
+    /// The frames read have so many bytes.
     pub(crate) bytes: u64,
 }
 

@@ -68,7 +68,7 @@ pub(crate) fn parse_samples(text: &str) -> Result<SampleRange> {
     }
 }
 
-/// More than 0, at most 1.
+/// A share: more than 0, at most 1.
 pub(crate) fn parse_share(text: &str) -> Result<f32> {
     let share: f32 = text.parse()?;
     ensure!(share > 0.0 && share <= 1.0, "more than 0, at most 1");

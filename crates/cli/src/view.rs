@@ -116,7 +116,7 @@ impl View {
             }
             Ok(())
         });
-        // The server's edits may have named any of them while the scene was shown.
+        // Edits name files of the scene's as long as it is shown, and no longer.
         drop(files);
         let ended = server.map_or(Ok(()), |server| runtime.block_on(server.end()));
         runtime.shutdown_timeout(GRACE);
@@ -218,9 +218,9 @@ struct Running {
 }
 
 impl Running {
-    /// Ends it.
+    /// Ends the server.
     async fn end(self) -> Result<()> {
-        // It hears nothing where it has ended already.
+        // A server that has ended by itself hears nothing.
         let _ = self.stop.send(());
         self.ended.await.context("the server")??;
         Ok(())

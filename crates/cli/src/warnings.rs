@@ -4,10 +4,10 @@ use lumencast_scene::Scene;
 
 use crate::output::tell;
 
-/// How many lines there are at most.
+/// A scene's warnings take so many lines at most.
 const SHOWN: usize = 20;
 
-/// Said where nothing gives light.
+/// What is said where nothing gives light.
 pub(crate) const DARK: &str =
     "nothing in the scene gives light; --environment sky:1000 puts it under a sky";
 

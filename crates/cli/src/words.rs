@@ -7,10 +7,10 @@ use crate::output;
 /// The most digits of a number that count: an f32 has a little over seven.
 const DIGITS: i32 = 6;
 
-/// What a number is of.
+/// What a number measures.
 #[derive(Clone, Copy)]
 enum Unit {
-    /// Nothing, or what its name says.
+    /// A plain number, or one whose name says what it is.
     Plain,
     /// The number of a thing, not an amount.
     Name,
@@ -128,7 +128,7 @@ fn measure(number: &Number, of: Unit) -> String {
     }
 }
 
-/// A number with the digits of it that count.
+/// A number in words, with only the digits that count.
 fn in_digits(value: f64) -> String {
     let exponent = value.abs().log10().floor();
     if value == 0.0 || !value.is_finite() {
@@ -144,7 +144,7 @@ fn in_digits(value: f64) -> String {
     thousands(without_zeros(&format!("{value:.decimals$}")))
 }
 
-/// Without zeros that say nothing at the end of a fraction.
+/// Digits without the zeros that say nothing at a fraction's end.
 fn without_zeros(digits: &str) -> &str {
     match digits.contains('.') {
         true => digits.trim_end_matches('0').trim_end_matches('.'),
@@ -152,7 +152,7 @@ fn without_zeros(digits: &str) -> &str {
     }
 }
 
-/// Thousands apart.
+/// Digits with the thousands set apart.
 fn thousands(digits: &str) -> String {
     let (sign, digits) = digits.split_at(usize::from(digits.starts_with('-')));
     let (whole, fraction) = digits.split_at(digits.find('.').unwrap_or(digits.len()));

@@ -5,7 +5,7 @@ use std::str::FromStr;
 #[cfg(feature = "gpu")]
 use lumencast_shade::Occlusion;
 
-/// A factor on radiance, or none where it is to be found from a picture.
+/// A factor on radiance; none where a picture is to tell it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Exposure(pub(crate) Option<f32>);
 

@@ -7,9 +7,9 @@ use lumencast_solve::Effort;
 
 use crate::values::parse_positive;
 
-/// Samples of a probe, at most, unless told otherwise.
+/// A probe takes so many samples at most, unless told otherwise.
 pub(crate) const MOST_SAMPLES: u32 = 32_768;
-/// How noisy light may be that is computed once, unless told otherwise: codes of 0 to 255.
+/// Light that is computed once may be so noisy, unless told otherwise; codes of 0 to 255.
 const NOISE: &str = "0.5";
 
 /// The noise at which computing ends, if it is to end by that.
@@ -37,7 +37,7 @@ pub(crate) struct EffortArguments {
 }
 
 impl EffortArguments {
-    /// With so many samples a probe at most.
+    /// The effort of at most so many samples a probe.
     pub(crate) fn with(&self, samples: u32) -> Effort {
         Effort { samples, noise: self.noise.0 }
     }

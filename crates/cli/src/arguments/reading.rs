@@ -7,7 +7,7 @@ use lumencast_solve::{FitOptions, GatherOptions};
 
 use crate::values::parse_offset;
 
-/// Points a probe of light that is computed once, unless told otherwise.
+/// Light that is computed once is fitted to so many points a probe, unless told otherwise.
 const POINTS: u32 = 256;
 /// Where fitted light is read unless told otherwise. Farther off, points on both sides of an edge read
 /// the same place; at the surface itself, both sides of a wall do (`docs/results/walls.md`).
@@ -42,24 +42,24 @@ pub(crate) struct ReadingArguments {
 }
 
 impl ReadingArguments {
-    /// For pages, live.
+    /// How pages read live light.
     pub(crate) fn served(&self) -> Reading {
         Reading { fit: self.fit(0), offset: self.offset.unwrap_or_default() }
     }
 
-    /// For whoever has the file.
+    /// How whoever has the file reads its light.
     pub(crate) fn baked(&self) -> Reading {
         Reading { fit: self.fit(POINTS), offset: self.offset.unwrap_or_default() }
     }
 
-    /// For our own renderer.
+    /// How our own renderer reads light that is computed for it.
     pub(crate) fn drawn(&self) -> Reading {
         let fit = self.fit(POINTS);
         let usual = if fit.is_some() { NEAR } else { Offset::default() };
         Reading { fit, offset: self.offset.unwrap_or(usual) }
     }
 
-    /// What is compared with what: light as it is gathered, and fitted where that is asked for.
+    /// The readings that are compared: light as it is gathered, and fitted where that is asked for.
     pub(crate) fn compared(&self) -> Vec<Reading> {
         let gathered = Reading { fit: None, offset: self.offset.unwrap_or_default() };
         let fitted = Some(self.drawn()).filter(|reading| reading.fit.is_some());

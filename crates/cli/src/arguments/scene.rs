@@ -30,7 +30,7 @@ pub(crate) struct SceneSource {
 }
 
 impl SceneSource {
-    /// The scene, with what there is to be said of it said.
+    /// The scene. People are told what is left out of it, and where nothing lights it.
     pub(crate) fn open(&self) -> Result<Scene> {
         self.open_edited(&[])
     }
@@ -74,7 +74,7 @@ impl SceneSource {
     }
 }
 
-/// Names are passed on as text, to servers and pages too.
+/// Parses a scene's name, which is passed on as text, to servers and pages too.
 pub(crate) fn scene_name() -> impl TypedValueParser<Value = String> {
     OsStringValueParser::new().try_map(|name| {
         name.into_string()

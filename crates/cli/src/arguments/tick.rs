@@ -39,7 +39,7 @@ pub(crate) struct TickArguments {
 }
 
 impl TickArguments {
-    /// All that a tick needs to know.
+    /// What a tick needs to know.
     pub(crate) fn options(
         &self,
         scene: &mut Scene,

@@ -17,12 +17,12 @@ use super::drawing::draw;
 /// Side of the filter that takes the reference's noise away, pixels.
 const FILTER: u32 = 4;
 
-/// PSNR, dB.
+/// How near a picture is to its reference, dB.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct Psnr {
-    /// Of pixels.
+    /// The PSNR of pixels as they are.
     pub(super) sharp: f64,
-    /// After the filter.
+    /// The PSNR after the filter.
     pub(super) filtered: f64,
 }
 
@@ -43,9 +43,9 @@ pub(super) struct Judge {
 /// How a part of a picture differs from the reference, after the filter, in codes of 0 to 255.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub(super) struct Deviation {
-    /// Mean of what is too much, of each channel.
+    /// The mean of what is too much in each channel.
     pub(super) mean: Vec3,
-    /// Root of the mean square, over channels.
+    /// The root of the mean square over pixels and channels.
     pub(super) rms: f32,
 }
 
@@ -117,7 +117,7 @@ impl Judge {
         Ok(-10.0 * (squares.sum::<f64>() / (3.0 * a.len() as f64)).log10())
     }
 
-    /// As a picture is displayed: v^(1/2.2), clamped.
+    /// The code by which a picture is displayed: v^(1/2.2), clamped.
     fn code(&self, linear: Vec3) -> Vec3 {
         gamma_code(linear * self.exposure).clamp(Vec3::ZERO, Vec3::ONE)
     }
@@ -181,7 +181,7 @@ mod tests {
         Judge::new(reference, (0..SIDE * SIDE).map(covered).collect(), 1.0).expect("pixels")
     }
 
-    /// A code of a tenth too much everywhere: 20 dB.
+    /// Codes that are a tenth too high everywhere make 20 dB.
     #[test]
     fn it_is_the_error_of_codes() {
         let judge = judge(picture(|_, _| linear(0.5)), |_| true);

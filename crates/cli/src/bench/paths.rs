@@ -50,7 +50,7 @@ impl BenchPaths {
         let (mut paths, mut segments) = (Vec::new(), Vec::new());
         for _ in 0..self.rounds {
             let start = Instant::now();
-            // Never told to stop.
+            // Every pass is finished: nothing tells it to stop.
             let traced = renderer.pass(&mut film, u32::MAX, &|_| true).unwrap_or_default();
             let seconds = start.elapsed().as_secs_f64();
             paths.push(traced.paths as f64 / seconds);

@@ -49,7 +49,7 @@ pub(crate) struct BenchRays {
     json: bool,
 }
 
-/// Instances of which a top level is built.
+/// The top level that is timed has so many instances.
 const INSTANCES: u32 = 1000;
 
 impl BenchRays {

@@ -1,5 +1,5 @@
-//! A section of a document of markdown that a command wrote: what was measured, in place of what had been
-//! measured before.
+//! A section of a document of markdown: a command writes what it measures in place of what its last run
+//! wrote.
 
 use std::fs;
 use std::io::ErrorKind;

@@ -37,7 +37,7 @@ pub(crate) struct BenchTick {
     json: bool,
 }
 
-/// Ticks until the number of samples has settled; they are left out of the figures of time.
+/// The number of samples settles within so many ticks, which the figures of time leave out.
 const SETTLING: usize = 25;
 /// Bytes of a probe of L2 in half floats: the second paper's, and its published implementation's.
 const RAW_BYTES: [(&str, u64); 2] = [("paper", 56), ("implementation", 72)];
@@ -135,9 +135,9 @@ impl BenchTick {
 struct Sent {
     state: u64,
     catalog: u64,
-    /// By field and layer.
+    /// Bytes of probes by field and layer.
     probes: BTreeMap<(u32, u8), u64>,
-    /// Sum over probes of the squared error relative to c0, and how many.
+    /// The sum over probes of the squared error relative to c0; `weight` is their number.
     squared_error: f64,
     weight: f64,
 }

@@ -158,7 +158,7 @@ impl Render {
         self.lighting.unwrap_or(unless_given)
     }
 
-    /// Said before hours of work, not after.
+    /// Checks where pictures go: people learn that before hours of work, not after.
     fn check_outputs(&self) -> Result<()> {
         for path in &self.output {
             let extension = path.extension().map(|e| e.to_ascii_lowercase());

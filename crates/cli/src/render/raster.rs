@@ -18,9 +18,9 @@ use crate::output::{self, say, tell};
 
 /// Samples a pixel unless told otherwise.
 const SAMPLES: u32 = 8;
-/// Of the picture that tells the exposure, as a part of the size.
+/// The picture that tells the exposure has this part of the size along each side.
 const GLANCE: u32 = 4;
-/// Pre-exposure of that picture: halves then hold 0.1 to 60 million cd/m² with all their digits.
+/// The pre-exposure of that picture: halves then hold 0.1 to 60 million cd/m² with all their digits.
 const GLANCE_PRE_EXPOSURE: f32 = 1.0 / 1024.0;
 
 impl Render {
@@ -151,7 +151,7 @@ impl Render {
             drawn.shadow_resolution
         );
         match drawn.time {
-            // Nothing is shown on a screen.
+            // A picture in a file takes no time on a screen.
             Some(PassTimes { deformation, shadows, occlusion, pictures, screen: _ }) => say!(
                 "{adapter}: {:.1} ms skins and morph targets, {:.1} ms shadow maps, \
                  {:.1} ms occlusion, {:.1} ms pictures",
@@ -194,7 +194,7 @@ impl Render {
 struct Done {
     adapter: String,
     drawn: Drawn,
-    /// The light's.
+    /// The number of the light's probes.
     probes: usize,
     seconds: f64,
     exposure: f32,

@@ -4,16 +4,16 @@ use glam::{IVec2, UVec2, Vec3};
 use lumencast_gather::reference::{Sample, Surface};
 use rayon::prelude::*;
 
-/// Pixels along the side of a block.
+/// A block has so many pixels along its side.
 const BLOCK: usize = 32;
-/// 1, normal, position, position squared.
+/// The features are 1, the normal, the position and the position squared.
 const FEATURES: usize = 10;
-/// Features that are brought to 0 to 1 in a block, those of the position.
+/// The features that are brought to 0 to 1 in a block: those of the position.
 const SCALED: std::ops::Range<usize> = 4..FEATURES;
-/// Amplitude of the noise on features, without which flat surfaces had features that depend on each
-/// other, and no one solution.
+/// The amplitude of the noise on features. Without it, the features of flat surfaces would depend on
+/// each other, and there would be no one solution.
 const NOISE: f32 = 1e-2;
-/// Places of the grid of blocks that frames take in turn, so that no border of blocks stays.
+/// Frames shift the grid of blocks to so many places in turn, so that no border of blocks stays.
 const PLACES: u32 = 16;
 
 type Features = [f32; FEATURES];
@@ -22,8 +22,8 @@ type Row = [f32; FEATURES + 3];
 /// A weight a feature and channel.
 type Weights = [Vec3; FEATURES];
 
-/// For every pixel with a surface, the combination of its features that in its block comes nearest to
-/// `light` in the least squares; never negative.
+/// The light of every pixel with a surface: the combination of its features that in its block comes
+/// nearest to `light` in the least squares, and is never negative.
 pub(super) fn fit(
     size: UVec2,
     samples: &[Sample],
@@ -97,7 +97,7 @@ impl Block {
         Self { ranges, weights: least_squares(&mut rows) }
     }
 
-    /// Light of a surface by the solution.
+    /// The light of a surface by the solution.
     fn light(&self, surface: &Surface) -> Vec3 {
         let mut features = features(surface);
         for n in SCALED {

@@ -7,8 +7,8 @@
 //! multiplied by the base colour, and passed through temporal antialiasing. Shares of new frames and
 //! the features are those of the published implementation.
 //!
-//! For a camera that stands still, so that a pixel's history is its own: nothing is reprojected, and
-//! no history is thrown away. What surfaces and the environment send out by themselves has no noise:
+//! The camera stands still, so that a pixel's history is its own: nothing is reprojected, and no
+//! history is thrown away. What surfaces and the environment send out by themselves has no noise:
 //! it is left out of the fit, and added afterwards.
 
 mod fit;
@@ -18,7 +18,7 @@ use glam::{UVec2, Vec3};
 use lumencast_gather::reference::{Frame, Sample};
 use lumencast_picture::{Picture, PictureError, gamma_code};
 
-/// Least share of a new frame in the averages before and after the fit.
+/// A new frame's least share in the averages before and after the fit.
 const BEFORE: f32 = 0.2;
 const AFTER: f32 = 0.1;
 /// Base colours below this count as this: so much of what a black surface receives it still reflects.
@@ -32,12 +32,12 @@ pub(super) struct Bmfr {
     frames: u32,
     before: History,
     after: History,
-    /// Display codes.
+    /// The last picture as display codes.
     shown: Vec<Vec3>,
 }
 
 impl Bmfr {
-    /// Nothing seen yet. Codes, among which edges are smoothed, are those at this exposure.
+    /// A denoiser that has seen no frame. Edges are smoothed among codes at this exposure.
     pub(super) fn new(size: UVec2, exposure: f32) -> Self {
         let pixels = size.x as usize * size.y as usize;
         let [before, after] = [BEFORE, AFTER].map(|least| History::new(pixels, least));
@@ -57,7 +57,7 @@ impl Bmfr {
         self.frames += 1;
     }
 
-    /// Linear colour, as bright as white at the exposure at most.
+    /// The picture in linear colour, at most as bright as white at the exposure.
     ///
     /// # Errors
     /// No frame was taken in.
@@ -67,13 +67,13 @@ impl Bmfr {
     }
 }
 
-/// Light that a surface receives, about; nothing where none is seen.
+/// About the light that a surface receives; nothing where no surface is seen.
 fn demodulated(sample: &Sample) -> Option<Vec3> {
     let surface = sample.surface?;
     Some((sample.radiance - sample.emitted) / surface.base_color.max(Vec3::splat(DARKEST)))
 }
 
-/// Radiance of a sample whose surface receives `light`.
+/// The radiance of a sample whose surface receives `light`.
 fn modulated(sample: &Sample, light: Vec3) -> Vec3 {
     let color = sample.surface.map_or(Vec3::ZERO, |s| s.base_color.max(Vec3::splat(DARKEST)));
     sample.emitted + color * light

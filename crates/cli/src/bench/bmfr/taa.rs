@@ -1,13 +1,13 @@
-//! Temporal antialiasing: the picture before, as far as the new one allows it.
+//! Temporal antialiasing: the last picture is kept as far as the new one allows it.
 
 use glam::{IVec2, UVec2, Vec3};
 
-/// Share of the new frame.
+/// The new frame's share.
 const SHARE: f32 = 0.2;
 
-/// The new picture mixed with the one before, which is first held within the colours about the pixel:
-/// the mean of the bounds of all nine and of the five that share an edge, in YCoCg. The new picture
-/// where there was none before.
+/// The new picture mixed with the last one, which is first held within the colours about the pixel: the
+/// mean of the bounds of all nine and of the five that share an edge, in YCoCg. Where there is no last
+/// picture, the new one as it is.
 pub(super) fn smoothed(size: UVec2, new: &[Vec3], before: &[Vec3]) -> Vec<Vec3> {
     if before.len() != new.len() {
         return new.to_vec();
@@ -68,11 +68,11 @@ mod tests {
     fn history_is_held_within_what_is_about() {
         let grey = vec![Vec3::splat(0.5); 12];
         assert_eq!(smoothed(SIZE, &grey, &[]), grey);
-        // What was there before is nowhere near: nothing of it stays.
+        // The last picture is nowhere near: nothing of it stays.
         let ghost = vec![Vec3::new(1.0, 0.0, 0.0); 12];
         let found = smoothed(SIZE, &grey, &ghost);
         assert!(found.iter().all(|c| (*c - 0.5).abs().max_element() < 1e-6), "{found:?}");
-        // Within them, four fifths of it do.
+        // Where it lies within the bounds, four fifths of it stay.
         let edge: Vec<_> = (0..12).map(|i| Vec3::splat((i % 2) as f32)).collect();
         let found = smoothed(SIZE, &edge, &grey);
         assert!((found[5] - 0.6).abs().max_element() < 1e-6, "{}", found[5]);

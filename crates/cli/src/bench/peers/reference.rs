@@ -10,7 +10,7 @@ use lumencast_picture::{Loaded, Picture};
 use super::subjects::{SIZE, Subject};
 use crate::output::tell;
 
-/// Samples a pixel and bounces.
+/// Mitsuba's arguments for samples a pixel and bounces.
 const EFFORT: [&str; 4] = ["--spp", "1024", "--bounces", "4"];
 
 /// Where references are, and how they are made.

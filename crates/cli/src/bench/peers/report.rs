@@ -16,7 +16,7 @@ pub(super) struct Report {
     pub(super) scenes: Vec<Table>,
 }
 
-/// Of a scene.
+/// What is measured of a scene.
 #[derive(Serialize)]
 pub(super) struct Table {
     pub(super) scene: &'static str,
@@ -25,7 +25,7 @@ pub(super) struct Table {
     pub(super) fields: Vec<Field>,
 }
 
-/// Of light.
+/// What is measured of one field.
 #[derive(Serialize)]
 pub(super) struct Field {
     pub(super) grid: String,

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::bench::judge::Psnr;
 
-/// Pixels of the pictures.
+/// The pictures' width and height, pixels.
 pub(in crate::bench) const SIZE: UVec2 = UVec2::new(320, 180);
 
 /// A scene of the protocol.

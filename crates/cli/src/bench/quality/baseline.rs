@@ -13,7 +13,7 @@ use super::{BenchQuality, Subject};
 use crate::bench::bmfr::Bmfr;
 use crate::output;
 
-/// Of the paths, which must not be among the reference's.
+/// The paths' seed: none of them must be among the reference's.
 const SEED: u64 = 2;
 
 impl BenchQuality {

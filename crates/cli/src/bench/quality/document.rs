@@ -1,5 +1,5 @@
-//! A section of a document of results: what was measured, in place of what had been measured before,
-//! with one picture of pictures and the plots beside it.
+//! A section of a document of results. A run replaces what the last one put there; one picture of
+//! pictures and the plots lie beside the document.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use super::sheet;
 use crate::bench::section::Section;
 use crate::out_file;
 
-/// Beside the document.
+/// The folder of pictures beside the document.
 const FOLDER: &str = "pictures";
 
 /// Finds out whether a section can be written, before what takes hours is measured for it.
@@ -33,7 +33,7 @@ fn section(name: &str) -> Section {
     Section { title: format!("quality of {name}"), command: "quality" }
 }
 
-/// A section's name, of which files are named too.
+/// A section's name. Its files are called by it too.
 pub(super) fn parse_name(text: &str) -> Result<String, String> {
     let is_plain = |c: char| c.is_alphanumeric() || " _.-".contains(c);
     if text.trim().is_empty() || text.contains("--") || !text.chars().all(is_plain) {

@@ -15,7 +15,7 @@ use crate::arguments::Reading;
 use crate::bench::drawing::{cells, draw, sum};
 use crate::light_source::Computed;
 
-/// Samples a probe of one of the second paper's updates.
+/// One of the second paper's updates takes so many samples a probe.
 pub(super) const UPDATE: u32 = 512;
 
 /// A field as it is measured.
@@ -23,7 +23,7 @@ pub(super) struct Field {
     name: String,
     light: Light,
     probes: usize,
-    /// Of so many samples a probe as an update has.
+    /// The time that an update of [`UPDATE`] samples a probe takes.
     update_seconds: f64,
 }
 
@@ -62,14 +62,14 @@ pub(super) struct Canvas<'a> {
 }
 
 impl Canvas<'_> {
-    /// Of direct light alone.
+    /// The errors of direct light alone.
     pub(super) fn direct(&mut self, judge: &Judge) -> Result<Errors> {
         let direct = draw(self.renderer, self.view, &self.settings, Lighting::DIRECT)?;
         Ok(Errors::of(&judge.compare(&sum(&direct, &judge.reference.indirect))?))
     }
 
-    /// Of a picture under a field. What only a first picture takes, its indirect part alone has taken
-    /// before the whole one is timed.
+    /// The row of a picture under a field. Its indirect part is drawn first, so that the time of the
+    /// whole picture holds nothing that only a first picture takes.
     pub(super) fn row(&mut self, field: &Field, judge: &Judge) -> Result<Row> {
         self.renderer.set_light(&field.light)?;
         let indirect = draw(self.renderer, self.view, &self.settings, Lighting::INDIRECT)?;

@@ -164,7 +164,7 @@ impl BenchQuality {
         Ok(())
     }
 
-    /// The light of every grid in every order.
+    /// The light of every grid in every order, and the first grid's with a bounce more.
     fn fields(&self, subject: &Subject<'_>, grids: &[VolumeSpec]) -> Result<Vec<Field>> {
         let mut fields = Vec::new();
         let below = self.picture.bounces.saturating_sub(1);

@@ -6,8 +6,8 @@ use std::fmt::Write;
 /// Pixels of the whole, and of the frame about the lines: left, top, right, bottom.
 const SIZE: (f64, f64) = (640.0, 400.0);
 const FRAME: [f64; 4] = [64.0, 96.0, 620.0, 344.0];
-/// Lines: colours that are told apart by eyes that do not see red or green too (Okabe and Ito 2008),
-/// on light and on dark ground, and marks that are told apart without colours.
+/// The lines' colours, which are told apart by eyes that do not see red or green too (Okabe and Ito 2008),
+/// on light and on dark ground, and their marks, which are told apart without colours.
 const LINES: [(&str, &str, Mark); 4] = [
     ("#0072b2", "#56b4e9", Mark::Circle),
     ("#d55e00", "#e69f00", Mark::Square),
@@ -22,16 +22,16 @@ pub(super) struct Plot {
     /// What the axes show, with units.
     pub(super) x: String,
     pub(super) y: String,
-    /// Whether the axis of y begins there.
+    /// Whether the axis of y begins at zero.
     pub(super) from_zero: bool,
     pub(super) series: Vec<Series>,
 }
 
-/// A line.
+/// One line of a plot.
 #[derive(Clone, Debug)]
 pub(super) struct Series {
     pub(super) name: String,
-    /// x, more than 0, and y.
+    /// Pairs of x, which is more than 0, and y.
     pub(super) points: Vec<(f64, f64)>,
 }
 
@@ -43,7 +43,7 @@ enum Mark {
 }
 
 impl Plot {
-    /// The picture.
+    /// The plot as an SVG file.
     pub(super) fn svg(&self) -> String {
         let axes = Axes::new(self);
         let mut svg = head();
@@ -158,7 +158,7 @@ fn push(svg: &mut String, what: std::fmt::Arguments<'_>) {
     let _ = svg.write_fmt(what);
 }
 
-/// The ground, and how all is drawn.
+/// The file's head: the ground, and the styles of all that is drawn.
 fn head() -> String {
     let (width, height) = SIZE;
     let colours = |dark: bool| -> String {
@@ -194,7 +194,7 @@ mod tests {
         Plot { title: "T".into(), x: "size".into(), y: "dB".into(), from_zero, series }
     }
 
-    /// Places of a line.
+    /// The places that a line goes through.
     fn line(svg: &str, style: usize) -> Vec<(f64, f64)> {
         let begin = svg.split(&format!("<polyline class=\"l{style}\" points=\"")).nth(1);
         let points = begin.and_then(|s| s.split('"').next()).expect("a line");
@@ -211,7 +211,7 @@ mod tests {
         let svg = plot(&[&ours, &[(64.0, 22.0), (512.0, f64::INFINITY)]], false).svg();
         let [left, top, right, bottom] = FRAME;
         let found = line(&svg, 0);
-        // From 20 to 30 by 2, and a third of the way for one doubling of three.
+        // The axes go from 20 to 30 by 2, and a third of the way for one doubling of three.
         assert_eq!([found[0].1, found[1].1, found[2].1], [bottom, 0.5 * (top + bottom), top]);
         let share = (found[1].0 - found[0].0) / (found[2].0 - found[0].0);
         assert!((share - 1.0 / 3.0).abs() < 1e-3, "{share}");

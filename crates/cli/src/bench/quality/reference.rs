@@ -22,23 +22,23 @@ pub(super) struct Reference {
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct Told {
     pub(super) samples: u32,
-    /// Of both parts together; nothing where it has no noise.
+    /// The noise of both parts together, dB; nothing where there is none.
     pub(super) noise_psnr: Option<f64>,
-    /// What a sample a pixel took, of both parts; nothing where one of them was there already.
+    /// The seconds that a sample a pixel took in both parts; nothing where one was there already.
     pub(super) sample_seconds: Option<f64>,
 }
 
 /// What pictures of one size are judged by.
 pub(super) struct Judge {
     pub(super) reference: Reference,
-    /// All of its light.
+    /// The picture of all the reference's light.
     pub(super) whole: Picture,
-    /// Of the camera, and so of its pictures of all sizes.
+    /// The camera's exposure, which its pictures of all sizes share.
     pub(super) exposure: f32,
 }
 
 impl Judge {
-    /// At the exposure given, or else the reference's own.
+    /// A judge at the exposure given, or else at the reference's own.
     pub(super) fn new(reference: Reference, exposure: Option<f32>) -> Self {
         let whole = sum(&reference.direct, &reference.indirect);
         let exposure = exposure.unwrap_or_else(|| lumencast_picture::exposure(&whole));
@@ -60,7 +60,7 @@ impl BenchQuality {
         size: UVec2,
         exposure: Option<f32>,
     ) -> Result<Reference> {
-        // Reads all of the scene's files.
+        // The key takes reading all of the scene's files.
         let key = self.keep.is_some().then(|| self.key(subject)).transpose()?;
         let (direct_film, for_direct) = self.trace(subject, size, key, Parts::Direct)?;
         let (indirect_film, for_indirect) = self.trace(subject, size, key, Parts::Indirect)?;
@@ -115,7 +115,7 @@ impl BenchQuality {
     }
 }
 
-/// Noise of two films' sum, each with its own.
+/// The noise of two films' sum, as a PSNR in dB; nothing where neither film has noise.
 fn noise_psnr(a: &Film, b: &Film, exposure: f32) -> Option<f64> {
     let psnr = |film: &Film| film.noise(exposure).map(|noise| noise.psnr);
     let error = |psnr: f64| 10f64.powf(-0.1 * psnr);

@@ -14,7 +14,7 @@ pub(super) struct Report {
     pub(super) adapter: String,
     pub(super) bounces: u32,
     pub(super) materials: String,
-    /// A pixel, of pictures under fields.
+    /// The samples a pixel of pictures under fields.
     pub(super) samples: u32,
     pub(super) probe_samples: u32,
     pub(super) baseline_frames: u32,
@@ -23,7 +23,7 @@ pub(super) struct Report {
     pub(super) resolutions: Vec<AtResolution>,
 }
 
-/// Of pictures of one size.
+/// What is measured of pictures of one size.
 #[derive(Serialize)]
 pub(super) struct Table {
     pub(super) width: u32,
@@ -34,19 +34,19 @@ pub(super) struct Table {
     pub(super) direct: Errors,
     pub(super) fields: Vec<Row>,
     pub(super) baseline: Vec<Row>,
-    /// The reference's.
+    /// The reference.
     #[serde(skip)]
     pub(super) picture: Picture,
 }
 
-/// Of square pictures.
+/// What is measured of square pictures of one size.
 #[derive(Serialize)]
 pub(super) struct AtResolution {
-    /// Pixels.
+    /// The pictures' side, pixels.
     pub(super) side: u32,
     pub(super) reference: Told,
     pub(super) field: Row,
-    /// Denoised.
+    /// The denoised picture's row, where there is a baseline.
     pub(super) baseline: Option<Row>,
 }
 
@@ -55,12 +55,12 @@ pub(super) struct AtResolution {
 pub(super) struct Row {
     pub(super) name: String,
     pub(super) whole: Errors,
-    /// With the reference's direct light.
+    /// The errors of indirect light, with the reference's direct light on both sides.
     pub(super) indirect: Option<Errors>,
     pub(super) probes: Option<usize>,
-    /// Of an update of the field, or of a path a pixel.
+    /// The time of an update of the field, or of a path a pixel.
     pub(super) light_seconds: f64,
-    /// Of drawing, or of denoising.
+    /// The time of drawing, or of denoising.
     pub(super) picture_seconds: f64,
     #[serde(skip)]
     pub(super) picture: Picture,
@@ -85,7 +85,7 @@ impl Errors {
 }
 
 impl Row {
-    /// Of a picture without probes, and what its light and the picture itself took.
+    /// The row of a picture without probes; its light and the picture itself took these seconds.
     pub(super) fn new(
         name: String,
         [light_seconds, picture_seconds]: [f64; 2],
@@ -104,7 +104,7 @@ impl Row {
         }
     }
 
-    /// Of light and picture.
+    /// The time that light and picture take together.
     pub(super) fn frame_seconds(&self) -> f64 {
         self.light_seconds + self.picture_seconds
     }

@@ -6,10 +6,10 @@ use lumencast_picture::{Loaded, Picture, ToneMap};
 
 use super::report::Row;
 
-/// The widest that one of them is shown, pixels.
+/// A picture on the sheet is so many pixels wide at most.
 const WIDEST: u32 = 640;
 
-/// Linear colour, to be shown by the curve of sRGB.
+/// The sheet in linear colour, to be shown by the curve of sRGB.
 pub(super) fn of(reference: &Picture, rows: &[&Row], exposure: f32) -> Picture {
     let as_judged =
         |picture: &Picture| smaller(&picture.map(|p| ToneMap::Gamma.encode(p * exposure)));
@@ -28,8 +28,8 @@ pub(super) fn of(reference: &Picture, rows: &[&Row], exposure: f32) -> Picture {
     Loaded::Coded(codes).linear()
 }
 
-/// Averaged over squares of pixels, as few as make it narrow enough; what is left over at the right and
-/// below is cut off.
+/// The picture averaged over squares of pixels, as small as make it narrow enough. What is left over at
+/// the right and below is cut off.
 fn smaller(picture: &Picture) -> Picture {
     let side = picture.width().div_ceil(WIDEST).min(picture.height());
     let mean = |x: u32, y: u32| {

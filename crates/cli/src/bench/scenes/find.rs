@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use lumencast_scene::BUILTINS;
 
-/// The scenes that are named, and those in the folders that are: by name, those of folders within
-/// included. The built-in ones where none are.
+/// The scenes that are named, and those in the folders that are, in the order of their names; folders
+/// within folders count. The built-in scenes where nothing is named.
 pub(super) fn scenes(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     if named.is_empty() {
         return Ok(BUILTINS.iter().map(PathBuf::from).collect());

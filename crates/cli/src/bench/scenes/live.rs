@@ -1,4 +1,4 @@
-//! The same scene's light as a server casts it, some seconds after it began.
+//! A scene's light as a server casts it, some seconds after the server began.
 
 use anyhow::Result;
 use lumencast_codec::{Catalog, EncodedRegion, Epoch};
@@ -27,7 +27,7 @@ pub(super) fn light(
     Ok(tick.light().fields().to_vec())
 }
 
-/// Takes nothing.
+/// An outlet that takes nothing.
 struct Nobody;
 
 impl Outlet for Nobody {

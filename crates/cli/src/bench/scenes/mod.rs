@@ -33,13 +33,13 @@ use report::{Beside, Report, Row};
 
 /// Bounces of the reference; probes have one fewer.
 const BOUNCES: u32 = 4;
-/// By how much the reference's noise lies below the error that it tells, dB.
+/// The reference's noise lies so far below the error that it tells, dB.
 const BELOW: f64 = 6.0;
 /// The sky that scenes without light stand under, lux.
 const SKY: f32 = 1000.0;
-/// So many times the samples of one that is not live has light that counts as converged.
+/// Light counts as converged at so many times the samples of light that is computed once.
 const LIVE_CONVERGED: u32 = 4;
-/// Samples a pixel that a reference begins with.
+/// A reference begins with so many samples a pixel.
 const FIRST_SPP: u32 = 64;
 
 /// Measures the indirect light of scenes at default settings, beside the path tracer's.
@@ -105,7 +105,7 @@ struct Subject {
     scene: Scene,
     snapshot: Arc<Snapshot>,
     view: View,
-    /// Nothing where it is the reference's.
+    /// The exposure to judge at; nothing where the reference tells it.
     exposure: Option<f32>,
     under_sky: bool,
 }
@@ -251,7 +251,7 @@ fn computed(reading: Reading, effort: Effort) -> Computed {
     }
 }
 
-/// Its indirect part.
+/// The indirect part of a picture under these fields.
 fn draw_light(
     renderer: &mut Renderer,
     fields: Vec<Field>,

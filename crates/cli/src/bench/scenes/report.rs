@@ -13,7 +13,7 @@ pub(super) struct Report {
     pub(super) rows: Vec<Row>,
 }
 
-/// Of a scene.
+/// What is measured of a scene.
 #[derive(Serialize)]
 pub(super) struct Row {
     pub(super) scene: String,
@@ -21,18 +21,18 @@ pub(super) struct Row {
     pub(super) under_sky: bool,
     pub(super) grids: Vec<String>,
     pub(super) probes: usize,
-    /// Of a probe.
+    /// The samples of a probe.
     pub(super) samples: u32,
-    /// Of the field, codes of 0 to 255.
+    /// The field's noise, codes of 0 to 255.
     pub(super) noise: Option<f32>,
     pub(super) exposure: f32,
-    /// Of the indirect part.
+    /// The PSNR of the picture's indirect part.
     pub(super) psnr: Psnr,
-    /// The same of the same scene's light, computed in other ways.
+    /// The same scene's light, computed in other ways.
     pub(super) beside: Vec<Beside>,
-    /// After the filter, dB.
+    /// The reference's noise after the filter, as a PSNR in dB.
     pub(super) reference_noise: f64,
-    /// A pixel.
+    /// The reference's samples a pixel.
     pub(super) reference_samples: u32,
 }
 
@@ -63,7 +63,7 @@ impl Report {
 }
 
 impl Row {
-    /// Of the table.
+    /// The row as a line of the table.
     pub(super) fn line(&self) -> String {
         let star = if self.under_sky { "*" } else { "" };
         let noise = self.noise.map_or("off".into(), |noise| format!("{noise:.2}"));
