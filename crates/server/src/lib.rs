@@ -11,6 +11,7 @@ mod contents;
 mod edits;
 mod error;
 mod files;
+mod gathering;
 mod http;
 mod inbox;
 mod loader;

@@ -83,6 +83,14 @@ impl Budget {
         self.samples
     }
 
+    /// Takes note of a tick whose jobs were not done in time, which counts as late: there will be fewer
+    /// samples, and what they cost stays unknown.
+    pub fn overrun(&mut self) -> bool {
+        let samples = (f64::from(self.samples) * Self::CUT) as u32;
+        self.samples = samples.clamp(self.range.min, self.range.max);
+        true
+    }
+
     /// Goes back to the fewest samples, while nobody watches.
     pub fn rest(&mut self) {
         self.samples = self.range.min;

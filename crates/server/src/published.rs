@@ -21,8 +21,8 @@ pub(crate) struct Published {
     encoder: FieldEncoder,
     /// Number of the next update.
     update: u64,
-    /// The moment that its light shows; none before there is any.
-    pub(crate) shown: Option<Moment>,
+    /// The moment of light that is not yet encoded.
+    news: Option<Moment>,
     /// How many of its jobs have failed.
     failures: u64,
 }
@@ -30,7 +30,7 @@ pub(crate) struct Published {
 impl Published {
     pub(crate) fn new(field: &Field) -> Self {
         let encoder = FieldEncoder::new(field);
-        Self { id: field.id(), encoder, update: 0, shown: None, failures: 0 }
+        Self { id: field.id(), encoder, update: 0, news: None, failures: 0 }
     }
 
     /// The solver's fields, in its order; those that were there before go on.
@@ -53,13 +53,18 @@ impl Published {
         self.encoder.scale_log2()
     }
 
-    /// The frames of the regions that somebody watches; none before there is any light.
+    /// The field's light shows this moment from now on.
+    pub(crate) fn show(&mut self, moment: Moment) {
+        self.news = Some(moment);
+    }
+
+    /// The frames of the regions that somebody watches; none where there is no new light.
     pub(crate) fn encode(
         &mut self,
         field: &Field,
         watched: impl Fn(u32) -> bool,
     ) -> Vec<EncodedRegion> {
-        let Some(Moment { tick, time, version }) = self.shown else { return Vec::new() };
+        let Some(Moment { tick, time, version }) = self.news.take() else { return Vec::new() };
         let info = UpdateInfo { update: self.update, tick, time, scene_version: version };
         self.update += 1;
         self.encoder.encode(field, info, watched)

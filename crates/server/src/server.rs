@@ -24,6 +24,8 @@ use crate::page;
 use crate::publish::Publisher;
 use crate::tick::{Tick, TickOptions};
 
+/// How long a tick waits for its light: longer than ticks take that are a little late.
+const PATIENCE: Duration = Duration::from_millis(200);
 /// How long sessions may take to end when the server stops.
 const GRACE: Duration = Duration::from_secs(2);
 
@@ -202,7 +204,7 @@ impl Ticking {
             .unwrap_or_else(PoisonError::into_inner)
             .take_ready(now, |edit| loader.is_ready(tick, edit));
         shared.tick.store(tick.number(), Ordering::Relaxed);
-        let report = tick.step(now, mail, publisher);
+        let report = tick.step_within(now, mail, publisher, PATIENCE);
         // With the log's time, from which pages measure the way to them.
         tracing::debug!(tick = report.tick, late = report.late, "tick published");
         if report.files_changed {

@@ -2,18 +2,19 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use lumencast_codec::{
     AcceptedEdit, Catalog, EncodedRegion, Epoch, FieldInfo, RefusedEdit, SceneInfo, SceneState,
     StateFrame, check_volumes, limits,
 };
-use lumencast_gather::{Gather, Gathered, Ticket};
-use lumencast_light::Light;
+use lumencast_gather::Gather;
+use lumencast_light::{FieldId, Light};
 use lumencast_scene::{Edit, FileRead, Scene, Script, Snapshot, VolumeSpec};
-use lumencast_solve::{Asked, FitEffort, GatherOptions, Request, Solver, volumes};
+use lumencast_solve::{FitEffort, GatherOptions, Solver, volumes};
 
 use crate::error::ServerError;
+use crate::gathering::{Brought, Gathering, Patience};
 use crate::inbox::{Mail, Received, refusal};
 use crate::pace::{Budget, SampleRange};
 use crate::publish::Outlet;
@@ -76,7 +77,7 @@ const LONGEST_STEP: f64 = 0.5;
 /// A scene with its light, stepped by hand; it has no socket, no thread and no clock of its own.
 pub struct Tick {
     scene: Scene,
-    gatherer: Box<dyn Gather>,
+    gathering: Gathering,
     solver: Solver,
     /// The solver's fields, in its order.
     published: Vec<Published>,
@@ -127,7 +128,7 @@ impl Tick {
         let last = Report::default();
         Ok(Self {
             scene,
-            gatherer,
+            gathering: Gathering::new(gatherer),
             solver,
             published,
             options,
@@ -187,6 +188,7 @@ impl Tick {
         check_volumes(volumes)?;
         self.solver.set_volumes(volumes)?;
         self.published = Published::all(&self.solver, std::mem::take(&mut self.published));
+        self.gathering.keep(|id| self.solver.ids().any(|there| there == id));
         self.fields_are_news = true;
         Ok(())
     }
@@ -209,6 +211,29 @@ impl Tick {
     /// One tick at `now` seconds of the caller's clock, which must not run backwards. Everything
     /// that depends on it is the scene's time, so equal calls give equal light.
     pub fn step(&mut self, now: f64, mail: Mail, outlet: &mut dyn Outlet) -> Report {
+        self.step_with(now, mail, outlet, Patience::Endless)
+    }
+
+    /// The same, but waits for light only so long. Jobs that take longer go on beside the ticks that
+    /// follow, and the tick that finds them done takes them in. So edits and the scene's state do not
+    /// wait while trees of a large model are built.
+    pub fn step_within(
+        &mut self,
+        now: f64,
+        mail: Mail,
+        outlet: &mut dyn Outlet,
+        patience: Duration,
+    ) -> Report {
+        self.step_with(now, mail, outlet, Patience::Until(Instant::now() + patience))
+    }
+
+    fn step_with(
+        &mut self,
+        now: f64,
+        mail: Mail,
+        outlet: &mut dyn Outlet,
+        patience: Patience,
+    ) -> Report {
         let began = Instant::now();
         let mut watch = Stopwatch::start();
         let mut report = Report { tick: self.number, ..Report::default() };
@@ -229,14 +254,15 @@ impl Tick {
         outlet.state(state, is_snapshot);
         report.seconds[Stage::Publish as usize] = watch.lap();
 
-        let brought = self.gather(&scene);
-        let build_seconds = brought.iter().filter_map(Brought::build_seconds);
+        let brought = self.gather(&scene, patience);
+        let gathered = || brought.iter().filter_map(|brought| brought.gathered.as_ref());
+        let build_seconds = gathered().map(|gathered| gathered.build_seconds);
         let build = build_seconds.fold(0.0, f64::max);
         let gathering = watch.lap();
         report.seconds[Stage::Accelerate as usize] = build.min(gathering);
         report.seconds[Stage::Gather as usize] = gathering - build.min(gathering);
 
-        self.blend(&scene, &brought);
+        self.blend(&brought);
         report.seconds[Stage::Blend as usize] = watch.lap();
 
         if std::mem::take(&mut self.fields_are_news) {
@@ -254,7 +280,7 @@ impl Tick {
         }
         report.seconds[Stage::Publish as usize] += watch.lap();
 
-        report.rays = brought.iter().filter_map(|b| b.gathered.as_ref()).map(|g| g.rays).sum();
+        report.rays = gathered().map(|gathered| gathered.rays).sum();
         report.accepted = edits.accepted.len() as u64;
         report.refused = edits.refused.len() as u64;
         // Clients ask for files then that they did not need before.
@@ -324,44 +350,75 @@ impl Tick {
     }
 
     /// Sums for every field, all fields' jobs under way at once.
-    fn gather(&mut self, scene: &Arc<Snapshot>) -> Vec<Brought> {
-        for Brought { asked, gathered } in self.wait(self.solver.looks(scene)) {
-            match gathered {
-                Some(found) => self.solver.take(&asked, &found),
-                None => self.published[asked.field]
-                    .note_failure("its surfaces are those of an earlier moment"),
+    fn gather(&mut self, scene: &Arc<Snapshot>, patience: Patience) -> Vec<Brought> {
+        let moment = Moment { tick: self.number, time: scene.time, version: scene.version };
+        let earlier = self.gathering.poll();
+        let mut light = self.found(earlier);
+        for id in self.idle() {
+            if let Some(look) = self.solver.look(id, scene) {
+                self.gathering.submit(look, moment);
             }
         }
+        let looked = self.gathering.wait(self.number, patience);
+        light.extend(self.found(looked));
+
         let previous = self.options.feedback.then(|| Arc::new(self.light().clone()));
         let (samples, pass) = (self.budget.samples(), self.number);
-        let requests = self.solver.jobs(scene, previous, samples, pass).collect();
-        self.wait(requests)
+        for id in self.idle() {
+            if let Some(job) = self.solver.job(id, scene, previous.clone(), samples, pass) {
+                self.gathering.submit(job, moment);
+            }
+        }
+        let brought = self.gathering.wait(self.number, patience);
+        light.extend(self.found(brought));
+        light
     }
 
-    /// Submits all requests and waits for what they bring.
-    fn wait(&mut self, requests: Vec<Request>) -> Vec<Brought> {
-        let submit = |Request { job, asked }| (self.gatherer.submit(job), asked);
-        let tickets: Vec<(Ticket, Asked)> = requests.into_iter().map(submit).collect();
-        let bring = |(ticket, asked)| Brought { asked, gathered: self.gatherer.wait(ticket) };
-        tickets.into_iter().map(bring).collect()
+    /// The fields for which no job is under way.
+    fn idle(&self) -> Vec<FieldId> {
+        self.solver.ids().filter(|id| !self.gathering.is_at(*id)).collect()
+    }
+
+    /// Lets fields know where surfaces are, and returns what brought light.
+    fn found(&mut self, brought: Vec<Brought>) -> Vec<Brought> {
+        let (light, looks): (Vec<_>, Vec<_>) =
+            brought.into_iter().partition(|brought| brought.asked.is_light());
+        for Brought { asked, gathered, .. } in looks {
+            match gathered {
+                Some(found) => self.solver.take(&asked, &found),
+                None => {
+                    self.note_failure(asked.field, "its surfaces are those of an earlier moment")
+                }
+            }
+        }
+        light
+    }
+
+    fn note_failure(&mut self, field: FieldId, outcome: &str) {
+        if let Some(published) = self.published.iter_mut().find(|known| known.id == field) {
+            published.note_failure(outcome);
+        }
     }
 
     /// Takes in what was gathered; a field whose job has failed keeps its light.
-    fn blend(&mut self, scene: &Snapshot, brought: &[Brought]) {
-        for Brought { asked, gathered } in brought {
-            let published = &mut self.published[asked.field];
+    fn blend(&mut self, brought: &[Brought]) {
+        for Brought { asked, moment, gathered } in brought {
             let Some(gathered) = gathered else {
-                published.note_failure("it keeps its light");
+                self.note_failure(asked.field, "it keeps its light");
                 continue;
             };
             self.solver.take(asked, gathered);
-            let (tick, time, version) = (self.number, scene.time, scene.version);
-            published.shown = Some(Moment { tick, time, version });
+            if let Some(published) = self.published.iter_mut().find(|known| known.id == asked.field)
+            {
+                published.show(*moment);
+            }
         }
-        self.solver.solve(FIT_EFFORT);
+        if !brought.is_empty() {
+            self.solver.solve(FIT_EFFORT);
+        }
     }
 
-    /// Frames of every field that has light, for the regions that somebody watches.
+    /// Frames of every field that has new light, for the regions that somebody watches.
     fn encode(&mut self, outlet: &dyn Outlet) -> Vec<(u32, EncodedRegion)> {
         let mut frames = Vec::new();
         for published in &mut self.published {
@@ -410,7 +467,12 @@ impl Tick {
         report.samples = probes as u64 * u64::from(report.samples_a_probe);
         report.probes = probes as u64;
         report.buried = self.solver.buried_count() as u64;
-        report.late = self.budget.record(report.stage(Stage::Gather), report.total_seconds());
+        let (gather, total) = (report.stage(Stage::Gather), report.total_seconds());
+        report.late = if self.gathering.is_busy() {
+            self.budget.overrun()
+        } else {
+            self.budget.record(gather, total)
+        };
         if report.late {
             tracing::debug!(tick = self.number, seconds = report.total_seconds(), "late");
         }
@@ -420,18 +482,6 @@ impl Tick {
         self.number += 1;
         self.last = report.clone();
         report
-    }
-}
-
-/// What became of a request; nothing was gathered where its job has failed.
-struct Brought {
-    asked: Asked,
-    gathered: Option<Gathered>,
-}
-
-impl Brought {
-    fn build_seconds(&self) -> Option<f64> {
-        self.gathered.as_ref().map(|gathered| gathered.build_seconds)
     }
 }
 

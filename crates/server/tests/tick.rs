@@ -1,6 +1,7 @@
 //! The tick, stepped by hand: no network, no clock but the test's own.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -500,6 +501,65 @@ fn a_late_tick_takes_fewer_samples_next_time() {
     assert_eq!(stepped.kept.states.last().map(|s| s.samples), Some(20.0), "of the last tick");
     stepped.steps(1);
     assert_eq!(stepped.kept.states.last().map(|s| s.samples), Some(next.samples_a_probe.into()));
+}
+
+/// A gatherer whose jobs are done only while nobody holds them.
+struct Held {
+    inner: CpuPathTracer,
+    hold: Arc<AtomicBool>,
+    submitted: Arc<AtomicU64>,
+}
+
+impl Gather for Held {
+    fn submit(&mut self, job: Job) -> Ticket {
+        self.submitted.fetch_add(1, Ordering::Relaxed);
+        self.inner.submit(job)
+    }
+
+    fn poll(&mut self, ticket: Ticket) -> Progress {
+        match self.hold.load(Ordering::Relaxed) {
+            true => Progress::Working(0.5),
+            false => self.inner.poll(ticket),
+        }
+    }
+
+    fn wait(&mut self, ticket: Ticket) -> Option<Gathered> {
+        self.inner.wait(ticket)
+    }
+
+    fn cancel(&mut self, ticket: Ticket) {
+        self.inner.cancel(ticket);
+    }
+}
+
+/// A job that takes longer than a tick goes on beside those that follow, which edit the scene and tell of
+/// it all the same.
+#[test]
+fn ticks_go_on_while_a_job_takes_long() {
+    let (hold, submitted) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicU64::new(0)));
+    let inner = CpuPathTracer::new(Options::default()).expect("threads");
+    let held = Held { inner, hold: hold.clone(), submitted: submitted.clone() };
+    let mut stepped = Stepped::with(options(), Box::new(held));
+    let lamp = stepped.node("lamp");
+    let mut step = |mail, patience| {
+        stepped.now += PERIOD;
+        stepped.tick.step_within(stepped.now, mail, &mut stepped.kept, patience)
+    };
+    for seq in 1..=3 {
+        let report = step(mail(seq, dim(lamp, 100.0)), Duration::ZERO);
+        assert_eq!((report.accepted, report.rays), (1, 0));
+        assert!(report.late, "its light is missing");
+    }
+    assert_eq!(submitted.load(Ordering::Relaxed), 1, "one job a field at a time");
+
+    hold.store(false, Ordering::Relaxed);
+    while step(Mail::default(), Duration::from_secs(60)).rays == 0 {
+        std::thread::yield_now();
+    }
+    let Kept { states, frames, .. } = &stepped.kept;
+    assert!(states.len() > 3 && (0..).zip(states).all(|(tick, state)| state.tick == tick));
+    let shown = ProbeHeader::read(&frames.last().expect("light").1.bytes).unwrap().info;
+    assert_eq!(shown.update, 0, "there was no light before");
 }
 
 /// Volumes come and go while ticks go on: clients are told in the next catalog, what stays keeps its

@@ -28,10 +28,13 @@ fn solver(fit: Option<FitOptions>) -> (Solver, Vec<(Asked, lumencast_gather::Gat
         };
         requests.into_iter().map(wait).collect()
     };
-    for (asked, found) in gather(solver.looks(&snapshot)) {
+    let ids: Vec<_> = solver.ids().collect();
+    let looks = ids.iter().filter_map(|id| solver.look(*id, &snapshot)).collect();
+    for (asked, found) in gather(looks) {
         solver.take(&asked, &found);
     }
-    let brought = gather(solver.jobs(&snapshot, None, SAMPLES, 0).collect());
+    let jobs = ids.iter().filter_map(|id| solver.job(*id, &snapshot, None, SAMPLES, 0)).collect();
+    let brought = gather(jobs);
     (solver, brought)
 }
 

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use lumencast_gather::Gather;
-use lumencast_light::Field;
+use lumencast_light::{Field, FieldId};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::blend::BlendSettings;
@@ -87,7 +87,10 @@ pub fn bake(
 ) -> Result<Baked, SolveError> {
     let mean = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
     let mut all = Solver::new(volumes, GatherOptions { blend: mean, ..options })?;
-    for Request { job, asked } in all.looks(scene) {
+    let ids: Vec<FieldId> = all.ids().collect();
+    for Request { job, asked } in
+        ids.iter().filter_map(|id| all.look(*id, scene)).collect::<Vec<_>>()
+    {
         let ticket = gatherer.submit(job);
         all.take(&asked, &gatherer.wait(ticket).ok_or(SolveError::Gather)?);
     }
@@ -99,8 +102,10 @@ pub fn bake(
     let mut until = effort.noise.map_or(most, |_| most.min(FIRST_LOOK * SAMPLES_A_PASS));
     while samples < most {
         let now = SAMPLES_A_PASS.min(most - samples);
-        let requests: Vec<Request> = all.jobs(scene, None, now, pass).collect();
-        for Request { job, asked } in requests {
+        for id in &ids {
+            let Some(Request { job, asked }) = all.job(*id, scene, None, now, pass) else {
+                continue;
+            };
             let ticket = gatherer.submit(job);
             let gathered = gatherer.wait(ticket).ok_or(SolveError::Gather)?;
             all.take(&asked, &gathered);

@@ -1,6 +1,6 @@
 //! Fields while they are computed: what stands between sums of arriving light and what is published.
 //!
-//! A [`Solver`] keeps the fields of a scene. It says what to gather ([`Solver::jobs`]), takes in the
+//! A [`Solver`] keeps the fields of a scene. It says what to gather ([`Solver::job`]), takes in the
 //! sums that a gatherer brings ([`Solver::take`]), and makes light of them ([`Solver::solve`]). It owns
 //! no gatherer and no clock: [`bake`] steps it until the light has converged, a server tick by tick.
 //!

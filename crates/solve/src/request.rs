@@ -1,6 +1,7 @@
 //! What a solver asks a gatherer for.
 
 use lumencast_gather::{Budget, Job};
+use lumencast_light::FieldId;
 
 /// A job for a gatherer. Its sums go back to the solver with what was asked.
 #[derive(Clone, Debug)]
@@ -14,8 +15,8 @@ pub struct Request {
 /// What sums belong to.
 #[derive(Clone, Debug)]
 pub struct Asked {
-    /// The field's place in the order of the solver's fields.
-    pub field: usize,
+    /// The field.
+    pub field: FieldId,
     pub(crate) what: What,
 }
 
@@ -25,4 +26,11 @@ pub(crate) enum What {
     Surfaces,
     /// Light at receivers.
     Light { budgets: Vec<Budget> },
+}
+
+impl Asked {
+    /// Whether light comes of it: otherwise only where surfaces are.
+    pub fn is_light(&self) -> bool {
+        matches!(self.what, What::Light { .. })
+    }
 }

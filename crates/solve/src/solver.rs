@@ -110,39 +110,37 @@ impl Solver {
         self.volumes().map(VolumeSolver::buried_count).sum()
     }
 
-    /// What to ask for before [`Self::jobs`], so that fields that want to know where surfaces are know
+    /// What to ask for before [`Self::job`], so that a field that wants to know where surfaces are knows
     /// those of this scene.
-    pub fn looks(&self, scene: &Arc<Snapshot>) -> Vec<Request> {
-        let look = |(field, volume): (usize, &VolumeSolver)| {
-            let job = volume.look(scene)?;
-            Some(Request { job, asked: Asked { field, what: What::Surfaces } })
-        };
-        self.volumes().enumerate().filter_map(look).collect()
+    pub fn look(&self, field: FieldId, scene: &Arc<Snapshot>) -> Option<Request> {
+        let job = self.volume(field)?.look(scene)?;
+        Some(Request { job, asked: Asked { field, what: What::Surfaces } })
     }
 
-    /// What to gather for each field, `samples` a probe. `pass` gives other directions each time.
-    pub fn jobs<'a>(
-        &'a mut self,
-        scene: &'a Arc<Snapshot>,
+    /// What to gather for a field, `samples` a probe; nothing where there is none of this number. `pass`
+    /// gives other directions each time.
+    pub fn job(
+        &mut self,
+        field: FieldId,
+        scene: &Arc<Snapshot>,
         previous: Option<Arc<Light>>,
         samples: u32,
         pass: u64,
-    ) -> impl Iterator<Item = Request> + 'a {
-        let options = &self.options;
-        self.fields.iter_mut().enumerate().map(move |(field, FieldSolver::Volume(volume))| {
-            let seed = pass << 8 | u64::from(volume.id().0);
-            let job = volume.job(scene.clone(), previous.clone(), samples, options, seed);
-            let what = What::Light { budgets: job.budgets.clone() };
-            Request { job, asked: Asked { field, what } }
-        })
+    ) -> Option<Request> {
+        let options = self.options;
+        let seed = pass << 8 | u64::from(field.0);
+        let volume = self.volume_mut(field)?;
+        let job = volume.job(scene.clone(), previous, samples, &options, seed);
+        let what = What::Light { budgets: job.budgets.clone() };
+        Some(Request { job, asked: Asked { field, what } })
     }
 
-    /// Takes in what was gathered.
+    /// Takes in what was gathered; nothing where the field is gone.
     ///
     /// # Panics
     /// If the sums are those of another request.
     pub fn take(&mut self, asked: &Asked, gathered: &Gathered) {
-        let FieldSolver::Volume(volume) = &mut self.fields[asked.field];
+        let Some(volume) = self.volume_mut(asked.field) else { return };
         match &asked.what {
             What::Surfaces => volume.found(gathered),
             What::Light { budgets } => volume.blend(gathered, budgets),
@@ -185,6 +183,14 @@ impl Solver {
     /// Where light matters: see [`VolumeSolver::places`].
     pub(crate) fn places(&self) -> Vec<(Vec3, Vec3)> {
         self.volumes().flat_map(VolumeSolver::places).collect()
+    }
+
+    fn volume(&self, id: FieldId) -> Option<&VolumeSolver> {
+        self.volumes().find(|volume| volume.id() == id)
+    }
+
+    fn volume_mut(&mut self, id: FieldId) -> Option<&mut VolumeSolver> {
+        self.volumes_mut().find(|volume| volume.id() == id)
     }
 
     fn volumes(&self) -> impl ExactSizeIterator<Item = &VolumeSolver> {
