@@ -2,11 +2,10 @@
 //! once a moment of the scene.
 
 use glam::{Vec3, Vec4};
+use lumencast_gpu::{Gpu, bindings};
 use lumencast_scene::{Aabb, Deformation, MorphTarget, Pose, Primitive};
 use lumencast_shaders::{deform, layout};
 
-use crate::bindings;
-use crate::gpu::Gpu;
 use crate::part::{Part, SHAPE_SIZE};
 
 /// Vertices of a workgroup.
@@ -33,7 +32,7 @@ impl Deformable {
     pub(crate) fn new(gpu: &Gpu, primitive: &Primitive) -> Option<Self> {
         let vertices = primitive.vertices.positions.len();
         let floats = vertices * primitive.morph_targets.len() * DISPLACEMENT;
-        let limits = gpu.device.limits();
+        let limits = gpu.device().limits();
         let shapes = (vertices * SHAPE_SIZE) as u64;
         let sets = primitive.influence_sets().max(1);
         let influences = (vertices * sets * size_of::<layout::Influence>()) as u64;
@@ -93,7 +92,8 @@ impl Deformer {
     pub(crate) fn new(gpu: &Gpu) -> Self {
         use bindings::{STORAGE, UNIFORM, WRITTEN};
         let types = [UNIFORM, STORAGE, STORAGE, STORAGE, STORAGE, STORAGE, WRITTEN];
-        let (layout, pipeline) = gpu.compute("deform", deform(), "deform_vertices", &types);
+        let layout = gpu.group_layout("deform", wgpu::ShaderStages::COMPUTE, &types);
+        let pipeline = gpu.compute("deform", deform(), "deform_vertices", &[&layout]);
         Self { layout, pipeline }
     }
 
@@ -129,16 +129,8 @@ impl Deformer {
             &cause.pose,
             &deformed.shape,
         ];
-        let entries = (0..).zip(buffers).map(|(binding, buffer)| wgpu::BindGroupEntry {
-            binding,
-            resource: buffer.as_entire_binding(),
-        });
-        let entries: Vec<_> = entries.collect();
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("deform"),
-            layout: &self.layout,
-            entries: &entries,
-        });
+        let resources = buffers.map(wgpu::Buffer::as_entire_binding);
+        let group = gpu.group("deform", &self.layout, &resources);
         let groups = deformable.vertices.div_ceil(GROUP);
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &group, &[]);
@@ -252,7 +244,7 @@ mod tests {
 
     use super::*;
     use crate::geometry::Geometry;
-    use crate::readback::Readback;
+    use lumencast_gpu::Readback;
 
     /// −1 to 1, the same every time.
     fn random(seed: u32) -> f32 {
@@ -369,14 +361,14 @@ mod tests {
         let (rest, deformable) =
             geometry.deforming(gpu, deformation.mesh()).nth(primitive).expect("a primitive");
         let mut part = rest.to_deform(gpu);
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut encoder = gpu.device().create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());
         let deformable = deformable.expect("room for it");
         deformer.deform(gpu, &mut pass, deformable, (deformation, &cause), rest, &mut part);
         drop(pass);
         let read = Readback::buffer(gpu, "vertices", part.shape.size());
         encoder.copy_buffer_to_buffer(&part.shape, 0, &read, 0, part.shape.size());
-        gpu.queue.submit([encoder.finish()]);
+        gpu.queue().submit([encoder.finish()]);
         let read = Readback::begin(read).wait(gpu, "deforming").expect("vertices");
         (bytemuck::cast_slice(&read).to_vec(), part.bounds)
     }

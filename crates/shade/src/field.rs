@@ -5,12 +5,13 @@
 //! probes, so that filtering never reaches a neighbour.
 
 use glam::{Affine3A, Mat3, UVec3, Vec3};
+use lumencast_gpu::Gpu;
+use lumencast_gpu::bindings::{self, FILTERED, SAMPLER, STORAGE, UNIFORM};
+use lumencast_gpu::textures;
 use lumencast_light::{Atlas, Grid, Light, ProbeVolume, ScaleRule, atlas_size, texels};
 use lumencast_shaders::layout;
 
 use crate::ShadeError;
-use crate::bindings::{self, FILTERED, SAMPLER, STORAGE, UNIFORM, entry};
-use crate::gpu::Gpu;
 
 /// Group 2 of the shaders.
 #[derive(Debug)]
@@ -30,23 +31,17 @@ pub(crate) struct GpuField {
 }
 
 /// The bindings of group 2.
-fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("field"),
-        entries: &[
-            entry(0, UNIFORM),
-            entry(1, STORAGE),
-            entry(2, bindings::texture(FILTERED, wgpu::TextureViewDimension::D3)),
-            entry(3, SAMPLER),
-        ],
-    })
+fn group_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
+    let atlas = bindings::texture(FILTERED, wgpu::TextureViewDimension::D3);
+    let types = [UNIFORM, STORAGE, atlas, SAMPLER];
+    gpu.group_layout("field", wgpu::ShaderStages::FRAGMENT, &types)
 }
 
 impl GpuField {
     /// No light.
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let layout = group_layout(&gpu.device);
-        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+        let layout = group_layout(gpu);
+        let sampler = gpu.device().create_sampler(&wgpu::SamplerDescriptor {
             label: Some("field"),
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
@@ -90,7 +85,7 @@ impl GpuField {
         let sizes: Vec<UVec3> =
             volumes.iter().map(|v| atlas_size(v.grid.resolution, v.order)).collect();
         if sizes != self.sizes {
-            let limit = gpu.device.limits().max_texture_dimension_3d;
+            let limit = gpu.device().limits().max_texture_dimension_3d;
             let (size, origins) = arrange(&sizes, limit)
                 .ok_or(ShadeError::Field { volumes: volumes.len(), limit })?;
             self.atlas = texture(gpu, size);
@@ -149,35 +144,19 @@ fn of_volume(volume: &ProbeVolume, origin: UVec3, scale_log2: i8) -> layout::Vol
     }
 }
 
-fn extent(size: UVec3) -> wgpu::Extent3d {
-    wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: size.z }
-}
-
 fn texture(gpu: &Gpu, size: UVec3) -> wgpu::Texture {
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+    gpu.device().create_texture(&wgpu::TextureDescriptor {
         label: Some("field"),
-        size: extent(size),
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D3,
-        format: wgpu::TextureFormat::Rgba16Float,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
+        ..textures::volume(size, wgpu::TextureFormat::Rgba16Float, usage)
     })
 }
 
 fn write(gpu: &Gpu, atlas: &wgpu::Texture, origin: UVec3, packed: &Atlas) {
     let UVec3 { x, y, z } = origin;
-    gpu.queue.write_texture(
-        wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x, y, z }, ..atlas.as_image_copy() },
-        bytemuck::cast_slice(&packed.halves),
-        wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(8 * packed.size.x),
-            rows_per_image: Some(packed.size.y),
-        },
-        extent(packed.size),
-    );
+    let origin = wgpu::Origin3d { x, y, z };
+    let to = wgpu::TexelCopyTextureInfo { origin, ..atlas.as_image_copy() };
+    gpu.write_texels(to, bytemuck::cast_slice(&packed.halves), textures::volume_size(packed.size));
 }
 
 fn group(
@@ -192,18 +171,13 @@ fn group(
     let least = size_of::<layout::Volume>() as u64;
     let storage = wgpu::BufferUsages::STORAGE;
     let list = gpu.buffer("volumes", storage, bytemuck::cast_slice(volumes), least);
-    let view = atlas.create_view(&wgpu::TextureViewDescriptor::default());
-    let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("field"),
-        layout,
-        entries: &[
-            entry(0, uniform.as_entire_binding()),
-            entry(1, list.as_entire_binding()),
-            entry(2, wgpu::BindingResource::TextureView(&view)),
-            entry(3, wgpu::BindingResource::Sampler(sampler)),
-        ],
-    })
+    let resources = [
+        uniform.as_entire_binding(),
+        list.as_entire_binding(),
+        wgpu::BindingResource::TextureView(&textures::view(atlas)),
+        wgpu::BindingResource::Sampler(sampler),
+    ];
+    gpu.group("field", layout, &resources)
 }
 
 #[cfg(test)]

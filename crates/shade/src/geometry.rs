@@ -3,10 +3,10 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use lumencast_gpu::Gpu;
 use lumencast_scene::Mesh;
 
 use crate::deform::Deformable;
-use crate::gpu::Gpu;
 use crate::part::{Part, upload};
 
 /// The meshes that are on the device.

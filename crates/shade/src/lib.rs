@@ -16,21 +16,18 @@
 
 #![forbid(unsafe_code)]
 
-mod bindings;
 mod camera;
 mod deform;
 mod environment_brdf;
 mod error;
 mod field;
 mod geometry;
-mod gpu;
 mod lights;
 mod materials;
 mod meter;
 mod occlusion;
 mod part;
 mod pipelines;
-mod readback;
 mod renderer;
 mod scene;
 mod screen;
@@ -42,7 +39,7 @@ mod timing;
 
 pub use environment_brdf::{Reflected, environment_brdf, reflected};
 pub use error::ShadeError;
-pub use gpu::{Abilities, Gpu};
+pub use lumencast_gpu::{Abilities, Gpu, GpuError};
 pub use renderer::{Drawn, Renderer};
 pub use screen::{Measured, Screen, Show};
 pub use settings::{Lighting, Materials, Occlusion, Settings, Shading, Shadows, Transparency};

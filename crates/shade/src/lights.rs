@@ -2,14 +2,17 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{UVec2, UVec3, Vec3};
 use half::f16;
+use lumencast_gpu::Gpu;
+use lumencast_gpu::bindings::{
+    DEPTHS, FILTERED, NEAREST_SAMPLER, PICTURE, SAMPLER, STORAGE, UNIFORM, texture,
+};
+use lumencast_gpu::textures::{self, DEPTH};
 use lumencast_scene::{Environment, HdrImage, LightKind, PlacedLight, PunctualLight, Snapshot};
 use lumencast_shaders::layout::{self, light};
 
-use crate::bindings::{FILTERED, SAMPLER, STORAGE, UNIFORM, entry, texture};
 use crate::environment_brdf::{Reflected, environment_brdf};
-use crate::gpu::{DEPTH, Gpu};
 use crate::occlusion::Occluder;
 use crate::shadows::ShadowPlan;
 
@@ -28,33 +31,29 @@ pub(crate) struct GpuLights {
 }
 
 /// The bindings of group 1.
-fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let plane = wgpu::TextureViewDimension::D2;
-    let exact = wgpu::TextureSampleType::Float { filterable: false };
-    let depth = wgpu::TextureSampleType::Depth;
-    let gathering = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering);
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("light"),
-        entries: &[
-            entry(0, UNIFORM),
-            entry(1, UNIFORM),
-            entry(2, texture(exact, plane)),
-            entry(3, STORAGE),
-            entry(4, STORAGE),
-            entry(5, texture(depth, wgpu::TextureViewDimension::D2Array)),
-            entry(6, gathering),
-            entry(7, texture(FILTERED, plane)),
-            entry(8, SAMPLER),
-            entry(9, texture(exact, plane)),
-            entry(10, texture(depth, plane)),
-        ],
-    })
+fn group_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
+    let table = texture(FILTERED, wgpu::TextureViewDimension::D2);
+    let maps = texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2Array);
+    let types = [
+        UNIFORM,
+        UNIFORM,
+        PICTURE,
+        STORAGE,
+        STORAGE,
+        maps,
+        NEAREST_SAMPLER,
+        table,
+        SAMPLER,
+        PICTURE,
+        DEPTHS,
+    ];
+    gpu.group_layout("light", wgpu::ShaderStages::FRAGMENT, &types)
 }
 
 impl GpuLights {
     pub(crate) fn new(gpu: &Gpu) -> Self {
         let sampler = |label, filter| {
-            gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+            gpu.device().create_sampler(&wgpu::SamplerDescriptor {
                 label: Some(label),
                 mag_filter: filter,
                 min_filter: filter,
@@ -62,11 +61,11 @@ impl GpuLights {
             })
         };
         Self {
-            layout: group_layout(&gpu.device),
+            layout: group_layout(gpu),
             nearest: sampler("shadows", wgpu::FilterMode::Nearest),
             linear: sampler("table", wgpu::FilterMode::Linear),
             table: table(gpu),
-            picture: (None, picture(gpu, 1, 1, &[Vec3::ZERO])),
+            picture: (None, picture(gpu, UVec2::ONE, &[Vec3::ZERO])),
             maps: maps(gpu, 1, 1),
         }
     }
@@ -119,26 +118,22 @@ impl GpuLights {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
             ..Default::default()
         });
-        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let texture = wgpu::BindingResource::TextureView;
         let sampler = wgpu::BindingResource::Sampler;
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("light"),
-            layout: &self.layout,
-            entries: &[
-                entry(0, frame.as_entire_binding()),
-                entry(1, environment.as_entire_binding()),
-                entry(2, texture(&self.picture.1)),
-                entry(3, lights.as_entire_binding()),
-                entry(4, views.as_entire_binding()),
-                entry(5, texture(&maps)),
-                entry(6, sampler(&self.nearest)),
-                entry(7, texture(&self.table)),
-                entry(8, sampler(&self.linear)),
-                entry(9, texture(occlusion.visibility())),
-                entry(10, texture(occlusion.depth())),
-            ],
-        })
+        let resources = [
+            frame.as_entire_binding(),
+            environment.as_entire_binding(),
+            texture(&self.picture.1),
+            lights.as_entire_binding(),
+            views.as_entire_binding(),
+            texture(&maps),
+            sampler(&self.nearest),
+            texture(&self.table),
+            sampler(&self.linear),
+            texture(occlusion.visibility()),
+            texture(occlusion.depth()),
+        ];
+        gpu.group("light", &self.layout, &resources)
     }
 
     fn environment(&mut self, gpu: &Gpu, environment: &Environment) -> layout::Environment {
@@ -148,7 +143,7 @@ impl GpuLights {
             Environment::Image { image: None, .. } => elevation(Vec3::ZERO, Vec3::ZERO, Vec3::ZERO),
             Environment::Image { image: Some(image), intensity, rotation, .. } => {
                 if !self.picture.0.as_ref().is_some_and(|known| Arc::ptr_eq(known, image)) {
-                    let view = picture(gpu, image.width, image.height, &image.texels);
+                    let view = picture(gpu, UVec2::new(image.width, image.height), &image.texels);
                     self.picture = (Some(image.clone()), view);
                 }
                 layout::Environment {
@@ -195,15 +190,11 @@ fn of_light(placed: &PlacedLight, first_shadow: u32, shadow_count: u32) -> layou
 }
 
 fn maps(gpu: &Gpu, side: u32, layers: u32) -> wgpu::Texture {
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
+    let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+    gpu.device().create_texture(&wgpu::TextureDescriptor {
         label: Some("shadow maps"),
-        size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: layers },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: DEPTH,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
+        size: textures::volume_size(UVec3::new(side, side, layers)),
+        ..textures::plane(UVec2::ONE, DEPTH, usage)
     })
 }
 
@@ -220,40 +211,29 @@ fn table(gpu: &Gpu) -> wgpu::TextureView {
         .collect();
     let format = wgpu::TextureFormat::Rgba16Float;
     let side = TABLE as u32;
-    plane(gpu, "environment BRDF", format, 2 * side, side, bytemuck::cast_slice(&halves))
+    let size = UVec2::new(2 * side, side);
+    plane(gpu, "environment BRDF", format, size, bytemuck::cast_slice(&halves))
 }
 
 /// The environment's picture in f32: suns do not fit halves.
-fn picture(gpu: &Gpu, width: u32, height: u32, texels: &[Vec3]) -> wgpu::TextureView {
+fn picture(gpu: &Gpu, size: UVec2, texels: &[Vec3]) -> wgpu::TextureView {
     let texels: Vec<[f32; 4]> = texels.iter().map(|t| t.extend(1.0).to_array()).collect();
     let format = wgpu::TextureFormat::Rgba32Float;
-    plane(gpu, "environment", format, width, height, bytemuck::cast_slice(&texels))
+    plane(gpu, "environment", format, size, bytemuck::cast_slice(&texels))
 }
 
 fn plane(
     gpu: &Gpu,
     label: &str,
     format: wgpu::TextureFormat,
-    width: u32,
-    height: u32,
+    size: UVec2,
     texels: &[u8],
 ) -> wgpu::TextureView {
-    let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+    let texture = gpu.device().create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
-        size,
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
+        ..textures::plane(size, format, usage)
     });
-    let layout = wgpu::TexelCopyBufferLayout {
-        offset: 0,
-        bytes_per_row: Some(texels.len() as u32 / height),
-        rows_per_image: None,
-    };
-    gpu.queue.write_texture(texture.as_image_copy(), texels, layout, size);
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
+    gpu.write_texels(texture.as_image_copy(), texels, texture.size());
+    textures::view(&texture)
 }

@@ -1,11 +1,11 @@
 //! Materials on the device: numbers and textures, one bind group each.
 
 use glam::{Affine2, Vec4};
+use lumencast_gpu::Gpu;
+use lumencast_gpu::bindings::{FILTERED, SAMPLER, UNIFORM, texture};
 use lumencast_scene::{AlphaMode, Material, TextureRef};
 use lumencast_shaders::layout::{self, material};
 
-use crate::bindings::{FILTERED, SAMPLER, UNIFORM, entry, texture};
-use crate::gpu::Gpu;
 use crate::settings::Materials;
 use crate::textures::{Coding, Textures};
 
@@ -31,17 +31,10 @@ pub(crate) struct GpuMaterial {
 const MAPS: usize = 8;
 
 /// The bindings of group 3: numbers, then a texture and a sampler for each map.
-pub(crate) fn group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let map_texture = texture(FILTERED, wgpu::TextureViewDimension::D2);
-    let mut entries = vec![entry(0, UNIFORM)];
-    for map in 0..MAPS as u32 {
-        entries.push(entry(2 * map + 1, map_texture));
-        entries.push(entry(2 * map + 2, SAMPLER));
-    }
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("material"),
-        entries: &entries,
-    })
+pub(crate) fn group_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
+    let map = [texture(FILTERED, wgpu::TextureViewDimension::D2), SAMPLER];
+    let types = [&[UNIFORM][..], &map.repeat(MAPS)].concat();
+    gpu.group_layout("material", wgpu::ShaderStages::FRAGMENT, &types)
 }
 
 impl GpuMaterial {
@@ -58,23 +51,12 @@ impl GpuMaterial {
         let numbers = numbers(material, model);
         let uniform = wgpu::BufferUsages::UNIFORM;
         let buffer = gpu.buffer("material", uniform, bytemuck::bytes_of(&numbers), 0);
-        let mut entries =
-            vec![wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }];
-        for (map, (view, sampler)) in (0..).zip(views.iter().zip(&samplers)) {
-            entries.push(wgpu::BindGroupEntry {
-                binding: 2 * map + 1,
-                resource: wgpu::BindingResource::TextureView(view),
-            });
-            entries.push(wgpu::BindGroupEntry {
-                binding: 2 * map + 2,
-                resource: wgpu::BindingResource::Sampler(sampler),
-            });
+        let mut resources = vec![buffer.as_entire_binding()];
+        for (view, sampler) in views.iter().zip(&samplers) {
+            resources.push(wgpu::BindingResource::TextureView(view));
+            resources.push(wgpu::BindingResource::Sampler(sampler));
         }
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(&material.name),
-            layout: group_layout,
-            entries: &entries,
-        });
+        let group = gpu.group(&material.name, group_layout, &resources);
         Self { group, surface: surface(material, model) }
     }
 }

@@ -1,11 +1,9 @@
 //! How bright a picture on the device is.
 
+use lumencast_gpu::{Gpu, Readback, bindings};
 use lumencast_shaders::layout::meter::{BINS, BINS_A_STOP, LEAST};
 use lumencast_shaders::meter;
 
-use crate::bindings;
-use crate::gpu::Gpu;
-use crate::readback::Readback;
 use crate::timing::{Commands, Stage};
 
 /// Bytes of a histogram.
@@ -24,7 +22,8 @@ pub(crate) struct Meter {
 impl Meter {
     pub(crate) fn new(gpu: &Gpu) -> Self {
         let types = [bindings::PICTURE, bindings::WRITTEN];
-        let (layout, pipeline) = gpu.compute("meter", meter(), "meter", &types);
+        let layout = gpu.group_layout("meter", wgpu::ShaderStages::COMPUTE, &types);
+        let pipeline = gpu.compute("meter", meter(), "meter", &[&layout]);
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let histogram = gpu.buffer("histogram", usage, &[], SIZE);
         Self { layout, pipeline, histogram }
@@ -38,17 +37,9 @@ impl Meter {
         picture: &wgpu::TextureView,
     ) -> wgpu::Buffer {
         let size = picture.texture().size();
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("meter"),
-            layout: &self.layout,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::TextureView(picture),
-                },
-                wgpu::BindGroupEntry { binding: 1, resource: self.histogram.as_entire_binding() },
-            ],
-        });
+        let picture = wgpu::BindingResource::TextureView(picture);
+        let resources = [picture, self.histogram.as_entire_binding()];
+        let group = gpu.group("meter", &self.layout, &resources);
         commands.encoder.clear_buffer(&self.histogram, 0, None);
         let (encoder, timestamp_writes) = commands.compute_pass(Stage::Screen);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {

@@ -6,11 +6,14 @@
 //! reads the result where its own depth is that of the pixel (`ambient_visibility` of the shader).
 //! Six bytes a pixel.
 
+use std::iter;
+
 use glam::UVec2;
+use lumencast_gpu::Gpu;
+use lumencast_gpu::bindings::{DEPTHS, PICTURE, UNIFORM};
+use lumencast_gpu::textures::{self, DEPTH};
 use lumencast_shaders::{layout, occlusion};
 
-use crate::bindings::{PICTURE, UNIFORM, entry, texture};
-use crate::gpu::{DEPTH, Gpu};
 use crate::settings::Occlusion;
 use crate::timing::{Commands, Stage};
 
@@ -85,15 +88,9 @@ impl Occluder {
         let uniform = wgpu::BufferUsages::UNIFORM;
         let settings = gpu.buffer("occlusion", uniform, bytemuck::bytes_of(&settings), 0);
         let group = |layout, views: &[&wgpu::TextureView]| {
-            let mut entries =
-                vec![wgpu::BindGroupEntry { binding: 0, resource: settings.as_entire_binding() }];
-            entries.extend((1..).zip(views).map(|(binding, view)| wgpu::BindGroupEntry {
-                binding,
-                resource: wgpu::BindingResource::TextureView(view),
-            }));
-            let label = Some("occlusion");
-            let descriptor = wgpu::BindGroupDescriptor { label, layout, entries: &entries };
-            gpu.device.create_bind_group(&descriptor)
+            let views = views.iter().map(|view| wgpu::BindingResource::TextureView(view));
+            let resources: Vec<_> = iter::once(settings.as_entire_binding()).chain(views).collect();
+            gpu.group("occlusion", layout, &resources)
         };
         let Textures { depth, rough, .. } = &self.textures;
         Some(Groups {
@@ -140,19 +137,12 @@ impl Occluder {
 
 impl Textures {
     fn new(gpu: &Gpu, size: UVec2) -> Self {
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
         let view = |label, format| {
-            let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            textures::view(&gpu.device().create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
-                size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
-                    | wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            });
-            texture.create_view(&wgpu::TextureViewDescriptor::default())
+                ..textures::plane(size, format, usage)
+            }))
         };
         Self {
             size,
@@ -165,14 +155,9 @@ impl Textures {
 
 impl Pipelines {
     fn new(gpu: &Gpu, pass: &wgpu::BindGroupLayout) -> Self {
-        let depth = texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2);
-        let entries = [entry(0, UNIFORM), entry(1, depth), entry(2, PICTURE)];
-        let group = |entries| {
-            let label = Some("occlusion");
-            let descriptor = wgpu::BindGroupLayoutDescriptor { label, entries };
-            gpu.device.create_bind_group_layout(&descriptor)
-        };
-        let (find_layout, blur_layout) = (group(&entries[..2]), group(&entries));
+        let group = |types| gpu.group_layout("occlusion", wgpu::ShaderStages::FRAGMENT, types);
+        let find_layout = group(&[UNIFORM, DEPTHS]);
+        let blur_layout = group(&[UNIFORM, DEPTHS, PICTURE]);
         let module = gpu.shader("occlusion", occlusion());
         let find = pipeline(gpu, &[Some(pass), Some(&find_layout)], &module, "occlusion_fragment");
         let blur = pipeline(gpu, &[Some(pass), Some(&blur_layout)], &module, "blur_fragment");
@@ -186,12 +171,8 @@ fn pipeline(
     module: &wgpu::ShaderModule,
     fragment_entry: &str,
 ) -> wgpu::RenderPipeline {
-    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("occlusion"),
-        bind_group_layouts: groups,
-        immediate_size: 0,
-    });
-    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+    let layout = gpu.pipeline_layout("occlusion", groups);
+    gpu.device().create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(fragment_entry),
         layout: Some(&layout),
         vertex: wgpu::VertexState {

@@ -6,9 +6,8 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3, Vec4};
+use lumencast_gpu::Gpu;
 use lumencast_scene::{Aabb, Primitive, Vertices};
-
-use crate::gpu::Gpu;
 
 /// Locations 0 to 2 of the shaders.
 #[repr(C)]

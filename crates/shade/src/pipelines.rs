@@ -1,8 +1,10 @@
 //! Pipelines: how each kind of surface is drawn in each kind of pass.
 
+use lumencast_gpu::Gpu;
+use lumencast_gpu::bindings::{STORAGE, UNIFORM_BY_OFFSET};
+use lumencast_gpu::textures::{COLOR, DEPTH};
 use lumencast_shaders::{Shading, background, depth, forward};
 
-use crate::gpu::{COLOR, DEPTH, Gpu};
 use crate::materials::Surface;
 use crate::settings::Transparency;
 use crate::{materials, part};
@@ -43,22 +45,9 @@ pub(crate) struct Layouts {
 }
 
 /// The bindings of group 0.
-fn pass_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty, has_dynamic_offset| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
-        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None },
-        count: None,
-    };
-    let storage = wgpu::BufferBindingType::Storage { read_only: true };
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("pass"),
-        entries: &[
-            entry(0, wgpu::BufferBindingType::Uniform, true),
-            entry(1, storage, false),
-            entry(2, storage, false),
-        ],
-    })
+fn pass_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
+    let types = [UNIFORM_BY_OFFSET, STORAGE, STORAGE];
+    gpu.group_layout("pass", wgpu::ShaderStages::VERTEX_FRAGMENT, &types)
 }
 
 impl Layouts {
@@ -68,16 +57,10 @@ impl Layouts {
         light: &wgpu::BindGroupLayout,
         field: &wgpu::BindGroupLayout,
     ) -> Self {
-        let device = &gpu.device;
-        let pass = pass_layout(device);
-        let material = materials::group_layout(device);
-        let layout = |label, groups: &[Option<&wgpu::BindGroupLayout>]| {
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some(label),
-                bind_group_layouts: groups,
-                immediate_size: 0,
-            })
-        };
+        let device = gpu.device();
+        let pass = pass_layout(gpu);
+        let material = materials::group_layout(gpu);
+        let layout = |label, groups: &[_]| gpu.pipeline_layout(label, groups);
         let forward = layout("forward", &[Some(&pass), Some(light), Some(field), Some(&material)]);
         let background = layout("background", &[Some(&pass), Some(light)]);
         let module = gpu.shader("depth", depth());
@@ -103,7 +86,7 @@ impl Layouts {
 
 impl Pipelines {
     pub(crate) fn new(gpu: &Gpu, layouts: &Layouts, variant: Variant) -> Self {
-        let device = &gpu.device;
+        let device = gpu.device();
         let module = gpu.shader("forward", forward(variant.shading));
         let only_depth = gpu.shader("depth", depth());
         let nothing =

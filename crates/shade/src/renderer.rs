@@ -4,6 +4,7 @@ use std::mem;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
+use lumencast_gpu::Gpu;
 use lumencast_light::Light;
 use lumencast_scene::{Snapshot, View};
 use lumencast_shaders::layout;
@@ -11,7 +12,6 @@ use lumencast_shaders::layout;
 use crate::ShadeError;
 use crate::camera::{Camera, Frustum, jitter};
 use crate::field::GpuField;
-use crate::gpu::Gpu;
 use crate::lights::GpuLights;
 use crate::materials::Surface;
 use crate::occlusion::{Groups, Occluder};
@@ -21,7 +21,7 @@ use crate::screen::{Screen, Show};
 use crate::settings::{Lighting, Materials, Settings, Shading, Transparency};
 use crate::shadows::ShadowPlan;
 use crate::target::{Target, depth_attachment};
-use crate::timing::{Commands, PassTimes, Stage};
+use crate::timing::{Commands, PassTimes, Stage, Timed};
 
 /// How far patterns turn from one frame of a picture to the next: the golden section fills the circle
 /// evenly for any number.
@@ -195,9 +195,10 @@ impl Renderer {
             let mut copies = Vec::with_capacity(views.len());
             let frame = FrameSettings { snapshot: &snapshot, plan: &plan, settings, number };
             self.frame(&mut commands, frame, &cameras, |gpu, commands, target| {
-                copies.push(target.copy(gpu, &mut commands.encoder));
+                copies.push(target.copy(gpu, commands));
             });
-            let timed = mem::replace(&mut commands, Commands::new(&self.gpu)).submit(&self.gpu);
+            let submitted = mem::replace(&mut commands, Commands::new(&self.gpu));
+            let timed = Timed::submit(submitted, &self.gpu);
             for (picture, copy) in pictures.iter_mut().zip(copies) {
                 copy.add_to(&self.gpu, picture, weight)?;
             }
@@ -242,7 +243,7 @@ impl Renderer {
             screen.draw(gpu, commands, picture, settings.pre_exposure, show, onto);
             histogram = screen.measure(gpu, commands, picture);
         });
-        let timed = commands.submit(&self.gpu);
+        let timed = Timed::submit(commands, &self.gpu);
         if let Some(histogram) = histogram {
             screen.submitted(timed, histogram, settings.pre_exposure);
         }
@@ -345,7 +346,7 @@ impl Renderer {
         cameras: &[Camera],
         settings: &Settings,
     ) -> ShadowPlan {
-        let limits = self.gpu.device.limits();
+        let limits = self.gpu.device().limits();
         let mut shadows = settings.shadows;
         shadows.resolution = shadows.resolution.min(limits.max_texture_dimension_2d);
         if !settings.lighting.direct {
@@ -382,7 +383,7 @@ impl Renderer {
 
     /// What passes with these views have in common; `visible`: the instances that they draw.
     fn passes(&self, views: &[layout::View], visible: &[u32]) -> Passes {
-        let alignment = self.gpu.device.limits().min_uniform_buffer_offset_alignment;
+        let alignment = self.gpu.device().limits().min_uniform_buffer_offset_alignment;
         let size = size_of::<layout::View>();
         let stride = (size as u32).next_multiple_of(alignment);
         let mut bytes = vec![0; stride as usize * views.len().max(1)];
@@ -398,16 +399,12 @@ impl Renderer {
             offset: 0,
             size: std::num::NonZeroU64::new(size as u64),
         };
-        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-        let group = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("pass"),
-            layout: &self.layouts.pass,
-            entries: &[
-                entry(0, wgpu::BindingResource::Buffer(view)),
-                entry(1, self.scene.instances.as_entire_binding()),
-                entry(2, visible.as_entire_binding()),
-            ],
-        });
+        let resources = [
+            wgpu::BindingResource::Buffer(view),
+            self.scene.instances.as_entire_binding(),
+            visible.as_entire_binding(),
+        ];
+        let group = self.gpu.group("pass", &self.layouts.pass, &resources);
         Passes { group, stride }
     }
 

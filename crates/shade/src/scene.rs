@@ -5,13 +5,13 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
+use lumencast_gpu::Gpu;
 use lumencast_scene::{Aabb, Deformation, Instance, Material, NodeId, Snapshot};
 use lumencast_shaders::layout;
 
 use crate::camera::Frustum;
 use crate::deform::{Cause, Deformer};
 use crate::geometry::Geometry;
-use crate::gpu::Gpu;
 use crate::materials::{GpuMaterial, Surface};
 use crate::part::Part;
 use crate::settings::Materials;
@@ -310,7 +310,7 @@ mod tests {
 
     fn on_a_device() -> GpuScene {
         let gpu = Gpu::new().expect("an adapter");
-        let layout = materials::group_layout(&gpu.device);
+        let layout = materials::group_layout(&gpu);
         let mut scene = GpuScene::new(&gpu, 1);
         scene.update(&gpu, &mut Commands::new(&gpu), &layout, &snapshot(), Materials::Full);
         scene
@@ -355,7 +355,7 @@ mod tests {
     #[test]
     fn instances_of_a_node_share_what_is_deformed() {
         let gpu = Gpu::new().expect("an adapter");
-        let layout = materials::group_layout(&gpu.device);
+        let layout = materials::group_layout(&gpu);
         let mut scene = GpuScene::new(&gpu, 1);
         let mut snapshot = Snapshot::clone(&snapshot());
         snapshot.instances.truncate(3);

@@ -3,16 +3,15 @@
 
 use std::collections::VecDeque;
 
+use lumencast_gpu::{Gpu, Readback, bindings};
 use lumencast_picture::ToneMap;
 use lumencast_shaders::layout;
 use lumencast_shaders::layout::tone;
 use lumencast_shaders::screen;
 
-use crate::gpu::Gpu;
+use crate::ShadeError;
 use crate::meter::{Meter, exposure};
-use crate::readback::Readback;
 use crate::timing::{Commands, PassTimes, Stage, Timed};
-use crate::{ShadeError, bindings};
 
 /// Frames that may be under way; more are not measured.
 const UNDER_WAY: usize = 3;
@@ -61,20 +60,11 @@ pub struct Show {
 impl Screen {
     /// For textures of a format.
     pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Self {
-        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("screen"),
-            entries: &[
-                bindings::entry(0, bindings::UNIFORM),
-                bindings::entry(1, bindings::PICTURE),
-            ],
-        });
-        let pipeline_layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("screen"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
+        let types = [bindings::UNIFORM, bindings::PICTURE];
+        let layout = gpu.group_layout("screen", wgpu::ShaderStages::FRAGMENT, &types);
+        let pipeline_layout = gpu.pipeline_layout("screen", &[Some(&layout)]);
         let module = gpu.shader("screen", screen());
-        let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        let pipeline = gpu.device().create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("screen"),
             layout: Some(&pipeline_layout),
             vertex: wgpu::VertexState {
@@ -116,17 +106,8 @@ impl Screen {
         };
         let uniform = wgpu::BufferUsages::UNIFORM;
         let screen = gpu.buffer("screen", uniform, bytemuck::bytes_of(&screen), 0);
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("screen"),
-            layout: &self.layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: screen.as_entire_binding() },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::TextureView(picture),
-                },
-            ],
-        });
+        let picture = wgpu::BindingResource::TextureView(picture);
+        let group = gpu.group("screen", &self.layout, &[screen.as_entire_binding(), picture]);
         let color = wgpu::RenderPassColorAttachment {
             view: onto,
             depth_slice: None,

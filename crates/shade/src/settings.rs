@@ -1,6 +1,7 @@
 //! How a picture is drawn.
 
 use glam::UVec2;
+use lumencast_gpu::Abilities;
 pub use lumencast_shaders::Shading;
 
 /// Which light is drawn. Direct, indirect and emission add up to the whole picture.
@@ -150,9 +151,42 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// What pictures by these settings have to do without on an adapter of these abilities, for
+    /// people.
+    pub fn missing(&self, abilities: Abilities) -> Vec<&'static str> {
+        let mut missing = Vec::new();
+        let shades_samples = self.shading == Shading::Samples && self.samples > 1;
+        if shades_samples && !abilities.sample_shading {
+            missing.push(
+                "the adapter cannot shade single samples of a pixel: pictures are averaged over \
+                 frames of one sample, windows are shaded once a pixel",
+            );
+        }
+        if !abilities.clock {
+            missing.push("the adapter has no clock: passes are not timed");
+        }
+        missing
+    }
+
     /// The occlusion, where there is anything for it to hide.
     pub(crate) fn drawn_occlusion(&self) -> Option<Occlusion> {
         let is_drawn = |radius: f32| self.lighting.indirect && radius > 0.0 && radius.is_finite();
         self.occlusion.filter(|occlusion| is_drawn(occlusion.radius))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missing_is_said_where_it_is_asked_for() {
+        let all = Abilities { samples: 4, sample_shading: true, clock: true };
+        let samples = Settings { samples: 8, shading: Shading::Samples, ..Settings::default() };
+        assert!(samples.missing(all).is_empty());
+        let none = Abilities { samples: 1, sample_shading: false, clock: false };
+        assert_eq!(samples.missing(none).len(), 2);
+        let pixels = Settings { shading: Shading::Pixels, ..samples };
+        assert!(pixels.missing(none)[0].contains("clock"));
     }
 }

@@ -2,16 +2,13 @@
 
 use glam::{UVec2, Vec3};
 use half::f16;
+use lumencast_gpu::textures::{self, COLOR, DEPTH};
+use lumencast_gpu::{Gpu, GpuError, TextureCopy};
 
-use crate::ShadeError;
-use crate::gpu::{COLOR, DEPTH, Gpu};
-use crate::readback::Readback;
 use crate::timing::{Commands, Stage};
 
-/// Rows that are copied to a buffer begin at multiples of so many bytes.
-const ROW_ALIGNMENT: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
-/// Of a pixel of [`COLOR`].
-const PIXEL: u32 = 8;
+/// Bytes of a pixel of [`COLOR`].
+const PIXEL: usize = 8;
 
 /// Textures of one size and sample count.
 #[derive(Debug)]
@@ -28,28 +25,21 @@ pub(crate) struct Target {
 impl Target {
     pub(crate) fn new(gpu: &Gpu, size: UVec2, samples: u32) -> Self {
         let texture = |label, format, sample_count, usage| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
+            gpu.device().create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
-                size: extent(size),
-                mip_level_count: 1,
                 sample_count,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage,
-                view_formats: &[],
+                ..textures::plane(size, format, usage)
             })
         };
         let attached = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let read = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::TEXTURE_BINDING;
         let resolved = texture("picture", COLOR, 1, attached | read);
-        let view =
-            |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let resolved_view = view(&resolved);
+        let resolved_view = textures::view(&resolved);
         let drawn = match samples {
             1 => resolved_view.clone(),
-            _ => view(&texture("samples", COLOR, samples, attached)),
+            _ => textures::view(&texture("samples", COLOR, samples, attached)),
         };
-        let depth = view(&texture("depth", DEPTH, samples, attached));
+        let depth = textures::view(&texture("depth", DEPTH, samples, attached));
         Self { size, samples, drawn, resolved, resolved_view, depth }
     }
 
@@ -85,20 +75,8 @@ impl Target {
     }
 
     /// Copies the picture to where it can be read.
-    pub(crate) fn copy(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) -> Copied {
-        let row = (PIXEL * self.size.x).next_multiple_of(ROW_ALIGNMENT);
-        let buffer = Readback::buffer(gpu, "picture", u64::from(row) * u64::from(self.size.y));
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(row),
-            rows_per_image: None,
-        };
-        encoder.copy_texture_to_buffer(
-            self.resolved.as_image_copy(),
-            wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
-            extent(self.size),
-        );
-        Copied { buffer, row, size: self.size }
+    pub(crate) fn copy(&self, gpu: &Gpu, commands: &mut Commands) -> PictureCopy {
+        PictureCopy(TextureCopy::new(gpu, &mut commands.encoder, &self.resolved))
     }
 }
 
@@ -114,31 +92,21 @@ pub(crate) fn depth_attachment(
     }
 }
 
-fn extent(size: UVec2) -> wgpu::Extent3d {
-    wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 }
-}
-
 /// A copy of a picture.
 #[derive(Debug)]
-pub(crate) struct Copied {
-    buffer: wgpu::Buffer,
-    row: u32,
-    size: UVec2,
-}
+pub(crate) struct PictureCopy(TextureCopy);
 
-impl Copied {
+impl PictureCopy {
     /// Waits for the picture, whose commands have been submitted, and adds it times `weight` to
     /// `sum`.
-    pub(crate) fn add_to(self, gpu: &Gpu, sum: &mut [Vec3], weight: f32) -> Result<(), ShadeError> {
-        let bytes = Readback::begin(self.buffer).wait(gpu, "reading a picture back")?;
-        let rows = bytes.chunks_exact(self.row as usize);
-        for (own, row) in sum.chunks_exact_mut(self.size.x as usize).zip(rows) {
-            for (pixel, halves) in own.iter_mut().zip(row.chunks_exact(PIXEL as usize)) {
+    pub(crate) fn add_to(self, gpu: &Gpu, sum: &mut [Vec3], weight: f32) -> Result<(), GpuError> {
+        let mut pixels = sum.iter_mut();
+        self.0.wait(gpu, "reading a picture back", |row| {
+            for (halves, pixel) in row.chunks_exact(PIXEL).zip(pixels.by_ref()) {
                 let half =
                     |i: usize| f16::from_le_bytes([halves[2 * i], halves[2 * i + 1]]).to_f32();
                 *pixel += weight * Vec3::new(half(0), half(1), half(2));
             }
-        }
-        Ok(())
+        })
     }
 }

@@ -7,11 +7,10 @@ use std::collections::HashMap;
 use std::sync::{Arc, LazyLock};
 
 use glam::{UVec2, Vec3, Vec4};
+use lumencast_gpu::{Gpu, textures};
 use lumencast_picture::{linear_from_srgb, srgb_from_linear};
 use lumencast_scene::{Filter, Image, TextureRef, Wrap};
 use rayon::prelude::*;
-
-use crate::gpu::Gpu;
 
 /// How the RGB of a texture is coded; alpha is always linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -56,7 +55,7 @@ impl Textures {
         let image = &texture.image;
         let (_, view) =
             self.textures.entry((Arc::as_ptr(image).addr(), coding)).or_insert_with(|| {
-                let largest = gpu.device.limits().max_texture_dimension_2d;
+                let largest = gpu.device().limits().max_texture_dimension_2d;
                 let (size, levels) = mips(image, coding, largest);
                 (image.clone(), upload(gpu, size, &levels, coding))
             });
@@ -77,7 +76,7 @@ impl Textures {
                 Filter::Nearest => (wgpu::FilterMode::Nearest, 1),
                 Filter::Linear => (wgpu::FilterMode::Linear, anisotropy),
             };
-            gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+            gpu.device().create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("material"),
                 address_mode_u: mode(wrap[0]),
                 address_mode_v: mode(wrap[1]),
@@ -157,32 +156,18 @@ fn upload(gpu: &Gpu, size: UVec2, levels: &[Vec<[u8; 4]>], coding: Coding) -> wg
         Coding::Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
         Coding::Linear => wgpu::TextureFormat::Rgba8Unorm,
     };
-    let extent =
-        |size: UVec2| wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+    let texture = gpu.device().create_texture(&wgpu::TextureDescriptor {
         label: Some("material"),
-        size: extent(size),
         mip_level_count: levels.len() as u32,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
+        ..textures::plane(size, format, usage)
     });
     for (level, texels) in (0..).zip(levels) {
         let size = UVec2::new((size.x >> level).max(1), (size.y >> level).max(1));
-        gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo { mip_level: level, ..texture.as_image_copy() },
-            bytemuck::cast_slice(texels),
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(4 * size.x),
-                rows_per_image: None,
-            },
-            extent(size),
-        );
+        let to = wgpu::TexelCopyTextureInfo { mip_level: level, ..texture.as_image_copy() };
+        gpu.write_texels(to, bytemuck::cast_slice(texels), textures::plane_size(size));
     }
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
+    textures::view(&texture)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! shaders, on whatever adapter there is.
 
 use glam::{Vec3, Vec4};
-use lumencast_shade::{Gpu, wgpu};
+use lumencast_gpu::{Gpu, Readback, bindings, wgpu};
 use lumencast_shaders::harmonics;
 use serde::Deserialize;
 
@@ -60,52 +60,25 @@ fn ask(@builtin(global_invocation_id) id: vec3u) {
 
 fn ask(asked: &[Vec4]) -> Vec<Answer> {
     let gpu = Gpu::new().expect("an adapter");
-    let device = gpu.device();
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: None,
-        source: wgpu::ShaderSource::Wgsl((harmonics() + QUESTIONS).into()),
-    });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: None,
-        layout: None,
-        module: &module,
-        entry_point: Some("ask"),
-        compilation_options: Default::default(),
-        cache: None,
-    });
-    let buffer = |size: usize, usage| {
-        device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: size as u64,
-            usage,
-            mapped_at_creation: false,
-        })
-    };
+    let types = [bindings::STORAGE, bindings::WRITTEN];
+    let layout = gpu.group_layout("vectors", wgpu::ShaderStages::COMPUTE, &types);
+    let pipeline = gpu.compute("vectors", harmonics() + QUESTIONS, "ask", &[&layout]);
     let storage = wgpu::BufferUsages::STORAGE;
-    let input = buffer(size_of_val(asked), storage | wgpu::BufferUsages::COPY_DST);
-    gpu.queue().write_buffer(&input, 0, bytemuck::cast_slice(asked));
-    let size = asked.len() * ANSWER * size_of::<f32>();
-    let output = buffer(size, storage | wgpu::BufferUsages::COPY_SRC);
-    let read = buffer(size, wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ);
-    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: None,
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &[
-            wgpu::BindGroupEntry { binding: 0, resource: input.as_entire_binding() },
-            wgpu::BindGroupEntry { binding: 1, resource: output.as_entire_binding() },
-        ],
-    });
-    let mut encoder = device.create_command_encoder(&Default::default());
+    let input = gpu.buffer("asked", storage, bytemuck::cast_slice(asked), 0);
+    let size = (asked.len() * ANSWER * size_of::<f32>()) as u64;
+    let output = gpu.buffer("answers", storage | wgpu::BufferUsages::COPY_SRC, &[], size);
+    let read = Readback::buffer(&gpu, "answers", size);
+    let resources = [&input, &output].map(wgpu::Buffer::as_entire_binding);
+    let group = gpu.group("vectors", &layout, &resources);
+    let mut encoder = gpu.device().create_command_encoder(&Default::default());
     let mut pass = encoder.begin_compute_pass(&Default::default());
     pass.set_pipeline(&pipeline);
     pass.set_bind_group(0, &group, &[]);
     pass.dispatch_workgroups(asked.len() as u32, 1, 1);
     drop(pass);
-    encoder.copy_buffer_to_buffer(&output, 0, &read, 0, size as u64);
+    encoder.copy_buffer_to_buffer(&output, 0, &read, 0, size);
     gpu.queue().submit([encoder.finish()]);
-    read.map_async(wgpu::MapMode::Read, .., |mapped| mapped.unwrap());
-    device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
-    let bytes = read.get_mapped_range(..).unwrap();
+    let bytes = Readback::begin(read).wait(&gpu, "asking").expect("answers");
     let numbers: &[f32] = bytemuck::cast_slice(&bytes);
     let part = |numbers: &[f32]| Answer {
         basis: numbers[..25].try_into().unwrap(),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use lumencast_shade::ShadeError;
+use lumencast_shade::{GpuError, ShadeError};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::WindowEvent;
@@ -142,7 +142,7 @@ impl App {
                 shown.window.request_redraw();
             }
             Ok(false) => events.set_control_flow(ControlFlow::wait_duration(PAUSE)),
-            Err(WindowError::Shade(ShadeError::Failed { during, reason }))
+            Err(WindowError::Shade(ShadeError::Gpu(GpuError::Failed { during, reason })))
                 if self.lost < ATTEMPTS =>
             {
                 tracing::warn!(during, reason, "the graphics device is made anew");

@@ -1,7 +1,7 @@
 //! What can go wrong.
 
 use lumencast_picture::PictureError;
-use lumencast_shade::ShadeError;
+use lumencast_shade::{GpuError, ShadeError};
 use thiserror::Error;
 
 /// Why a window closed.
@@ -36,4 +36,10 @@ pub enum WindowError {
         /// What it says.
         reason: String,
     },
+}
+
+impl From<GpuError> for WindowError {
+    fn from(error: GpuError) -> Self {
+        Self::Shade(error.into())
+    }
 }

@@ -221,7 +221,7 @@ impl Stage {
             format!("{} of {}²", self.drawn.shadow_maps, self.drawn.shadow_resolution),
         ));
         let mut notices: Vec<String> = self.world.notice().into_iter().collect();
-        let missing = self.gpu().abilities().missing(&self.settings(size));
+        let missing = self.settings(size).missing(self.gpu().abilities());
         notices.extend(missing.into_iter().map(|what| format!("{what}.")));
         if self.drawn.lights_without_shadow > 0 {
             let count = self.drawn.lights_without_shadow;
@@ -261,7 +261,7 @@ impl Stage {
         self.lit = Some(wanted);
         self.drawn = renderer.show(&self.camera.view(), &settings, screen, show, onto)?;
         // Those who draw the panel do not expect a device that is gone.
-        renderer.gpu().health()?;
+        renderer.gpu().poll("drawing")?;
         Ok(())
     }
 

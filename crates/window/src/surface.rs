@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::UVec2;
-use lumencast_shade::{Gpu, ShadeError, wgpu};
+use lumencast_shade::{Gpu, GpuError, wgpu};
 use winit::window::Window;
 
 use crate::error::WindowError;
@@ -85,7 +85,8 @@ impl Surface {
                 Current::Outdated => {}
                 Current::Lost => {
                     let reason = "the window's surface was lost".to_owned();
-                    return Err(ShadeError::Failed { during: "showing a picture", reason }.into());
+                    let during = "showing a picture";
+                    return Err(GpuError::Failed { during, reason }.into());
                 }
             }
             self.configure(gpu);

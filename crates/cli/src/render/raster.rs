@@ -37,7 +37,7 @@ impl Render {
         let settings = self.raster_settings();
         let gpu = Gpu::new()?;
         let adapter = gpu.name();
-        for what in gpu.abilities().missing(&settings) {
+        for what in settings.missing(gpu.abilities()) {
             tell!("warning: {what}");
         }
         let snapshot = scene.snapshot();

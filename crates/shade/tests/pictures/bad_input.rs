@@ -4,7 +4,7 @@ use crate::common::{SIZE, drawn, renderer};
 use glam::{Quat, UVec2, UVec3, Vec3};
 use lumencast_light::{FieldId, Grid, Light, Order, ProbeVolume};
 use lumencast_scene::{Environment, LightKind, PunctualLight, Scene, View};
-use lumencast_shade::{Gpu, Lighting, Renderer, Settings, ShadeError, Transparency};
+use lumencast_shade::{Gpu, GpuError, Lighting, Renderer, Settings, ShadeError, Transparency};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 fn view() -> View {
@@ -63,7 +63,7 @@ fn impossible_sizes_are_refused() {
     let mut renderer = renderer(&scene, &settings());
     for size in [UVec2::ZERO, UVec2::new(0, 5), UVec2::new(5, 1 << 20)] {
         let error = renderer.pictures(&[view()], &Settings { size, ..settings() }).unwrap_err();
-        assert!(matches!(error, ShadeError::Size { .. }), "{error}");
+        assert!(matches!(error, ShadeError::Gpu(GpuError::Size { .. })), "{error}");
     }
     assert!(renderer.pictures(&[view()], &settings()).is_ok(), "and it goes on");
     assert!(renderer.pictures(&[], &settings()).unwrap().is_empty());

@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use crate::common::{SIZE, renderer};
 use glam::{UVec2, Vec3};
+use lumencast_gpu::{TextureCopy, textures};
 use lumencast_light::Light;
 use lumencast_picture::{Picture, ToneMap, luminance};
 use lumencast_scene::{
     Deformation, Environment, LightKind, MorphTarget, PunctualLight, Scene, Snapshot, View,
 };
 use lumencast_shade::{
-    Gpu, Measured, Occlusion, Renderer, Screen, Settings, ShadeError, Show, wgpu,
+    Gpu, GpuError, Measured, Occlusion, Renderer, Screen, Settings, ShadeError, Show, wgpu,
 };
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -19,22 +20,12 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// A texture that is shown on in place of a window's, and its codes.
 struct Shown {
     texture: wgpu::Texture,
-    size: UVec2,
 }
 
 impl Shown {
     fn new(gpu: &Gpu, size: UVec2) -> Self {
-        let texture = gpu.device().create_texture(&wgpu::TextureDescriptor {
-            label: None,
-            size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
-        Self { texture, size }
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
+        Self { texture: gpu.device().create_texture(&textures::plane(size, FORMAT, usage)) }
     }
 
     fn view(&self) -> wgpu::TextureView {
@@ -42,33 +33,15 @@ impl Shown {
     }
 
     fn codes(&self, gpu: &Gpu) -> Vec<[u8; 3]> {
-        let row = (4 * self.size.x).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = gpu.device().create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: u64::from(row * self.size.y),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(row),
-            rows_per_image: None,
-        };
-        encoder.copy_texture_to_buffer(
-            self.texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
-            self.texture.size(),
-        );
+        let copy = TextureCopy::new(gpu, &mut encoder, &self.texture);
         gpu.queue().submit([encoder.finish()]);
-        buffer.map_async(wgpu::MapMode::Read, .., |mapped| mapped.unwrap());
-        gpu.device().poll(wgpu::PollType::wait_indefinitely()).unwrap();
-        let bytes = buffer.get_mapped_range(..).unwrap();
-        let row_codes = |row: &[u8]| -> Vec<[u8; 3]> {
-            let pixels = row.chunks_exact(4).take(self.size.x as usize);
-            pixels.map(|p| [p[0], p[1], p[2]]).collect()
-        };
-        bytes.chunks_exact(row as usize).flat_map(row_codes).collect()
+        let mut codes = Vec::new();
+        let read = copy.wait(gpu, "reading codes", |row| {
+            codes.extend(row.as_chunks::<4>().0.iter().map(|p| [p[0], p[1], p[2]]));
+        });
+        read.expect("codes");
+        codes
     }
 }
 
@@ -202,7 +175,7 @@ fn lost_devices_are_told() {
     let before = first.pictures(&[view], &settings).unwrap();
     first.gpu().device().destroy();
     let error = first.pictures(&[view], &settings).unwrap_err();
-    assert!(matches!(error, ShadeError::Failed { .. }), "{error}");
+    assert!(matches!(error, ShadeError::Gpu(GpuError::Failed { .. })), "{error}");
     let mut second = renderer(&scene.snapshot(), &settings);
     assert_eq!(second.pictures(&[view], &settings).unwrap(), before);
 }

@@ -1,54 +1,28 @@
-//! The graphics device.
+//! The device, and what its adapter can do.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::UVec2;
 
-use crate::ShadeError;
-use crate::bindings::entry;
-use crate::settings::{Settings, Shading};
+use crate::error::GpuError;
+use crate::textures::{COLOR, DEPTH};
 
-/// What colours are drawn in before they are shown: linear, pre-exposed.
-pub(crate) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
-/// Depth, of pictures and shadow maps alike.
-pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-
-/// The most passes of a frame that are timed: a query set holds no more pairs.
+/// The most passes that are timed: a query set holds no more pairs.
 pub(crate) const TIMED_PASSES: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
 
 /// What is used where an adapter has it, and done without where it has not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Abilities {
-    /// The most samples that a pixel has at once: 1, 2, 4 or 8. Pictures of more are averaged over
-    /// frames.
+    /// The most samples that a pixel has at once, in [`COLOR`] and
+    /// [`DEPTH`]: 1, 2, 4 or 8.
     pub samples: u32,
-    /// Every sample of a pixel can be shaded. Without it, pictures are averaged over frames of one
-    /// sample instead, and windows are shaded once a pixel.
+    /// Every sample of a pixel can be shaded.
     pub sample_shading: bool,
-    /// It tells how long passes take.
+    /// The adapter tells how long passes take.
     pub clock: bool,
 }
 
-impl Abilities {
-    /// What pictures by these settings have to do without, for people.
-    pub fn missing(&self, settings: &Settings) -> Vec<&'static str> {
-        let mut missing = Vec::new();
-        let shades_samples = settings.shading == Shading::Samples && settings.samples > 1;
-        if shades_samples && !self.sample_shading {
-            missing.push(
-                "the adapter cannot shade single samples of a pixel: pictures are averaged over \
-                 frames of one sample, windows are shaded once a pixel",
-            );
-        }
-        if !self.clock {
-            missing.push("the adapter has no clock: passes are not timed");
-        }
-        missing
-    }
-}
-
-/// What there is no drawing without: shaders read instances and lights from storage buffers, and skins
-/// are computed.
+/// What every device has: shaders read storage buffers in every stage, and compute.
 const NEEDED: wgpu::DownlevelFlags = wgpu::DownlevelFlags::COMPUTE_SHADERS
     .union(wgpu::DownlevelFlags::VERTEX_STORAGE)
     .union(wgpu::DownlevelFlags::FRAGMENT_STORAGE);
@@ -67,11 +41,11 @@ fn refusal(flags: wgpu::DownlevelFlags) -> Option<String> {
 #[derive(Debug)]
 pub struct Gpu {
     adapter: wgpu::Adapter,
-    pub(crate) device: wgpu::Device,
-    pub(crate) queue: wgpu::Queue,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
     info: wgpu::AdapterInfo,
-    /// For the timestamps of a frame's passes, if it has a clock.
-    pub(crate) clock: Option<wgpu::QuerySet>,
+    /// Holds the timestamps of passes, where the adapter has a clock.
+    clock: Option<wgpu::QuerySet>,
     /// Sample counts that pictures can be multisampled with.
     sample_counts: Vec<u32>,
     sample_shading: bool,
@@ -80,31 +54,31 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// Of the adapter that the platform thinks fastest; `VK_DRIVER_FILES` and the like choose
+    /// Opens the adapter that the platform thinks fastest; `VK_DRIVER_FILES` and the like choose
     /// otherwise.
     ///
     /// # Errors
-    /// Where there is none, or it gives no device.
-    pub fn new() -> Result<Self, ShadeError> {
+    /// [`GpuError::NoAdapter`] where there is none, [`GpuError::Device`] where it gives no device.
+    pub fn new() -> Result<Self, GpuError> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         Self::of_instance(&instance, None)
     }
 
-    /// Of the fastest adapter that can show pictures on a surface of that instance.
+    /// Opens the fastest adapter that can show pictures on a surface of that instance.
     ///
     /// # Errors
     /// As [`Gpu::new`].
     pub fn for_surface(
         instance: &wgpu::Instance,
         surface: &wgpu::Surface<'_>,
-    ) -> Result<Self, ShadeError> {
+    ) -> Result<Self, GpuError> {
         Self::of_instance(instance, Some(surface))
     }
 
     fn of_instance(
         instance: &wgpu::Instance,
         surface: Option<&wgpu::Surface<'_>>,
-    ) -> Result<Self, ShadeError> {
+    ) -> Result<Self, GpuError> {
         let options = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
             compatible_surface: surface,
@@ -113,18 +87,18 @@ impl Gpu {
         let open = async {
             let adapter = instance.request_adapter(&options).await.map_err(|error| {
                 tracing::debug!(%error, "no adapter");
-                ShadeError::NoAdapter
+                GpuError::NoAdapter
             })?;
             Self::of_adapter(adapter).await
         };
         pollster::block_on(open)
     }
 
-    async fn of_adapter(adapter: wgpu::Adapter) -> Result<Self, ShadeError> {
+    async fn of_adapter(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
         let info = adapter.get_info();
         let flags = adapter.get_downlevel_capabilities().flags;
         if let Some(reason) = refusal(flags) {
-            return Err(ShadeError::Device { adapter: info.name, reason });
+            return Err(GpuError::Device { adapter: info.name, reason });
         }
         // With this feature, sample counts are those of the adapter instead of WebGPU's 1 and 4.
         let specific = wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES;
@@ -136,7 +110,7 @@ impl Gpu {
             ..Default::default()
         };
         let (device, queue) = adapter.request_device(&descriptor).await.map_err(|error| {
-            ShadeError::Device { adapter: info.name.clone(), reason: error.to_string() }
+            GpuError::Device { adapter: info.name.clone(), reason: error.to_string() }
         })?;
         let supported = |format: wgpu::TextureFormat, count| {
             let flags = adapter.get_texture_format_features(format).flags;
@@ -170,7 +144,7 @@ impl Gpu {
         Ok(Self { adapter, device, queue, info, clock, sample_counts, sample_shading, fault })
     }
 
-    /// What it has of all that can be done without.
+    /// What the adapter has of all that can be done without.
     pub fn abilities(&self) -> Abilities {
         Abilities {
             samples: self.samples_at_once(u32::MAX),
@@ -188,28 +162,28 @@ impl Gpu {
         self
     }
 
-    /// For those who draw more onto what is shown.
+    /// Makes everything that lies on the device.
     pub fn device(&self) -> &wgpu::Device {
         &self.device
     }
 
-    /// The device's.
+    /// Takes what the device is to do.
     pub fn queue(&self) -> &wgpu::Queue {
         &self.queue
     }
 
-    /// What the device is of.
+    /// The adapter that the device was opened on.
     pub fn adapter(&self) -> &wgpu::Adapter {
         &self.adapter
     }
 
-    /// Name of the adapter, and of its driver.
+    /// The names of the adapter and of its driver, for people.
     pub fn name(&self) -> String {
         let driver = [self.info.driver.as_str(), self.info.driver_info.as_str()].join(" ");
         format!("{} ({}, {})", self.info.name, self.info.backend.to_str(), driver.trim())
     }
 
-    /// Whether it computes on the processor.
+    /// Whether the device computes on the processor.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
     }
@@ -223,20 +197,29 @@ impl Gpu {
     /// Whether a picture of this size can be drawn.
     ///
     /// # Errors
-    /// [`ShadeError::Size`].
-    pub fn check_size(&self, size: UVec2) -> Result<(), ShadeError> {
+    /// [`GpuError::Size`] where it has no pixels, or more a side than the adapter draws.
+    pub fn check_size(&self, size: UVec2) -> Result<(), GpuError> {
         let limit = self.device.limits().max_texture_dimension_2d;
         if size.min_element() == 0 || size.max_element() > limit {
-            return Err(ShadeError::Size { width: size.x, height: size.y, limit });
+            return Err(GpuError::Size { width: size.x, height: size.y, limit });
         }
         Ok(())
     }
 
-    /// What the device has complained about since it was last asked.
-    pub(crate) fn check(&self, during: &'static str) -> Result<(), ShadeError> {
+    /// Holds the timestamps of passes, where the adapter has a clock.
+    pub(crate) fn clock(&self) -> Option<&wgpu::QuerySet> {
+        self.clock.as_ref()
+    }
+
+    /// Whether the device has complained since it was last asked. `during` names what was done, for
+    /// people.
+    ///
+    /// # Errors
+    /// [`GpuError::Failed`] where the device was lost, or has failed otherwise.
+    pub fn check(&self, during: &'static str) -> Result<(), GpuError> {
         let fault = self.fault.lock().unwrap_or_else(PoisonError::into_inner).take();
         match fault {
-            Some(reason) => Err(ShadeError::Failed { during, reason }),
+            Some(reason) => Err(GpuError::failed(during, reason)),
             None => Ok(()),
         }
     }
@@ -244,91 +227,21 @@ impl Gpu {
     /// Waits until everything submitted is done.
     ///
     /// # Errors
-    /// Where the device was lost, or has failed otherwise.
-    pub fn finish(&self, during: &'static str) -> Result<(), ShadeError> {
+    /// As [`Gpu::check`].
+    pub fn finish(&self, during: &'static str) -> Result<(), GpuError> {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|error| ShadeError::Failed { during, reason: error.to_string() })?;
+            .map_err(|error| GpuError::failed(during, error))?;
         self.check(during)
-    }
-
-    /// What the device has complained about since it was last asked, without waiting for it.
-    ///
-    /// # Errors
-    /// Where it was lost, or has failed otherwise.
-    pub fn health(&self) -> Result<(), ShadeError> {
-        self.poll("drawing")
     }
 
     /// Lets callbacks of what is done be called, without waiting.
-    pub(crate) fn poll(&self, during: &'static str) -> Result<(), ShadeError> {
-        self.device
-            .poll(wgpu::PollType::Poll)
-            .map_err(|error| ShadeError::Failed { during, reason: error.to_string() })?;
+    ///
+    /// # Errors
+    /// As [`Gpu::check`].
+    pub fn poll(&self, during: &'static str) -> Result<(), GpuError> {
+        self.device.poll(wgpu::PollType::Poll).map_err(|error| GpuError::failed(during, error))?;
         self.check(during)
-    }
-
-    pub(crate) fn shader(&self, label: &str, source: String) -> wgpu::ShaderModule {
-        self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        })
-    }
-
-    /// A pipeline that computes, and the layout of its one group, whose bindings are of these types.
-    pub(crate) fn compute(
-        &self,
-        label: &str,
-        source: String,
-        entry_point: &str,
-        types: &[wgpu::BindingType],
-    ) -> (wgpu::BindGroupLayout, wgpu::ComputePipeline) {
-        let module = self.shader(label, source);
-        let label = Some(label);
-        let visibility = wgpu::ShaderStages::COMPUTE;
-        let entries: Vec<_> = (0..)
-            .zip(types)
-            .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry { visibility, ..entry(binding, ty) })
-            .collect();
-        let layout = self.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label,
-            entries: &entries,
-        });
-        let pipeline_layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label,
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label,
-            layout: Some(&pipeline_layout),
-            module: &module,
-            entry_point: Some(entry_point),
-            compilation_options: Default::default(),
-            cache: None,
-        });
-        (layout, pipeline)
-    }
-
-    /// A buffer with contents; of at least `least` bytes, since bindings may not be empty.
-    pub(crate) fn buffer(
-        &self,
-        label: &str,
-        usage: wgpu::BufferUsages,
-        contents: &[u8],
-        least: u64,
-    ) -> wgpu::Buffer {
-        let size = (contents.len() as u64).max(least).next_multiple_of(4);
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage: usage | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        if !contents.is_empty() {
-            self.queue.write_buffer(&buffer, 0, contents);
-        }
-        buffer
     }
 }
 
@@ -355,16 +268,5 @@ mod tests {
         assert_eq!(refusal(NEEDED), None, "all else can be done without");
         let said = refusal(all - wgpu::DownlevelFlags::VERTEX_STORAGE).expect("a reason");
         assert!(said.contains("VERTEX_STORAGE") && !said.contains("COMPUTE"), "{said}");
-    }
-
-    #[test]
-    fn what_is_missing_is_said_where_it_is_asked_for() {
-        let all = Abilities { samples: 4, sample_shading: true, clock: true };
-        let samples = Settings { samples: 8, shading: Shading::Samples, ..Settings::default() };
-        assert!(all.missing(&samples).is_empty());
-        let none = Abilities { samples: 1, sample_shading: false, clock: false };
-        assert_eq!(none.missing(&samples).len(), 2);
-        let pixels = Settings { shading: Shading::Pixels, ..samples };
-        assert!(none.missing(&pixels)[0].contains("clock"));
     }
 }
