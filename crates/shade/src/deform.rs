@@ -81,6 +81,15 @@ impl Cause {
     }
 }
 
+/// How a primitive of an instance is deformed.
+#[derive(Clone, Copy)]
+pub(crate) struct Deforming<'a> {
+    pub(crate) deformable: &'a Deformable,
+    pub(crate) deformation: &'a Deformation,
+    /// The same on the device.
+    pub(crate) cause: &'a Cause,
+}
+
 /// The pipeline that deforms.
 #[derive(Debug)]
 pub(crate) struct Deformer {
@@ -102,11 +111,11 @@ impl Deformer {
         &self,
         gpu: &Gpu,
         pass: &mut wgpu::ComputePass<'_>,
-        deformable: &Deformable,
-        (deformation, cause): (&Deformation, &Cause),
+        by: Deforming<'_>,
         rest: &Part,
         deformed: &mut Part,
     ) {
+        let Deforming { deformable, deformation, cause } = by;
         let targets = deformable.reach.displacements.len() as u32;
         let pose = deformation.pose();
         let uniform = layout::Deform {
@@ -364,7 +373,8 @@ mod tests {
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());
         let deformable = deformable.expect("room for it");
-        deformer.deform(gpu, &mut pass, deformable, (deformation, &cause), rest, &mut part);
+        let by = Deforming { deformable, deformation, cause: &cause };
+        deformer.deform(gpu, &mut pass, by, rest, &mut part);
         drop(pass);
         let read = Readback::buffer(gpu, "vertices", part.shape.size());
         encoder.copy_buffer_to_buffer(&part.shape, 0, &read, 0, part.shape.size());

@@ -18,15 +18,19 @@
 
 mod camera;
 mod deform;
+mod draw;
+mod drawn;
 mod environment_brdf;
 mod error;
 mod field;
+mod frame;
 mod geometry;
 mod lights;
 mod materials;
 mod meter;
 mod occlusion;
 mod part;
+mod passes;
 mod pipelines;
 mod renderer;
 mod scene;
@@ -37,10 +41,11 @@ mod target;
 mod textures;
 mod timing;
 
+pub use drawn::Drawn;
 pub use environment_brdf::{Reflected, environment_brdf, reflected};
 pub use error::ShadeError;
 pub use lumencast_gpu::{Abilities, Gpu, GpuError};
-pub use renderer::{Drawn, Renderer};
+pub use renderer::Renderer;
 pub use screen::{Measured, Screen, Show};
 pub use settings::{Lighting, Materials, Occlusion, Settings, Shading, Shadows, Transparency};
 pub use timing::PassTimes;

@@ -9,10 +9,11 @@ use lumencast_gpu::bindings::{
     DEPTHS, FILTERED, NEAREST_SAMPLER, PICTURE, SAMPLER, STORAGE, UNIFORM, texture,
 };
 use lumencast_gpu::textures::{self, DEPTH};
-use lumencast_scene::{Environment, HdrImage, LightKind, PlacedLight, PunctualLight, Snapshot};
+use lumencast_scene::{Environment, HdrImage, LightKind, PlacedLight, PunctualLight};
 use lumencast_shaders::layout::{self, light};
 
 use crate::environment_brdf::{Reflected, environment_brdf};
+use crate::frame::Frame;
 use crate::occlusion::Occluder;
 use crate::shadows::ShadowPlan;
 
@@ -91,11 +92,10 @@ impl GpuLights {
     pub(crate) fn group(
         &mut self,
         gpu: &Gpu,
-        snapshot: &Snapshot,
-        plan: &ShadowPlan,
-        frame: layout::Frame,
+        frame: &Frame<'_>,
         occlusion: &Occluder,
     ) -> wgpu::BindGroup {
+        let Frame { snapshot, plan, .. } = *frame;
         let environment = self.environment(gpu, &snapshot.environment);
         let lights: Vec<layout::Light> = snapshot
             .lights
@@ -103,13 +103,12 @@ impl GpuLights {
             .zip(&plan.lights)
             .map(|(light, &(first, count))| of_light(light, first, count))
             .collect();
-        let frame = layout::Frame { light_count: lights.len() as u32, ..frame };
         let uniform =
             |label, contents: &[u8]| gpu.buffer(label, wgpu::BufferUsages::UNIFORM, contents, 0);
         let storage = |label, contents: &[u8], least: usize| {
             gpu.buffer(label, wgpu::BufferUsages::STORAGE, contents, least as u64)
         };
-        let frame = uniform("frame", bytemuck::bytes_of(&frame));
+        let frame = uniform("frame", bytemuck::bytes_of(&frame.layout()));
         let environment = uniform("environment", bytemuck::bytes_of(&environment));
         let lights = storage("lights", bytemuck::cast_slice(&lights), size_of::<layout::Light>());
         let least = size_of::<layout::ShadowView>();

@@ -6,8 +6,8 @@ use lumencast_gpu::textures::{COLOR, DEPTH};
 use lumencast_shaders::{Shading, background, depth, forward};
 
 use crate::materials::Surface;
+use crate::part;
 use crate::settings::Transparency;
-use crate::{materials, part};
 
 /// What pipelines depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,7 +36,6 @@ pub(crate) struct Pipelines {
 #[derive(Debug)]
 pub(crate) struct Layouts {
     pub(crate) pass: wgpu::BindGroupLayout,
-    pub(crate) material: wgpu::BindGroupLayout,
     forward: wgpu::PipelineLayout,
     background: wgpu::PipelineLayout,
     depth: wgpu::PipelineLayout,
@@ -51,29 +50,39 @@ fn pass_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
 }
 
 impl Layouts {
-    /// `light` and `field`: the bindings of groups 1 and 2.
+    /// `light`, `field` and `material`: the bindings of groups 1 to 3.
     pub(crate) fn new(
         gpu: &Gpu,
         light: &wgpu::BindGroupLayout,
         field: &wgpu::BindGroupLayout,
+        material: &wgpu::BindGroupLayout,
     ) -> Self {
         let device = gpu.device();
         let pass = pass_layout(gpu);
-        let material = materials::group_layout(gpu);
         let layout = |label, groups: &[_]| gpu.pipeline_layout(label, groups);
-        let forward = layout("forward", &[Some(&pass), Some(light), Some(field), Some(&material)]);
+        let forward = layout("forward", &[Some(&pass), Some(light), Some(field), Some(material)]);
         let background = layout("background", &[Some(&pass), Some(light)]);
         let module = gpu.shader("depth", depth());
         let depth = layout("depth", &[Some(&pass)]);
-        let masked = layout("masked depth", &[Some(&pass), None, None, Some(&material)]);
+        let masked = layout("masked depth", &[Some(&pass), None, None, Some(material)]);
         let into_map = |layout, vertex, fragment| {
-            let entries = Entries { layout, module: &module, vertex, fragment, constants: &[] };
             let depth = depth_state(wgpu::CompareFunction::Greater, true);
-            mesh_pipeline(device, "depth", &entries, None, depth, 1)
+            let drawn = MeshPipeline {
+                label: "depth",
+                layout,
+                module: &module,
+                vertex,
+                fragment,
+                constants: &[],
+                target: None,
+                depth,
+                samples: 1,
+            };
+            drawn.create(device)
         };
         let solid_depth = into_map(&depth, "depth_vertex", None);
         let masked_depth = into_map(&masked, "masked_depth_vertex", Some("masked_depth_fragment"));
-        Self { pass, material, forward, background, depth, solid_depth, masked_depth }
+        Self { pass, forward, background, depth, solid_depth, masked_depth }
     }
 
     pub(crate) fn depth(&self, surface: Surface) -> &wgpu::RenderPipeline {
@@ -91,18 +100,21 @@ impl Pipelines {
         let only_depth = gpu.shader("depth", depth());
         let nothing =
             wgpu::ColorTargetState { write_mask: wgpu::ColorWrites::empty(), ..COLOR.into() };
-        let first = Entries {
+        let first = MeshPipeline {
+            label: "depth",
             layout: &layouts.depth,
             module: &only_depth,
             vertex: "depth_vertex",
             fragment: Some("depth_fragment"),
             constants: &[],
+            target: Some(nothing),
+            depth: depth_state(wgpu::CompareFunction::Greater, true),
+            samples: variant.samples,
         };
-        let nearer = depth_state(wgpu::CompareFunction::Greater, true);
         let sky = gpu.shader("background", background());
         Self {
             variant,
-            first: mesh_pipeline(device, "depth", &first, Some(nothing), nearer, variant.samples),
+            first: first.create(device),
             solid: forward_pipeline(device, layouts, &module, variant, Surface::Solid),
             masked: forward_pipeline(device, layouts, &module, variant, Surface::Masked),
             blended: forward_pipeline(device, layouts, &module, variant, Surface::Blended),
@@ -162,15 +174,6 @@ fn multisample(count: u32) -> wgpu::MultisampleState {
     wgpu::MultisampleState { count, ..Default::default() }
 }
 
-/// What a pipeline that draws meshes is made of.
-struct Entries<'a> {
-    layout: &'a wgpu::PipelineLayout,
-    module: &'a wgpu::ShaderModule,
-    vertex: &'a str,
-    fragment: Option<&'a str>,
-    constants: &'a [(&'a str, f64)],
-}
-
 fn forward_pipeline(
     device: &wgpu::Device,
     layouts: &Layouts,
@@ -182,56 +185,69 @@ fn forward_pipeline(
     let blends = surface == Surface::Blended && variant.transparency == Transparency::Sorted;
     let constant = |is: bool| f64::from(u8::from(is));
     let constants = [("BLENDED", constant(blends)), ("OCCLUDED", constant(variant.occluded))];
-    let entries = Entries {
-        layout: &layouts.forward,
-        module,
-        vertex: "forward_vertex",
-        fragment: Some(if is_solid { "solid_fragment" } else { "holed_fragment" }),
-        constants: &constants,
-    };
-    let target = wgpu::ColorTargetState {
-        format: COLOR,
-        blend: blends.then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-        write_mask: wgpu::ColorWrites::ALL,
-    };
     let depth = if is_solid {
         // It is there already.
         depth_state(wgpu::CompareFunction::Equal, false)
     } else {
         depth_state(wgpu::CompareFunction::Greater, !blends)
     };
-    mesh_pipeline(device, "forward", &entries, Some(target), depth, variant.samples)
+    let drawn = MeshPipeline {
+        label: "forward",
+        layout: &layouts.forward,
+        module,
+        vertex: "forward_vertex",
+        fragment: Some(if is_solid { "solid_fragment" } else { "holed_fragment" }),
+        constants: &constants,
+        target: Some(wgpu::ColorTargetState {
+            format: COLOR,
+            blend: blends.then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+            write_mask: wgpu::ColorWrites::ALL,
+        }),
+        depth,
+        samples: variant.samples,
+    };
+    drawn.create(device)
 }
 
-fn mesh_pipeline(
-    device: &wgpu::Device,
-    label: &str,
-    entries: &Entries<'_>,
+/// What a pipeline that draws meshes is made of.
+struct MeshPipeline<'a> {
+    label: &'a str,
+    layout: &'a wgpu::PipelineLayout,
+    module: &'a wgpu::ShaderModule,
+    vertex: &'a str,
+    fragment: Option<&'a str>,
+    /// Values of the fragment's overrides.
+    constants: &'a [(&'a str, f64)],
+    /// The colours that are written, if any.
     target: Option<wgpu::ColorTargetState>,
     depth: wgpu::DepthStencilState,
     samples: u32,
-) -> wgpu::RenderPipeline {
-    let buffers = part::vertex_layouts();
-    let targets = [target];
-    let fragment = entries.fragment.map(|entry| wgpu::FragmentState {
-        module: entries.module,
-        entry_point: Some(entry),
-        compilation_options: wgpu::PipelineCompilationOptions {
-            constants: entries.constants,
-            ..Default::default()
-        },
-        targets: if targets[0].is_some() { &targets } else { &[] },
-    });
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(label),
-        layout: Some(entries.layout),
-        vertex: vertex(entries.module, entries.vertex, &buffers),
-        // Nothing is culled: backs of single-sided materials hide what lies behind them.
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(depth),
-        multisample: multisample(samples),
-        fragment,
-        multiview_mask: None,
-        cache: None,
-    })
+}
+
+impl MeshPipeline<'_> {
+    fn create(self, device: &wgpu::Device) -> wgpu::RenderPipeline {
+        let buffers = part::vertex_layouts();
+        let targets = [self.target];
+        let fragment = self.fragment.map(|entry| wgpu::FragmentState {
+            module: self.module,
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: self.constants,
+                ..Default::default()
+            },
+            targets: if targets[0].is_some() { &targets } else { &[] },
+        });
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(self.label),
+            layout: Some(self.layout),
+            vertex: vertex(self.module, self.vertex, &buffers),
+            // Nothing is culled: backs of single-sided materials hide what lies behind them.
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(self.depth),
+            multisample: multisample(self.samples),
+            fragment,
+            multiview_mask: None,
+            cache: None,
+        })
+    }
 }

@@ -10,9 +10,9 @@ use lumencast_scene::{Aabb, Deformation, Instance, Material, NodeId, Snapshot};
 use lumencast_shaders::layout;
 
 use crate::camera::Frustum;
-use crate::deform::{Cause, Deformer};
+use crate::deform::{Cause, Deformer, Deforming};
 use crate::geometry::Geometry;
-use crate::materials::{GpuMaterial, Surface};
+use crate::materials::{self, GpuMaterial, Surface};
 use crate::part::Part;
 use crate::settings::Materials;
 use crate::textures::Textures;
@@ -50,8 +50,10 @@ pub(crate) struct GpuScene {
     textures: Textures,
     deformer: Deformer,
     deformed: HashMap<NodeId, Deformed>,
+    /// The bindings of group 3.
+    pub(crate) material_layout: wgpu::BindGroupLayout,
     materials: Vec<GpuMaterial>,
-    /// Of which `materials` were made.
+    /// What `materials` were made of.
     source: Option<(Arc<[Material]>, Materials)>,
     pub(crate) instances: wgpu::Buffer,
     draws: Vec<Draw>,
@@ -65,6 +67,7 @@ impl GpuScene {
             textures: Textures::new(gpu, anisotropy),
             deformer: Deformer::new(gpu),
             deformed: HashMap::new(),
+            material_layout: materials::group_layout(gpu),
             materials: Vec::new(),
             source: None,
             instances: instance_buffer(gpu, &[]),
@@ -78,17 +81,27 @@ impl GpuScene {
         &mut self,
         gpu: &Gpu,
         commands: &mut Commands,
-        material_layout: &wgpu::BindGroupLayout,
         snapshot: &Snapshot,
         model: Materials,
     ) {
-        self.update_materials(gpu, material_layout, &snapshot.materials, model);
+        self.update_materials(gpu, &snapshot.materials, model);
         let placed: Vec<layout::Instance> = snapshot.instances.iter().map(placed).collect();
         self.instances = instance_buffer(gpu, &placed);
         self.deform(gpu, commands, snapshot);
+        self.list_draws(gpu, &snapshot.instances);
+        self.bounds = Aabb::EMPTY;
+        for (_, bounds) in self.draws.iter().flat_map(|draw| &draw.placed) {
+            self.bounds.grow(bounds.min);
+            self.bounds.grow(bounds.max);
+        }
+        self.geometry.forget_unused();
+    }
+
+    /// Lists what has to be drawn, primitive by primitive of the same vertices, with where it stands.
+    fn list_draws(&mut self, gpu: &Gpu, instances: &[Instance]) {
         self.draws.clear();
         let mut known: HashMap<(usize, usize), usize> = HashMap::new();
-        for (instance, number) in snapshot.instances.iter().zip(0..) {
+        for (instance, number) in instances.iter().zip(0..) {
             let own = self.deformed.get(&instance.node);
             for primitive in 0..instance.mesh.primitives.len() {
                 let part = match own {
@@ -118,12 +131,6 @@ impl GpuScene {
         }
         // So that few things change from one draw call to the next.
         self.draws.sort_by_key(|draw| (draw.surface, draw.material));
-        self.bounds = Aabb::EMPTY;
-        for (_, bounds) in self.draws.iter().flat_map(|draw| &draw.placed) {
-            self.bounds.grow(bounds.min);
-            self.bounds.grow(bounds.max);
-        }
-        self.geometry.forget_unused();
     }
 
     /// Brings the vertices of deforming instances to this moment.
@@ -174,20 +181,14 @@ impl GpuScene {
                 return rest.deformed(gpu, &deformation.vertices()[primitive]);
             };
             let mut part = own.unwrap_or_else(|| rest.to_deform(gpu));
-            let by = (&**deformation, &cause);
-            self.deformer.deform(gpu, pass, deformable, by, rest, &mut part);
+            let by = Deforming { deformable, deformation, cause: &cause };
+            self.deformer.deform(gpu, pass, by, rest, &mut part);
             part
         });
         Deformed { parts: parts.collect(), by: deformation.clone() }
     }
 
-    fn update_materials(
-        &mut self,
-        gpu: &Gpu,
-        layout: &wgpu::BindGroupLayout,
-        materials: &Arc<[Material]>,
-        model: Materials,
-    ) {
+    fn update_materials(&mut self, gpu: &Gpu, materials: &Arc<[Material]>, model: Materials) {
         if let Some((known, of)) = &self.source
             && Arc::ptr_eq(known, materials)
             && *of == model
@@ -196,6 +197,7 @@ impl GpuScene {
         }
         let fallback = Material::default();
         let all = materials.iter().chain(std::iter::once(&fallback));
+        let layout = &self.material_layout;
         self.materials =
             all.map(|m| GpuMaterial::new(gpu, layout, &mut self.textures, m, model)).collect();
         self.source = Some((materials.clone(), model));
@@ -278,7 +280,6 @@ mod tests {
 
     use super::*;
     use crate::camera::Camera;
-    use crate::materials;
 
     /// Balls in a row along x, a metre apart, the k-th at x = k; all of one mesh of two primitives.
     const BALLS: i32 = 41;
@@ -310,9 +311,8 @@ mod tests {
 
     fn on_a_device() -> GpuScene {
         let gpu = Gpu::new().expect("an adapter");
-        let layout = materials::group_layout(&gpu);
         let mut scene = GpuScene::new(&gpu, 1);
-        scene.update(&gpu, &mut Commands::new(&gpu), &layout, &snapshot(), Materials::Full);
+        scene.update(&gpu, &mut Commands::new(&gpu), &snapshot(), Materials::Full);
         scene
     }
 
@@ -355,7 +355,6 @@ mod tests {
     #[test]
     fn instances_of_a_node_share_what_is_deformed() {
         let gpu = Gpu::new().expect("an adapter");
-        let layout = materials::group_layout(&gpu);
         let mut scene = GpuScene::new(&gpu, 1);
         let mut snapshot = Snapshot::clone(&snapshot());
         snapshot.instances.truncate(3);
@@ -369,7 +368,7 @@ mod tests {
         }
         for _ in 0..2 {
             let mut commands = Commands::new(&gpu);
-            scene.update(&gpu, &mut commands, &layout, &snapshot, Materials::Full);
+            scene.update(&gpu, &mut commands, &snapshot, Materials::Full);
             let mut placed: Vec<_> = scene.draws.iter().map(|draw| draw.placed.len()).collect();
             placed.sort_unstable();
             assert_eq!((placed, scene.deformed.len()), (vec![1, 1, 2, 2], 2));

@@ -94,12 +94,11 @@ impl Screen {
         gpu: &Gpu,
         commands: &mut Commands,
         picture: &wgpu::TextureView,
-        pre_exposure: f32,
         show: Show,
         onto: &wgpu::TextureView,
     ) {
         let screen = layout::Screen {
-            factor: show.exposure / pre_exposure,
+            factor: show.exposure,
             tone_map: number(show.tone_map),
             step: STEP,
             _pad: 0,

@@ -41,22 +41,32 @@ pub(crate) struct ShadowPlan {
     pub(crate) left_out: usize,
 }
 
+/// What shadows are drawn for.
+#[derive(Clone, Copy)]
+pub(crate) struct Sight<'a> {
+    pub(crate) cameras: &'a [Camera],
+    /// The bounds of everything that casts shadows.
+    pub(crate) bounds: &'a Aabb,
+    pub(crate) settings: &'a Shadows,
+}
+
+impl Sight<'_> {
+    /// How many maps a directional light has.
+    fn cascades(&self) -> u32 {
+        self.settings.cascades.clamp(1, 4)
+    }
+}
+
 impl ShadowPlan {
-    /// `bounds`: of everything that casts shadows.
-    pub(crate) fn new(
-        lights: &[PlacedLight],
-        cameras: &[Camera],
-        bounds: &Aabb,
-        settings: &Shadows,
-        most_layers: u32,
-    ) -> Self {
-        if settings.resolution == 0 || bounds.is_empty() {
+    /// The maps of lights, at most `most_layers` of them.
+    pub(crate) fn new(lights: &[PlacedLight], sight: Sight<'_>, most_layers: u32) -> Self {
+        if sight.settings.resolution == 0 || sight.bounds.is_empty() {
             return Self { lights: vec![(0, 0); lights.len()], ..Self::default() };
         }
-        let cascades = settings.cascades.clamp(1, 4);
+        let cascades = sight.cascades();
         let wanted: Vec<u32> =
             lights.iter().map(|light| maps(&light.light.kind, cascades)).collect();
-        let (resolution, chosen) = room(lights, &wanted, settings, most_layers);
+        let (resolution, chosen) = room(lights, &wanted, sight.settings, most_layers);
         let mut plan = Self { resolution, ..Self::default() };
         for ((light, &count), chosen) in lights.iter().zip(&wanted).zip(chosen) {
             let first = plan.views.len() as u32;
@@ -67,16 +77,15 @@ impl ShadowPlan {
             }
             match light.light.kind {
                 LightKind::Directional { angle } => {
-                    let size = (0.5 * angle).tan();
-                    plan.directional(light.direction, size, cameras, bounds, settings, cascades);
+                    plan.directional(light.direction, (0.5 * angle).tan(), sight);
                 }
                 LightKind::Spot { outer, radius, .. } if count == 1 => {
-                    let up = up_for(light.direction);
-                    plan.perspective(light.position, light.direction, up, outer, radius);
+                    let axes = (light.direction, up_for(light.direction));
+                    plan.perspective(light.position, axes, outer, radius);
                 }
                 LightKind::Point { radius } | LightKind::Spot { radius, .. } => {
-                    for (forward, up) in FACES {
-                        plan.perspective(light.position, forward, up, 0.5 * FRAC_PI_2, radius);
+                    for axes in FACES {
+                        plan.perspective(light.position, axes, 0.5 * FRAC_PI_2, radius);
                     }
                 }
             }
@@ -85,7 +94,14 @@ impl ShadowPlan {
         plan
     }
 
-    fn perspective(&mut self, eye: Vec3, forward: Vec3, up: Vec3, half_angle: f32, radius: f32) {
+    /// Adds the map of a square pyramid of which the half angle is given, along `forward`.
+    fn perspective(
+        &mut self,
+        eye: Vec3,
+        (forward, up): (Vec3, Vec3),
+        half_angle: f32,
+        radius: f32,
+    ) {
         let tan = half_angle.tan();
         let clip_from_view =
             Mat4::from_cols(Vec4::X / tan, Vec4::Y / tan, Vec4::NEG_W, Vec4::Z * NEAR);
@@ -94,26 +110,20 @@ impl ShadowPlan {
             texel: 2.0 * tan / self.resolution as f32,
             near: NEAR,
             reach: Vec2::ONE,
-            // Of what stands a quarter of the way from the light.
+            // Casters a quarter of the way from the light have an edge so wide.
             search: 3.0 * radius,
             ..layout::ShadowView::default()
         });
     }
 
-    fn directional(
-        &mut self,
-        direction: Vec3,
-        size: f32,
-        cameras: &[Camera],
-        bounds: &Aabb,
-        settings: &Shadows,
-        cascades: u32,
-    ) {
+    /// Adds the cascades of a light from afar. `size` is the tangent of half its angle.
+    fn directional(&mut self, direction: Vec3, size: f32, sight: Sight<'_>) {
+        let Sight { cameras, bounds, settings } = sight;
         let light_from_world = Mat4::look_to_rh(Vec3::ZERO, direction, up_for(direction));
         let all = bounds.transformed(|corner| light_from_world.transform_point3(corner));
-        let depth_range = (all.max.z - all.min.z).max(1e-3) * 1.001;
         let farthest = cameras.iter().map(|c| farthest(c, bounds)).fold(1e-2, f32::max);
         let nearest = 0.005 * farthest;
+        let cascades = sight.cascades();
         for cascade in 0..cascades {
             let from = if cascade == 0 { 0.0 } else { split(nearest, farthest, cascade, cascades) };
             let to = split(nearest, farthest, cascade + 1, cascades);
@@ -121,23 +131,41 @@ impl ShadowPlan {
                 true => around_sphere(&light_from_world, cameras, from, to),
                 false => around(&light_from_world, slices(cameras, from, to)),
             };
-            // What lies outside the scene needs no map.
-            let (low, high) = (seen.min.max(all.min), seen.max.min(all.max));
-            let (low, high) = (low.truncate().min(high.truncate()), high.truncate());
-            let middle = 0.5 * (low + high);
-            let texels = self.resolution as f32;
-            let inner = (0.5 * (high - low)).max(Vec2::splat(1e-3));
-            let search =
-                (size * depth_range).min(WIDEST_SEARCH * 2.0 * inner.max_element() / texels);
-            // Wider by what edges at the border reach beyond it.
-            let extra = (settings.filter_radius + MARGIN).min(0.25 * texels);
-            let wide = inner + search;
-            let widest_texel = 2.0 * wide.max_element() / (texels - 2.0 * extra);
-            let half = wide + extra * widest_texel;
-            let texel = 2.0 * half / texels;
-            let snapped = (middle / texel).floor() * texel;
+            let mut view = self.cascade(&seen, &all, size, settings);
+            view.clip_from_world *= light_from_world;
+            if cascade + 1 == cascades {
+                view.reach = Vec2::ONE;
+            }
+            self.views.push(view);
+        }
+    }
+
+    /// The map of what is `seen` of `all`: boxes as the light sees them, in which space the view is.
+    fn cascade(
+        &self,
+        seen: &Aabb,
+        all: &Aabb,
+        size: f32,
+        settings: &Shadows,
+    ) -> layout::ShadowView {
+        let depth_range = (all.max.z - all.min.z).max(1e-3) * 1.001;
+        // What lies outside the scene needs no map.
+        let (low, high) = (seen.min.max(all.min), seen.max.min(all.max));
+        let (low, high) = (low.truncate().min(high.truncate()), high.truncate());
+        let middle = 0.5 * (low + high);
+        let texels = self.resolution as f32;
+        let inner = (0.5 * (high - low)).max(Vec2::splat(1e-3));
+        let search = (size * depth_range).min(WIDEST_SEARCH * 2.0 * inner.max_element() / texels);
+        // Wider by what edges at the border reach beyond it.
+        let extra = (settings.filter_radius + MARGIN).min(0.25 * texels);
+        let wide = inner + search;
+        let widest_texel = 2.0 * wide.max_element() / (texels - 2.0 * extra);
+        let half = wide + extra * widest_texel;
+        let texel = 2.0 * half / texels;
+        let snapped = (middle / texel).floor() * texel;
+        layout::ShadowView {
             // Depth 1 is nearest to the light, which looks along −z.
-            let clip_from_light = Mat4::from_cols(
+            clip_from_world: Mat4::from_cols(
                 Vec4::X / half.x,
                 Vec4::Y / half.y,
                 Vec4::Z / depth_range,
@@ -147,19 +175,13 @@ impl ShadowPlan {
                     1.0 - all.max.z / depth_range,
                     1.0,
                 ),
-            );
-            self.views.push(layout::ShadowView {
-                clip_from_world: clip_from_light * light_from_world,
-                texel: widest_texel,
-                depth_range,
-                reach: match cascade + 1 == cascades {
-                    true => Vec2::ONE,
-                    // Moved by less than a texel, its middle is.
-                    false => (inner + widest_texel) / half,
-                },
-                search,
-                ..layout::ShadowView::default()
-            });
+            ),
+            texel: widest_texel,
+            depth_range,
+            // Its middle is moved by less than a texel.
+            reach: (inner + widest_texel) / half,
+            search,
+            ..layout::ShadowView::default()
         }
     }
 }
@@ -274,7 +296,7 @@ mod tests {
     fn plan(lights: &[PlacedLight], settings: &Shadows) -> ShadowPlan {
         let view = View::look_at(Vec3::new(0.0, 1.0, 8.0), Vec3::ZERO, 0.9).unwrap();
         let camera = Camera::new(&view, UVec2::new(160, 90), Vec2::ZERO);
-        ShadowPlan::new(lights, &[camera], &BOUNDS, settings, 256)
+        ShadowPlan::new(lights, Sight { cameras: &[camera], bounds: &BOUNDS, settings }, 256)
     }
 
     fn in_clip(view: &layout::ShadowView, point: Vec3) -> Vec3 {
@@ -384,13 +406,9 @@ mod tests {
         assert_eq!(plan.left_out, 500 - plan.views.len());
         assert_eq!(plan.lights[499].1, 1, "the most intense has one");
         assert_eq!(plan.lights[0].1, 0);
-        let none = super::ShadowPlan::new(
-            &many,
-            &[],
-            &BOUNDS,
-            &Shadows { resolution: 0, ..settings },
-            256,
-        );
+        let none = Shadows { resolution: 0, ..settings };
+        let none = Sight { cameras: &[], bounds: &BOUNDS, settings: &none };
+        let none = ShadowPlan::new(&many, none, 256);
         assert!(none.views.is_empty() && none.lights.len() == 500);
     }
 
