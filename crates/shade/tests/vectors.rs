@@ -3,7 +3,7 @@
 
 use glam::{Vec3, Vec4};
 use lumencast_gpu::{Gpu, Readback, bindings, wgpu};
-use lumencast_shaders::harmonics;
+use lumencast_shaders::assemble;
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -35,8 +35,10 @@ struct Answer {
 /// Numbers of an answer.
 const ANSWER: usize = 50;
 
-/// Asks the functions of `harmonics.wgsl`: direction in, numbers out.
+/// Asks the functions of `common/harmonics`: direction in, numbers out.
 const QUESTIONS: &str = "
+#import common/harmonics
+
 @group(0) @binding(0) var<storage, read> asked: array<vec4f>;
 @group(0) @binding(1) var<storage, read_write> answers: array<array<f32, 50>>;
 
@@ -62,7 +64,8 @@ fn ask(asked: &[Vec4]) -> Vec<Answer> {
     let gpu = Gpu::new().expect("an adapter");
     let types = [bindings::STORAGE, bindings::WRITTEN];
     let layout = gpu.group_layout("vectors", wgpu::ShaderStages::COMPUTE, &types);
-    let pipeline = gpu.compute("vectors", harmonics() + QUESTIONS, "ask", &[&layout]);
+    let questions = assemble(QUESTIONS).expect("harmonics");
+    let pipeline = gpu.compute("vectors", questions, "ask", &[&layout]);
     let storage = wgpu::BufferUsages::STORAGE;
     let input = gpu.buffer("asked", storage, bytemuck::cast_slice(asked), 0);
     let size = (asked.len() * ANSWER * size_of::<f32>()) as u64;

@@ -1,42 +1,86 @@
-//! WGSL modules, put together into shaders, and the memory layouts that they share with Rust.
+//! WGSL modules that import each other, shaders made of them, and the memory layouts that they share
+//! with Rust.
 //!
-//! A shader is the text of its modules one after the other ([`forward`], [`depth`], [`background`],
-//! [`occlusion`]; before them [`deform`], and for what is done with a picture [`screen`], [`meter`]);
-//! what they need of each other is told by their order here, since WGSL has no imports. Tests validate
-//! every shader without a GPU, and compare every struct of [`layout`] with what the compiler makes of
-//! its namesake.
+//! Modules lie in folders by what they are for: `common` (mathematics and light that every stage
+//! shares), `surface` (materials, and what they do with light), `field` (probe volumes) and `shade` (the
+//! renderer). A module names those that it needs in lines such as `#import common/math`; [`assemble`]
+//! puts them before a source of one's own.
 //!
-//! Bindings are grouped by lifetime: 0 the pass (its view, instances, and which of them it draws), 1
-//! the frame's light (punctual lights, shadow maps, environment), 2 the fields, 3 the material.
-//! Deforming and what is done with a picture have a group of their own.
+//! Functions stand apart from bindings. Modules named `bindings` or `…_bindings` declare what a group
+//! binds, one module for each lifetime: group 0 the pass (its view, instances, and which of them it
+//! draws), 1 the frame (punctual lights, shadow maps, environment), 2 the fields, 3 the material.
+//! Deforming and what is done with a picture have groups of their own. All of `common`, and what else
+//! imports no bindings, is for fragment and compute shaders alike. So is `field/light`, wherever group 2
+//! is the fields. What takes derivatives, as textures with mips do, only fragment shaders import.
+//!
+//! Tests validate every shader without a GPU, and compare every struct of [`layout`] with what the
+//! compiler makes of its namesake.
 //!
 //! ```
-//! use lumencast_shaders::{Shading, forward};
+//! use lumencast_shaders::{Shading, assemble, forward};
 //!
 //! let shader = forward(Shading::Samples);
 //! assert!(shader.contains("fn solid_fragment"));
+//!
+//! let own = assemble("#import common/math\nconst HALF_PI: f32 = 0.5 * PI;\n")?;
+//! assert!(own.contains("const PI"));
+//! # Ok::<(), lumencast_shaders::ImportError>(())
 //! ```
 
 #![forbid(unsafe_code)]
 
+mod assemble;
 pub mod layout;
 
-const COMMON: &str = include_str!("../wgsl/common.wgsl");
-const VIEW: &str = include_str!("../wgsl/view.wgsl");
-const ENVIRONMENT: &str = include_str!("../wgsl/environment.wgsl");
-const LIGHT: &str = include_str!("../wgsl/light.wgsl");
-const HARMONICS: &str = include_str!("../wgsl/harmonics.wgsl");
-const FIELD: &str = include_str!("../wgsl/field.wgsl");
-const BSDF: &str = include_str!("../wgsl/bsdf.wgsl");
-const MATERIAL: &str = include_str!("../wgsl/material.wgsl");
-const FORWARD: &str = include_str!("../wgsl/forward.wgsl");
-const DEPTH: &str = include_str!("../wgsl/depth.wgsl");
-const BACKGROUND: &str = include_str!("../wgsl/background.wgsl");
-const OCCLUSION: &str = include_str!("../wgsl/occlusion.wgsl");
-const TONE: &str = include_str!("../wgsl/tone.wgsl");
-const SCREEN: &str = include_str!("../wgsl/screen.wgsl");
-const METER: &str = include_str!("../wgsl/meter.wgsl");
-const DEFORM: &str = include_str!("../wgsl/deform.wgsl");
+pub use assemble::ImportError;
+use assemble::Modules;
+
+macro_rules! modules {
+    ($($name:literal),* $(,)?) => {
+        [$(($name, include_str!(concat!("../wgsl/", $name, ".wgsl")))),*]
+    };
+}
+
+/// The names and texts of all modules. `shade/sampling`, which `shade/forward` imports, is one of
+/// `shade/by_pixels` and `shade/by_samples`: see [`forward`].
+pub const MODULES: [(&str, &str); 36] = modules![
+    "common/environment",
+    "common/harmonics",
+    "common/light",
+    "common/math",
+    "common/tone",
+    "common/triangle",
+    "field/bindings",
+    "field/light",
+    "field/volume",
+    "shade/ambient",
+    "shade/background",
+    "shade/by_pixels",
+    "shade/by_samples",
+    "shade/depth",
+    "shade/direct",
+    "shade/forward",
+    "shade/frame",
+    "shade/frame_bindings",
+    "shade/indirect",
+    "shade/meter",
+    "shade/meter_bindings",
+    "shade/occlusion",
+    "shade/occlusion_bindings",
+    "shade/pass_bindings",
+    "shade/screen",
+    "shade/screen_bindings",
+    "shade/shadows",
+    "shade/sight",
+    "shade/view",
+    "surface/bindings",
+    "surface/bsdf",
+    "surface/deform",
+    "surface/deform_bindings",
+    "surface/material",
+    "surface/site",
+    "surface/textures",
+];
 
 /// How often a multisampled surface is shaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -48,55 +92,64 @@ pub enum Shading {
     Samples,
 }
 
+/// A source after the modules that it imports.
+///
+/// # Errors
+/// Where it imports what is no module.
+pub fn assemble(source: &str) -> Result<String, ImportError> {
+    Modules(MODULES.to_vec()).assemble(source)
+}
+
+/// The shader whose entry points a module has.
+fn shader(module: &str) -> String {
+    shader_of(Modules(MODULES.to_vec()), module)
+}
+
+fn shader_of(modules: Modules<'_>, module: &str) -> String {
+    let shader = modules.assemble(&format!("#import {module}\n"));
+    shader.expect("our modules import modules, and no circles: a test assembles each")
+}
+
 /// Draws surfaces: `forward_vertex`; `solid_fragment` for those that cover all, `holed_fragment` for the
 /// others.
 pub fn forward(shading: Shading) -> String {
-    let modules = [COMMON, VIEW, ENVIRONMENT, LIGHT, HARMONICS, FIELD, BSDF, MATERIAL].concat();
-    let own = match shading {
-        Shading::Pixels => FORWARD.to_owned(),
-        Shading::Samples => FORWARD
-            .replace("@interpolate(perspective, center)", "@interpolate(perspective, sample)")
-            .replace("/*SAMPLE*/", "@builtin(sample_index) sample: u32,")
-            // The samples of a pixel take turns of a pattern that together fill the circle.
-            .replace("/*ITS TURN*/", " + 0.618034 * f32(sample)"),
+    let sampling = match shading {
+        Shading::Pixels => "shade/by_pixels",
+        Shading::Samples => "shade/by_samples",
     };
-    modules + &own
+    let chosen = MODULES.into_iter().find(|(name, _)| *name == sampling);
+    let sampling = chosen.map(|(_, text)| ("shade/sampling", text));
+    shader_of(Modules(MODULES.into_iter().chain(sampling).collect()), "shade/forward")
 }
 
 /// Draws the depth that a light or a camera sees: `depth_vertex` alone for opaque surfaces (where there is
 /// a picture, with `depth_fragment`); `masked_depth_vertex` and `masked_depth_fragment` for those with
 /// holes. Depths of `depth_vertex` are those of `forward_vertex`, to the bit.
 pub fn depth() -> String {
-    // `Bsdf` for what `material.wgsl` returns.
-    [COMMON, VIEW, BSDF, MATERIAL, DEPTH].concat()
+    shader("shade/depth")
 }
 
 /// Draws the environment where there is no surface: `background_vertex`, `background_fragment`.
 pub fn background() -> String {
-    [COMMON, VIEW, ENVIRONMENT, LIGHT, BACKGROUND].concat()
+    shader("shade/background")
 }
 
 /// Deforms the vertices of a primitive: `deform_vertices`.
 pub fn deform() -> String {
-    [COMMON, DEFORM].concat()
-}
-
-/// Spherical harmonics alone, for those who compare them with their own.
-pub fn harmonics() -> String {
-    [COMMON, HARMONICS].concat()
+    shader("surface/deform")
 }
 
 /// Ambient occlusion in screen space: `occlusion_vertex`, `occlusion_fragment`, and `blur_fragment`.
 pub fn occlusion() -> String {
-    [COMMON, VIEW, OCCLUSION].concat()
+    shader("shade/occlusion")
 }
 
 /// Shows a picture as display codes: `screen_vertex`, `screen_fragment`.
 pub fn screen() -> String {
-    [COMMON, TONE, SCREEN].concat()
+    shader("shade/screen")
 }
 
 /// Counts how bright the pixels of a picture are: `meter`.
 pub fn meter() -> String {
-    [TONE, METER].concat()
+    shader("shade/meter")
 }

@@ -1,5 +1,4 @@
-//! Every shader is valid WGSL, put together as at run time, and every struct lies in memory as Rust
-//! has it.
+//! Every shader is valid WGSL, assembled as at run time, and every struct lies in memory as Rust has it.
 
 use std::mem::{offset_of, size_of};
 

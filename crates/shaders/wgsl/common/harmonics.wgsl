@@ -2,6 +2,8 @@
 //
 // Coefficients come in groups of four, as the atlas packs them: a group is three texels.
 
+#import common/math
+
 // Y_lm(d) times a multiplier a band, in groups of four coefficients.
 struct Lobe {
     g0: vec4f,

@@ -4,23 +4,15 @@
 // Bavoil and Sainz 2008 ("Image-Space Horizon-Based Ambient Occlusion") do. Triangles over the whole
 // target, which has the depth's size.
 
-struct Occlusion {
-    // From here on nothing is hidden, metres.
-    radius: f32,
-    // Slices of a pixel, and samples to either side of a slice.
-    directions: u32,
-    steps: u32,
-    _pad: u32,
-}
-
-@group(1) @binding(0) var<uniform> occlusion: Occlusion;
-@group(1) @binding(1) var depths: texture_depth_2d;
-// What is blurred.
-@group(1) @binding(2) var rough: texture_2d<f32>;
+#import common/math
+#import common/triangle
+#import shade/occlusion_bindings
+#import shade/pass_bindings
+#import shade/sight
 
 @vertex
 fn occlusion_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
-    let at = vec2f(f32(index & 1u), f32(index >> 1u)) * 4.0 - 1.0;
+    let at = corner_of(index);
     return vec4f(at, 0.0, 1.0);
 }
 
@@ -32,7 +24,7 @@ fn depth_at(pixel: vec2i) -> f32 {
     return textureLoad(depths, pixel, 0);
 }
 
-// In view space: x to the right, y up, z towards the eye.
+// The place of a pixel's surface in view space: x to the right, y up, z towards the eye.
 fn position_at(pixel: vec2i, depth: f32) -> vec3f {
     let at = (vec2f(pixel) + 0.5) / vec2f(textureDimensions(depths));
     let h = view.view_from_clip * vec4f(2.0 * at.x - 1.0, 1.0 - 2.0 * at.y, depth, 1.0);
@@ -52,7 +44,7 @@ fn slope(pixel: vec2i, depth: f32, axis: vec2i) -> f32 {
 // A vector along the surface, towards the next pixel along an axis.
 fn along_surface(pixel: vec2i, depth: f32, here: vec3f, axis: vec2i) -> vec3f {
     let change = slope(pixel, depth, axis);
-    // To the nearer side: to the other one a surface may reach infinity within a pixel.
+    // The nearer side is taken: on the other one a surface may reach infinity within a pixel.
     let side = select(-1, 1, change >= 0.0);
     return f32(side) * (position_at(pixel + side * axis, depth + abs(change)) - here);
 }
@@ -88,7 +80,7 @@ struct Slice {
     across: vec3f,
     // What moves points into the slice along the surface, for each metre that they are across it.
     into: vec3f,
-    // Of the normal's projection: its length, and the angle from v towards d.
+    // The length of the normal's projection, and its angle from v towards d.
     weight: f32,
     tilt: f32,
 }
@@ -122,15 +114,15 @@ fn hidden(s: Slice, pixel: vec2i, here: vec3f, side: f32, offset: f32) -> f32 {
             continue;
         }
         let towards = position_at(pixel + by, depth) - here;
-        let left = 1.0 - dot(towards, towards) / (occlusion.radius * occlusion.radius);
+        let remaining = 1.0 - dot(towards, towards) / (occlusion.radius * occlusion.radius);
         // Pixels lie beside the slice. Moved along the surface they rise above it as much as before, so
         // that a plane does not hide itself. What comes to lie on the other side is left out.
         let inside = towards + s.into * dot(towards, s.across);
         let along = vec2f(side * dot(inside, s.d), dot(inside, s.v));
         let cosine = along.y * inverseSqrt(dot(along, along));
-        if left > 0.0 && along.x > 0.0 && cosine > horizon_cosine {
+        if remaining > 0.0 && along.x > 0.0 && cosine > horizon_cosine {
             let angle = acos(clamp(cosine, -1.0, 1.0));
-            sum += left * (arc(horizon, tilt) - arc(angle, tilt));
+            sum += remaining * (arc(horizon, tilt) - arc(angle, tilt));
             horizon = angle;
             horizon_cosine = cosine;
         }

@@ -1,12 +1,14 @@
 // The environment: the twin of `gather::lights::environment`'s radiance.
 
+#import common/math
+
 struct Environment {
     // Straight up (of a picture: its factor), straight down, at the horizon; cd/m².
     zenith: vec3f,
     // 0: by elevation, 1: a picture.
     kind: u32,
     ground: vec3f,
-    // Of a picture about +Y, in full turns.
+    // A picture is turned so far about +Y, in full turns.
     turn: f32,
     horizon: vec3f,
     _pad: u32,

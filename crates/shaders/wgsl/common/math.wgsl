@@ -28,7 +28,12 @@ fn transform_point(rows: array<vec4f, 3>, p: vec3f) -> vec3f {
     return vec3f(dot(rows[0], h), dot(rows[1], h), dot(rows[2], h));
 }
 
-// Its linear part applied to a vector.
+// The linear part of a row-major transform, applied to a vector.
 fn transform_vector(rows: array<vec4f, 3>, v: vec3f) -> vec3f {
     return vec3f(dot(rows[0].xyz, v), dot(rows[1].xyz, v), dot(rows[2].xyz, v));
+}
+
+fn normalize_or_zero(v: vec3f) -> vec3f {
+    let square = dot(v, v);
+    return select(vec3f(0.0), v * inverseSqrt(max(square, 1e-38)), square > 0.0);
 }

@@ -2,6 +2,12 @@
 // ones, of which cameras want no depth, as many texels stay open as light passes, which the filter of
 // the shadow's edge averages.
 
+#import common/math
+#import shade/pass_bindings
+#import surface/bindings
+#import surface/material
+#import surface/textures
+
 struct DepthVertex {
     @location(0) position: vec3f,
     @location(3) uv0: vec2f,

@@ -1,5 +1,10 @@
 // Draws the environment where there is no surface: a triangle over the whole target.
 
+#import common/environment
+#import common/triangle
+#import shade/frame_bindings
+#import shade/pass_bindings
+
 struct Background {
     @invariant @builtin(position) clip: vec4f,
     @location(0) @interpolate(linear, center) at: vec2f,
@@ -7,7 +12,7 @@ struct Background {
 
 @vertex
 fn background_vertex(@builtin(vertex_index) index: u32) -> Background {
-    let at = vec2f(f32(index & 1u), f32(index >> 1u)) * 4.0 - 1.0;
+    let at = corner_of(index);
     return Background(vec4f(at, 0.0, 1.0), at);
 }
 

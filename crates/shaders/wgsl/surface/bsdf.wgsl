@@ -1,5 +1,7 @@
 // How surfaces scatter light: the twin of `gather::bsdf`, in world space.
 
+#import common/math
+
 // What a surface is made of, textures looked up already.
 struct Substance {
     base_color: vec3f,
@@ -15,10 +17,10 @@ struct Bsdf {
     diffuse: vec3f,
     alpha: f32,
     transmission: vec3f,
-    // Of the specular lobe: dielectric and metal mixed.
+    // The specular lobe is one of dielectric and metal, mixed.
     f90: f32,
     f0: vec3f,
-    // Of the dielectric alone: what the lobes underneath lose.
+    // The lobes underneath lose what the dielectric alone reflects.
     dielectric_f0: f32,
     dielectric_f90: f32,
 }
@@ -79,7 +81,7 @@ fn ggx_lobe(n: vec3f, v: vec3f, l: vec3f, n_v: f32, n_l: f32, alpha: f32) -> vec
     let sum = v + l;
     let h = select(n, normalize(sum), dot(sum, sum) > 0.0);
     let a2 = alpha * alpha;
-    // So written it keeps its digits near the peak.
+    // Written so, it keeps its digits near the peak.
     let across = cross(n, h);
     let n_h = dot(n, h);
     let t = dot(across, across) / a2 + n_h * n_h;

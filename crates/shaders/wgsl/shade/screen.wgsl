@@ -1,22 +1,14 @@
 // Shows a picture: exposed, tone mapped, as display codes. A triangle over the whole target, which
 // has the picture's size.
 
-struct Screen {
-    // What the picture is multiplied by before it is mapped.
-    factor: f32,
-    // One of the tone maps.
-    tone_map: u32,
-    // Of the codes that the target holds, for rounding them at random; 0 rounds to the nearest.
-    step: f32,
-    _pad: u32,
-}
-
-@group(0) @binding(0) var<uniform> screen: Screen;
-@group(0) @binding(1) var picture: texture_2d<f32>;
+#import common/math
+#import common/tone
+#import common/triangle
+#import shade/screen_bindings
 
 @vertex
 fn screen_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
-    let at = vec2f(f32(index & 1u), f32(index >> 1u)) * 4.0 - 1.0;
+    let at = corner_of(index);
     return vec4f(at, 0.0, 1.0);
 }
 

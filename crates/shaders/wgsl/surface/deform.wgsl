@@ -1,34 +1,8 @@
 // Morph targets and skins: the vertices of a primitive of a deforming instance, a thread each. What
 // `scene::deform` computes; glTF 2.0, sections 3.7.2.2 and 3.7.3.
 
-struct Deform {
-    vertices: u32,
-    // How many of `morphs` there are.
-    morphs: u32,
-    // Joints of the skin. One transform more is in `pose`, for whatever has no joint.
-    joints: u32,
-    // Of each vertex, one after the other.
-    influences: u32,
-    flags: u32,
-}
-
-const DEFORM_SKINNED: u32 = 1u;
-// Each triangle has three vertices of its own, and its normal.
-const DEFORM_FLAT: u32 = 2u;
-
-// Four of the joints that a vertex hangs on.
-struct Influence {
-    weights: vec4f,
-    // Four numbers of 16 bits, the first in the lower half of x.
-    joints: vec2u,
-    _pad: vec2u,
-}
-
-// A morph target that displaces.
-struct Morph {
-    number: u32,
-    weight: f32,
-}
+#import common/math
+#import surface/deform_bindings
 
 struct Shape {
     position: vec3f,
@@ -39,16 +13,8 @@ struct Shape {
 
 // Numbers of a vertex in `rest` and `deformed`: position, normal, tangent.
 const SHAPE: u32 = 10u;
-// And in `displacements`, target by target: of position, normal, tangent.
+// Numbers of a vertex in `displacements`, target by target: of position, normal, tangent.
 const DISPLACEMENT: u32 = 9u;
-
-@group(0) @binding(0) var<uniform> deform: Deform;
-@group(0) @binding(1) var<storage, read> rest: array<f32>;
-@group(0) @binding(2) var<storage, read> influences: array<Influence>;
-@group(0) @binding(3) var<storage, read> displacements: array<f32>;
-@group(0) @binding(4) var<storage, read> morphs: array<Morph>;
-@group(0) @binding(5) var<storage, read> pose: array<array<vec4f, 3>>;
-@group(0) @binding(6) var<storage, read_write> deformed: array<f32>;
 
 fn at_rest(vertex: u32) -> Shape {
     let i = SHAPE * vertex;
@@ -63,7 +29,7 @@ fn displacement(i: u32) -> vec3f {
     return vec3f(displacements[i], displacements[i + 1u], displacements[i + 2u]);
 }
 
-// Of length one, or what stands in where it has no direction.
+// A vector of length one, or what stands in where there is no direction.
 fn unit_or(v: vec3f, otherwise: vec3f) -> vec3f {
     let squared = dot(v, v);
     return select(otherwise, v * inverseSqrt(squared), squared > 0.0);
@@ -129,7 +95,7 @@ fn shape_of(vertex: u32) -> Shape {
 fn face_normal(a: vec3f, b: vec3f, c: vec3f) -> vec3f {
     let p = b - a;
     let q = c - a;
-    // So that the product of small edges does not vanish.
+    // Scaled edges have a product that does not vanish, however small they are.
     let extent = max(abs(p), abs(q));
     let scale = max(max(extent.x, extent.y), extent.z);
     return unit_or(cross(p / scale, q / scale), vec3f(0.0, 1.0, 0.0));

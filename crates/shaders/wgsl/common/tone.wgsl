@@ -6,7 +6,7 @@ const TONE_REINHARD: u32 = 2u;
 const TONE_FILMIC: u32 = 3u;
 const TONE_NEUTRAL: u32 = 4u;
 
-// Of linear Rec. 709 colour.
+// The luminance of linear Rec. 709 colour.
 fn luminance(linear: vec3f) -> f32 {
     return dot(linear, vec3f(0.2126, 0.7152, 0.0722));
 }

@@ -1,0 +1,25 @@
+// Where a pass looks from, and what it draws.
+
+struct View {
+    clip_from_world: mat4x4f,
+    world_from_clip: mat4x4f,
+    // View space: x to the right, y up, z towards the eye.
+    view_from_clip: mat4x4f,
+    eye: vec3f,
+    // 1 where all rays leave from the eye, 0 where they are parallel.
+    perspective: f32,
+    forward: vec3f,
+    // Fraction of a turn added to patterns, so that frames of one picture differ.
+    turn: f32,
+}
+
+struct Instance {
+    world_from_object: array<vec4f, 3>,
+    // Inverse transpose of its linear part.
+    normal_from_object: array<vec4f, 3>,
+    // 1 where the transform mirrors, so that windings are turned about.
+    mirrors: u32,
+    _pad0: u32,
+    _pad1: u32,
+    _pad2: u32,
+}
