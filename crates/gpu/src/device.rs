@@ -13,8 +13,7 @@ pub(crate) const TIMED_PASSES: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
 /// What is used where an adapter has it, and done without where it has not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Abilities {
-    /// The most samples that a pixel has at once, in [`COLOR`] and
-    /// [`DEPTH`]: 1, 2, 4 or 8.
+    /// The most samples that a pixel has at once, in [`COLOR`] and [`DEPTH`]: 1, 2, 4 or 8.
     pub samples: u32,
     /// Every sample of a pixel can be shaded.
     pub sample_shading: bool,

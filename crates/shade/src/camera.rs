@@ -16,13 +16,13 @@ pub(crate) struct Camera {
     pub(crate) clip_from_world: Mat4,
     clip_from_view: Mat4,
     pub(crate) eye: Vec3,
-    /// Unit.
+    /// The axis of sight, a unit vector.
     pub(crate) forward: Vec3,
     pub(crate) perspective: bool,
 }
 
 impl Camera {
-    /// Draws what [`View::ray`] looks at. `jitter`: pixels by which the picture is moved.
+    /// A camera that sees what [`View::ray`] looks at. The picture is moved by `jitter`, pixels.
     pub(crate) fn new(view: &View, size: UVec2, jitter: Vec2) -> Self {
         let size = size.as_vec2();
         let aspect = size.x / size.y;
@@ -84,7 +84,7 @@ impl Camera {
         std::array::from_fn(|i| {
             let side = |bit: usize| if i & bit == 0 { -1.0 } else { 1.0 };
             let distance = if i & 4 == 0 { near } else { far };
-            // A point of the ray through a corner of the picture.
+            // This point lies on the ray through a corner of the picture.
             let on_ray = world_from_clip * Vec4::new(side(1), side(2), 0.5, 1.0);
             let on_ray = on_ray.truncate() / on_ray.w;
             if self.perspective {
@@ -102,7 +102,7 @@ impl Camera {
 pub(crate) struct Frustum([Vec4; 5]);
 
 impl Frustum {
-    /// Of Gribb and Hartmann (2001); nothing is too far.
+    /// The planes of Gribb and Hartmann (2001), without one for what is too far.
     pub(crate) fn new(clip_from_world: &Mat4) -> Self {
         let [x, y, z, w] = [0, 1, 2, 3].map(|i| clip_from_world.row(i));
         Self([w + x, w - x, w + y, w - y, w - z])
@@ -119,8 +119,8 @@ impl Frustum {
     }
 }
 
-/// Where within a pixel frame `i` of `n` samples it, pixels from its middle: Hammersley's points, whose
-/// mean is the middle.
+/// Where frame `i` of `n` samples a pixel, in pixels from its middle: at Hammersley's points, whose mean
+/// is the middle.
 pub(crate) fn jitter(i: u32, n: u32) -> Vec2 {
     let half_step = 0.5 / n as f32;
     let mirrored = i.reverse_bits() as f32 * 2f32.powi(-32);

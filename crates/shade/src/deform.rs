@@ -12,16 +12,16 @@ use crate::part::{Part, SHAPE_SIZE};
 const GROUP: u32 = 64;
 /// Workgroups along an axis, as many as every device has.
 const ROW: u32 = 65_535;
-/// Floats of a vertex's displacement: of position, normal and tangent.
+/// A vertex's displacement has so many floats: of position, normal and tangent.
 const DISPLACEMENT: usize = 9;
 
-/// What of a primitive deforms, on the device.
+/// What deforms of a primitive, on the device.
 #[derive(Debug)]
 pub(crate) struct Deformable {
     influences: wgpu::Buffer,
     displacements: wgpu::Buffer,
     vertices: u32,
-    /// Of four joints, a vertex.
+    /// A vertex hangs on so many fours of joints.
     influences_each: u32,
     flat: bool,
     reach: Reach,
@@ -84,9 +84,11 @@ impl Cause {
 /// How a primitive of an instance is deformed.
 #[derive(Clone, Copy)]
 pub(crate) struct Deforming<'a> {
+    /// The primitive at rest.
+    pub(crate) rest: &'a Part,
     pub(crate) deformable: &'a Deformable,
     pub(crate) deformation: &'a Deformation,
-    /// The same on the device.
+    /// The deformation on the device.
     pub(crate) cause: &'a Cause,
 }
 
@@ -106,21 +108,20 @@ impl Deformer {
         Self { layout, pipeline }
     }
 
-    /// Writes the vertices of `deformed`, which shares all else with `rest`, and tells its bounds.
+    /// Writes the vertices and bounds of `deformed`, which shares all else with the primitive at rest.
     pub(crate) fn deform(
         &self,
         gpu: &Gpu,
         pass: &mut wgpu::ComputePass<'_>,
         by: Deforming<'_>,
-        rest: &Part,
         deformed: &mut Part,
     ) {
-        let Deforming { deformable, deformation, cause } = by;
+        let Deforming { rest, deformable, deformation, cause } = by;
         let targets = deformable.reach.displacements.len() as u32;
         let pose = deformation.pose();
         let uniform = layout::Deform {
             vertices: deformable.vertices,
-            // In ascending order; a primitive may have fewer targets than there are weights.
+            // They are in ascending order, and a primitive may have fewer targets than weights.
             morphs: cause.morphs.partition_point(|morph| morph.number < targets) as u32,
             joints: pose.map_or(0, |pose| pose.joints.len() as u32),
             influences: deformable.influences_each,
@@ -151,11 +152,11 @@ impl Deformer {
 /// How far a primitive's vertices can go.
 #[derive(Debug)]
 struct Reach {
-    /// By joint, the box of the vertices at rest that hang on it.
+    /// For each joint, the box of the vertices at rest that hang on it.
     joints: Vec<Aabb>,
-    /// Of those without joints.
+    /// The box of those without joints.
     loose: Aabb,
-    /// By morph target, the box of displacements.
+    /// For each morph target, the box of displacements.
     displacements: Vec<Aabb>,
 }
 
@@ -216,7 +217,7 @@ fn influences(primitive: &Primitive) -> Vec<layout::Influence> {
         layout::Influence { weights, joints, ..layout::Influence::default() }
     };
     if primitive.joints.is_empty() {
-        // A joint that there is not.
+        // There is no joint of this number.
         return vec![influence([u16::MAX; 4], Vec4::X); primitive.vertices.positions.len()];
     }
     let fours = primitive.joints.iter().zip(&primitive.weights);
@@ -298,11 +299,11 @@ mod tests {
         let vertices = seed..seed + VERTICES;
         let weights = vertices.clone().map(|i| {
             let (a, b) = (vector(i + 20_000).abs(), random(i + 20_000).abs());
-            // Every third hangs on one joint alone.
+            // Every third vertex hangs on one joint alone.
             let weights = if i % 3 == 0 { Vec4::Y } else { a.extend(b) };
             weights / weights.element_sum()
         });
-        // One joint more than there is.
+        // Numbers go one joint too far.
         let joint = |i: u32| (i % (u32::from(JOINTS) + 1)) as u16;
         Primitive {
             weights: weights.collect(),
@@ -353,7 +354,7 @@ mod tests {
             (vec![], None),
             (vec![0.0, 0.0], Some(pose(0, Vec3::ONE))),
             (vec![0.7], None),
-            // Of weights past the last target nobody knows anything.
+            // Weights past the last target have no meaning.
             (vec![-0.4, 1.3, 5.0], Some(pose(50, Vec3::splat(1.7)))),
             (vec![0.0, 0.9], Some(pose(90, mirrored))),
         ]
@@ -373,8 +374,8 @@ mod tests {
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());
         let deformable = deformable.expect("room for it");
-        let by = Deforming { deformable, deformation, cause: &cause };
-        deformer.deform(gpu, &mut pass, by, rest, &mut part);
+        let by = Deforming { rest, deformable, deformation, cause: &cause };
+        deformer.deform(gpu, &mut pass, by, &mut part);
         drop(pass);
         let read = Readback::buffer(gpu, "vertices", part.shape.size());
         encoder.copy_buffer_to_buffer(&part.shape, 0, &read, 0, part.shape.size());

@@ -12,7 +12,7 @@ use crate::part::{Part, upload};
 /// The meshes that are on the device.
 #[derive(Debug, Default)]
 pub(crate) struct Geometry {
-    /// By address; the mesh is kept, so that no other takes its place.
+    /// Meshes by their addresses. Each is kept, so that no other takes its place.
     meshes: HashMap<usize, Kept>,
 }
 
@@ -20,7 +20,7 @@ pub(crate) struct Geometry {
 struct Kept {
     mesh: Arc<Mesh>,
     parts: Vec<Part>,
-    /// One a primitive, once an instance deforms.
+    /// There is one for each primitive, once an instance deforms.
     deformables: Vec<Option<Deformable>>,
 }
 
@@ -30,7 +30,7 @@ impl Geometry {
         &self.kept(gpu, mesh).parts
     }
 
-    /// The same, and what of each deforms; nothing where the device has no room for that.
+    /// The same, and what deforms of each; nothing where the device has no room for that.
     pub(crate) fn deforming(
         &mut self,
         gpu: &Gpu,

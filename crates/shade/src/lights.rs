@@ -197,7 +197,7 @@ fn maps(gpu: &Gpu, side: u32, layers: u32) -> wgpu::Texture {
     })
 }
 
-/// The environment BRDF, as halves: on the left a, b and the mean direction, on the right the bands.
+/// The environment BRDF, as halves. The left half has a, b and the mean direction, the right the bands.
 fn table(gpu: &Gpu) -> wgpu::TextureView {
     let entries = environment_brdf(TABLE);
     let left = |e: &Reflected| [e.albedo.x, e.albedo.y, e.mean.x, e.mean.y];

@@ -69,7 +69,7 @@ fn surface(material: &Material, model: Materials) -> Surface {
     }
 }
 
-/// In the order of the bindings.
+/// The maps of a material, in the order of the bindings.
 fn maps(m: &Material) -> [(Option<&TextureRef>, Coding); MAPS] {
     [
         (m.base_color_texture.as_ref(), Coding::Srgb),

@@ -64,7 +64,7 @@ const MIDDLE: std::ops::Range<f64> = 0.1..0.95;
 const SHOULDER: f64 = 0.5;
 /// Stops up the shoulder past which it makes no difference: a lamp in the picture is to be white.
 const LOST: f64 = 4.0;
-/// So far may a picture be up the shoulder, in stops, on average of all its pixels.
+/// A picture may be so far up the shoulder, in stops, on average of all its pixels.
 const MOST_BURNT: f64 = 0.18;
 /// Stops that exposure goes down for bright parts: a room with a window is not to be black.
 const MOST_STOPS_DOWN: f64 = 2.0;
@@ -150,13 +150,14 @@ mod tests {
     #[test]
     fn the_middle_becomes_middle_grey() {
         close(of(&[(5.0, 1000)], 0), 0.04);
-        // What is black around it does not count.
+        // Black pixels around it do not count.
         close(of(&[(5.0, 1000)], 9000), 0.04);
-        // Nor do a few lamps and dark corners.
+        // A few lamps and dark corners do not count either.
         close(of(&[(1.0, 950), (1000.0, 20), (0.001, 30)], 0), 0.2);
     }
 
-    /// As the page's rule has it: by as much as keeps the bright part's colours, by two stops at most.
+    /// Exposure goes down by as much as keeps the bright part's colours, by two stops at most, as in the
+    /// page.
     #[test]
     fn bright_parts_are_not_burnt_out() {
         // Three tenths of the picture are eight times as bright as the rest. Of them 0.6 stops may be

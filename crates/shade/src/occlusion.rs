@@ -28,7 +28,7 @@ pub(crate) struct Occluder {
     pipelines: Option<Pipelines>,
 }
 
-/// Of a pixel where there is no occlusion.
+/// What passes draw and pictures read. Each has a single pixel where there is no occlusion.
 #[derive(Debug)]
 struct Textures {
     size: UVec2,
@@ -53,7 +53,7 @@ pub(crate) struct Groups {
 }
 
 impl Occluder {
-    /// For pictures without occlusion.
+    /// What pictures without occlusion bind.
     pub(crate) fn new(gpu: &Gpu) -> Self {
         Self { textures: Textures::new(gpu, UVec2::ONE), pipelines: None }
     }

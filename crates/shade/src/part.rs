@@ -59,7 +59,7 @@ pub(crate) struct Part {
     pub(crate) attributes: wgpu::Buffer,
     pub(crate) indices: wgpu::Buffer,
     pub(crate) index_count: u32,
-    /// In object space.
+    /// The bounds in object space.
     pub(crate) bounds: Aabb,
 }
 

@@ -60,7 +60,7 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// With an empty scene and no light; of the settings only what holds for textures counts.
+    /// A renderer of an empty scene without light. Of the settings only what textures need counts.
     pub fn new(gpu: Gpu, settings: &Settings) -> Self {
         let (lights, field) = (GpuLights::new(&gpu), GpuField::new(&gpu));
         let scene = GpuScene::new(&gpu, settings.anisotropy);
@@ -114,7 +114,7 @@ impl Renderer {
     /// As [`Renderer::pictures`], with what it took.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Renderer::pictures`].
     pub fn pictures_with(
         &mut self,
         views: &[View],
@@ -136,7 +136,7 @@ impl Renderer {
         let camera = |view: &View, moved| {
             Camera::new(&view.relative_to(snapshot.origin), settings.size, moved)
         };
-        // The same for all frames, so that its maps are drawn once.
+        // The plan is the same for all frames, so that its maps are drawn once.
         let still: Vec<Camera> = views.iter().map(|view| camera(view, Vec2::ZERO)).collect();
         let plan = self.shadow_plan(&snapshot, &still, settings);
         for number in 0..frames {

@@ -24,7 +24,7 @@ pub(crate) struct Draw {
     pub(crate) part: Part,
     pub(crate) material: usize,
     pub(crate) surface: Surface,
-    /// Indices of the instances, and the worlds' bounds of the primitive there.
+    /// The instances by their numbers, and the primitive's bounds there, in the world.
     placed: Vec<(u32, Aabb)>,
 }
 
@@ -129,7 +129,7 @@ impl GpuScene {
                 self.draws[draw].placed.push((number, bounds));
             }
         }
-        // So that few things change from one draw call to the next.
+        // Sorted, few things change from one draw call to the next.
         self.draws.sort_by_key(|draw| (draw.surface, draw.material));
     }
 
@@ -181,8 +181,8 @@ impl GpuScene {
                 return rest.deformed(gpu, &deformation.vertices()[primitive]);
             };
             let mut part = own.unwrap_or_else(|| rest.to_deform(gpu));
-            let by = Deforming { deformable, deformation, cause: &cause };
-            self.deformer.deform(gpu, pass, by, rest, &mut part);
+            let by = Deforming { rest, deformable, deformation, cause: &cause };
+            self.deformer.deform(gpu, pass, by, &mut part);
             part
         });
         Deformed { parts: parts.collect(), by: deformation.clone() }

@@ -15,7 +15,7 @@ use crate::timing::{Commands, PassTimes, Stage, Timed};
 
 /// Frames that may be under way; more are not measured.
 const UNDER_WAY: usize = 3;
-/// Between two codes of eight bits.
+/// The step between two codes of eight bits.
 const STEP: f32 = 1.0 / 255.0;
 
 /// Shows pictures on textures of one format, which take display codes as they are (`Unorm`, not
@@ -58,7 +58,7 @@ pub struct Show {
 }
 
 impl Screen {
-    /// For textures of a format.
+    /// Shows pictures on textures of a format.
     pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Self {
         let types = [bindings::UNIFORM, bindings::PICTURE];
         let layout = gpu.group_layout("screen", wgpu::ShaderStages::FRAGMENT, &types);
@@ -88,7 +88,7 @@ impl Screen {
         Self { layout, pipeline, meter: Meter::new(gpu), under_way: VecDeque::new() }
     }
 
-    /// Draws a picture onto a texture of its size.
+    /// Draws a picture onto a texture of its size. Exposure is relative to what the picture has already.
     pub(crate) fn draw(
         &self,
         gpu: &Gpu,

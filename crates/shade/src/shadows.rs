@@ -156,7 +156,7 @@ impl ShadowPlan {
         let texels = self.resolution as f32;
         let inner = (0.5 * (high - low)).max(Vec2::splat(1e-3));
         let search = (size * depth_range).min(WIDEST_SEARCH * 2.0 * inner.max_element() / texels);
-        // Wider by what edges at the border reach beyond it.
+        // The map is wider by what edges at the border reach beyond it.
         let extra = (settings.filter_radius + MARGIN).min(0.25 * texels);
         let wide = inner + search;
         let widest_texel = 2.0 * wide.max_element() / (texels - 2.0 * extra);
@@ -221,21 +221,21 @@ fn room(
     while layers_of(resolution) < total.min(most_layers) && resolution / 2 >= LEAST_RESOLUTION {
         resolution /= 2;
     }
-    let mut left = layers_of(resolution);
+    let mut free = layers_of(resolution);
     let power = |light: &PlacedLight| (light.light.color * light.light.intensity).max_element();
     let mut order: Vec<usize> = (0..lights.len()).collect();
     order.sort_by(|&a, &b| power(&lights[b]).total_cmp(&power(&lights[a])));
     let mut chosen = vec![false; lights.len()];
     for i in order {
-        if wanted[i] <= left {
+        if wanted[i] <= free {
             chosen[i] = true;
-            left -= wanted[i];
+            free -= wanted[i];
         }
     }
     (resolution, chosen)
 }
 
-/// Any direction that is not the given one.
+/// A direction that is not along the given one.
 fn up_for(direction: Vec3) -> Vec3 {
     if direction.y.abs() > 0.99 { Vec3::Z } else { Vec3::Y }
 }
@@ -270,7 +270,7 @@ fn around_sphere(light_from_world: &Mat4, cameras: &[Camera], from: f32, to: f32
     let points = slices(cameras, from, to);
     let center = points.iter().sum::<Vec3>() / points.len().max(1) as f32;
     let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f32::max);
-    // Rounded, so that it stays the same while the camera moves.
+    // Rounded, it stays the same while the camera moves.
     let radius = (radius * 16.0).ceil() / 16.0;
     let center = light_from_world.transform_point3(center);
     Aabb { min: center - radius, max: center + radius }

@@ -15,7 +15,7 @@ const PIXEL: usize = 8;
 pub(crate) struct Target {
     size: UVec2,
     samples: u32,
-    /// Multisampled, where there is more than one sample.
+    /// This is multisampled where there is more than one sample.
     drawn: wgpu::TextureView,
     resolved: wgpu::Texture,
     resolved_view: wgpu::TextureView,

@@ -24,7 +24,7 @@ pub(crate) enum Coding {
 /// Textures and samplers that are on the device, each once.
 #[derive(Debug)]
 pub(crate) struct Textures {
-    /// By address; the image is kept, so that no other takes its place.
+    /// Textures by their images' addresses. Each image is kept, so that no other takes its place.
     textures: HashMap<(usize, Coding), (Arc<Image>, wgpu::TextureView)>,
     samplers: HashMap<([Wrap; 2], Filter), wgpu::Sampler>,
     white: wgpu::TextureView,
@@ -110,7 +110,7 @@ fn mips(image: &Image, coding: Coding, largest: u32) -> (UVec2, Vec<Vec<[u8; 4]>
     (UVec2::new(shrunk(image.width), shrunk(image.height)), levels)
 }
 
-/// The next level: each texel the mean of those it covers, of which odd sides leave one out.
+/// The next level. Each texel is the mean of those it covers; odd sides leave their last one out.
 fn halved(texels: &[[u8; 4]], size: UVec2, coding: Coding) -> (Vec<[u8; 4]>, UVec2) {
     let half = (size / 2).max(UVec2::ONE);
     let texel = |x: u32, y: u32| {

@@ -32,7 +32,7 @@ const NEAREST: f32 = 1e-3;
 pub struct Camera {
     /// What dragging does.
     pub steering: Steering,
-    /// In front of the camera.
+    /// The point is in front of the camera.
     pivot: Vec3,
     /// Metres from there.
     distance: f32,
@@ -46,7 +46,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// At a camera of the scene, going around what is in the middle of it. A roll is lost.
+    /// Starts at a camera of the scene, and goes around what is in its middle. A roll is lost.
     pub fn new(view: &View, center: Vec3, extent: f32) -> Self {
         let mut camera = Self {
             steering: Steering::default(),
@@ -82,7 +82,7 @@ impl Camera {
         }
     }
 
-    /// Its place.
+    /// The eye's place.
     pub fn eye(&self) -> Vec3 {
         self.pivot - self.distance * self.forward()
     }

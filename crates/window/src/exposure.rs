@@ -10,7 +10,7 @@ const UNKNOWN: f32 = 1.0 / 1024.0;
 pub struct Exposure {
     /// Whether it follows the picture: the middle of its luminances becomes middle grey.
     pub auto: bool,
-    /// By hand.
+    /// People set it by hand.
     pub stops: f32,
     /// Added to what follows the picture.
     pub compensation: f32,

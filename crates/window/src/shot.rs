@@ -17,7 +17,7 @@ use crate::world::World;
 const PATIENCE: Duration = Duration::from_secs(300);
 /// Between two looks at whether light has settled.
 const PAUSE: Duration = Duration::from_millis(20);
-/// Of what stands in for the window.
+/// The format of what stands in for the window.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 /// Saves a picture of a world as soon as its light has settled and its exposure is known, as a window of

@@ -15,7 +15,7 @@ pub(crate) struct Surface {
 }
 
 impl Surface {
-    /// Of a window, with the device that draws on it. `display` is the event loop's.
+    /// A window's surface, with the device that draws on it. `display` is the event loop's.
     pub(crate) fn new(
         window: &Arc<Window>,
         display: winit::event_loop::OwnedDisplayHandle,
