@@ -166,8 +166,8 @@ fn group(
     atlas: &wgpu::Texture,
     volumes: &[layout::Volume],
 ) -> wgpu::BindGroup {
-    let field = layout::Field { count: volumes.len() as u32 };
-    let uniform = gpu.buffer("field", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&field), 0);
+    let fields = layout::Fields { count: volumes.len() as u32 };
+    let uniform = gpu.buffer("fields", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&fields), 0);
     let least = size_of::<layout::Volume>() as u64;
     let storage = wgpu::BufferUsages::STORAGE;
     let list = gpu.buffer("volumes", storage, bytemuck::cast_slice(volumes), least);
@@ -177,7 +177,7 @@ fn group(
         wgpu::BindingResource::TextureView(&textures::view(atlas)),
         wgpu::BindingResource::Sampler(sampler),
     ];
-    gpu.group("field", layout, &resources)
+    gpu.group("fields", layout, &resources)
 }
 
 #[cfg(test)]

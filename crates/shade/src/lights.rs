@@ -97,7 +97,7 @@ impl GpuLights {
     ) -> wgpu::BindGroup {
         let Frame { snapshot, plan, .. } = *frame;
         let environment = self.environment(gpu, &snapshot.environment);
-        let lights: Vec<layout::Light> = snapshot
+        let lights: Vec<layout::PunctualLight> = snapshot
             .lights
             .iter()
             .zip(&plan.lights)
@@ -110,7 +110,8 @@ impl GpuLights {
         };
         let frame = uniform("frame", bytemuck::bytes_of(&frame.layout()));
         let environment = uniform("environment", bytemuck::bytes_of(&environment));
-        let lights = storage("lights", bytemuck::cast_slice(&lights), size_of::<layout::Light>());
+        let lights =
+            storage("lights", bytemuck::cast_slice(&lights), size_of::<layout::PunctualLight>());
         let least = size_of::<layout::ShadowView>();
         let views = storage("shadow views", bytemuck::cast_slice(&plan.views), least);
         let maps = self.maps.create_view(&wgpu::TextureViewDescriptor {
@@ -160,7 +161,7 @@ fn elevation(zenith: Vec3, horizon: Vec3, ground: Vec3) -> layout::Environment {
     layout::Environment { zenith, horizon, ground, ..layout::Environment::default() }
 }
 
-fn of_light(placed: &PlacedLight, first_shadow: u32, shadow_count: u32) -> layout::Light {
+fn of_light(placed: &PlacedLight, first_shadow: u32, shadow_count: u32) -> layout::PunctualLight {
     let PunctualLight { kind, color, intensity, range } = placed.light;
     let (cone_scale, cone_offset) = match kind {
         LightKind::Spot { inner, outer, .. } => {
@@ -174,7 +175,7 @@ fn of_light(placed: &PlacedLight, first_shadow: u32, shadow_count: u32) -> layou
         LightKind::Spot { radius, .. } => (light::SPOT, radius),
         LightKind::Directional { angle } => (light::DIRECTIONAL, (0.5 * angle).tan()),
     };
-    layout::Light {
+    layout::PunctualLight {
         position: placed.position,
         kind,
         direction: placed.direction,

@@ -74,7 +74,7 @@ pub struct Environment {
 /// A punctual light. Group 1, binding 3.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Light {
+pub struct PunctualLight {
     pub position: Vec3,
     pub kind: u32,
     pub direction: Vec3,
@@ -104,7 +104,7 @@ pub struct ShadowView {
 /// How many volumes there are. Group 2, binding 0.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Field {
+pub struct Fields {
     pub count: u32,
 }
 
@@ -248,7 +248,7 @@ pub mod parts {
     pub const INDIRECT: u32 = 4;
 }
 
-/// Values of [`Light::kind`].
+/// Values of [`PunctualLight::kind`].
 pub mod light {
     /// Shines in all directions.
     pub const POINT: u32 = 0;

@@ -46,8 +46,8 @@ macro_rules! modules {
 pub const MODULES: [(&str, &str); 36] = modules![
     "common/environment",
     "common/harmonics",
-    "common/light",
     "common/math",
+    "common/punctual",
     "common/tone",
     "common/triangle",
     "field/bindings",

@@ -114,7 +114,7 @@ fn layouts_agree() {
     same!(m, Environment { zenith, kind, ground, turn, horizon, _pad });
     same!(
         m,
-        Light {
+        PunctualLight {
             position,
             kind,
             direction,
@@ -128,7 +128,7 @@ fn layouts_agree() {
         }
     );
     same!(m, ShadowView { clip_from_world, texel, near, depth_range, search, reach, _pad0, _pad1 });
-    same!(m, Field { count });
+    same!(m, Fields { count });
     volumes_agree(m);
     same!(m, Map { row0, row1 });
     same!(m, Deform { vertices, morphs, joints, influences, flags });

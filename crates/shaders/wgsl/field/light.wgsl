@@ -1,4 +1,4 @@
-// The light of all volumes, sampled as `light::LightField` does.
+// The light of all volumes, sampled as `light::Light` does.
 //
 // Volumes are told by their number, and of each no more is read than is needed: a shader that reads all
 // of a volume at every step spends most of its time on that.
@@ -38,24 +38,24 @@ fn volume_light(number: u32, cell: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
     return TwoLobes(light.a * scale, light.b * scale);
 }
 
-// What two lobes see at a point of a surface (LightField::sample): the finest volume counts, passing
+// What two lobes see at a point of a surface (Light::sample): the finest volume counts, passing
 // smoothly into the next; beyond all of them the nearest one's border does. Negative light, which
 // truncated expansions have, is none. Each volume is read once at most, whatever of the point it has.
 fn field_light(position: vec3f, normal: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
-    if field.count == 1u {
+    if fields.count == 1u {
         // All that there is has all of every point.
         let light = volume_light(0u, sampled_cell(0u, position, normal), a, b);
         return TwoLobes(max(light.a, vec3f(0.0)), max(light.b, vec3f(0.0)));
     }
     var unclaimed = 1.0;
-    for (var i = 0u; i < field.count && unclaimed > 0.0; i++) {
+    for (var i = 0u; i < fields.count && unclaimed > 0.0; i++) {
         unclaimed -= unclaimed * weight_in(volumes[i].resolution, place_of(i, position, normal));
     }
     var reach = 0.0;
     var nearest = 0u;
     if unclaimed > 0.0 {
         var least = 3.4e38;
-        for (var i = 0u; i < field.count; i++) {
+        for (var i = 0u; i < fields.count; i++) {
             let resolution = volumes[i].resolution;
             let place = place_of(i, position, normal);
             reach += reach_of(resolution, place);
@@ -69,7 +69,7 @@ fn field_light(position: vec3f, normal: vec3f, a: Lobe, b: Lobe) -> TwoLobes {
     }
     var sum = TwoLobes(vec3f(0.0), vec3f(0.0));
     var remaining = 1.0;
-    for (var i = 0u; i < field.count && remaining + unclaimed > 0.0; i++) {
+    for (var i = 0u; i < fields.count && remaining + unclaimed > 0.0; i++) {
         let resolution = volumes[i].resolution;
         let place = place_of(i, position, normal);
         let claimed = remaining * weight_in(resolution, place);

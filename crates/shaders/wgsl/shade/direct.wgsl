@@ -1,6 +1,6 @@
 // Direct light, scattered by surfaces.
 
-#import common/light
+#import common/punctual
 #import shade/frame_bindings
 #import shade/shadows
 #import surface/bsdf

@@ -1,13 +1,13 @@
 // What a frame binds: what is drawn of its light, and all that shines.
 
 #import common/environment
-#import common/light
+#import common/punctual
 #import shade/frame
 
 @group(1) @binding(0) var<uniform> frame: Frame;
 @group(1) @binding(1) var<uniform> environment: Environment;
 @group(1) @binding(2) var environment_picture: texture_2d<f32>;
-@group(1) @binding(3) var<storage, read> lights: array<Light>;
+@group(1) @binding(3) var<storage, read> lights: array<PunctualLight>;
 @group(1) @binding(4) var<storage, read> shadow_views: array<ShadowView>;
 @group(1) @binding(5) var shadow_maps: texture_depth_2d_array;
 @group(1) @binding(6) var shadow_sampler: sampler;

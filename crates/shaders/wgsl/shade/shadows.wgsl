@@ -1,7 +1,7 @@
 // Shadows of punctual lights. Lights and maps are told by their number, and of each no more is read than
 // is needed.
 
-#import common/light
+#import common/punctual
 #import common/math
 #import shade/frame_bindings
 

@@ -1,6 +1,6 @@
 // Punctual lights, exactly as KHR_lights_punctual states them.
 
-struct Light {
+struct PunctualLight {
     position: vec3f,
     // One of LIGHT_*.
     kind: u32,
@@ -34,7 +34,7 @@ struct Incident {
     irradiance: vec3f,
 }
 
-fn incident(light: Light, at: vec3f) -> Incident {
+fn incident(light: PunctualLight, at: vec3f) -> Incident {
     if light.kind == LIGHT_DIRECTIONAL {
         return Incident(-light.direction, 0.0, light.intensity);
     }
