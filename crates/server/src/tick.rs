@@ -74,7 +74,8 @@ const REASON_ROOM: usize = limits::FRAME_BYTES / 32;
 /// Scene time moves at most this much in a tick, seconds, however long the machine slept.
 const LONGEST_STEP: f64 = 0.5;
 
-/// A scene with its light, stepped by hand; it has no socket, no thread and no clock of its own.
+/// A scene with its light, stepped by hand. It has no socket and no thread, and no clock but to measure
+/// how long its steps take.
 pub struct Tick {
     scene: Scene,
     gathering: Gathering,
@@ -271,7 +272,8 @@ impl Tick {
         let frames = self.encode(outlet);
         report.seconds[Stage::Encode as usize] = watch.lap();
 
-        let watched = !frames.is_empty();
+        // Where there is no new light, nobody can tell by frames.
+        let watched = !frames.is_empty() || brought.is_empty();
         if self.scales_are_news() {
             outlet.catalog(&self.catalog());
         }

@@ -5,6 +5,8 @@ import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 
+import { repositoryUrl } from '../../scripts/repository.mjs';
+
 const WEB = resolve(import.meta.dirname, '../..');
 const PROGRAM = `
 import { ConnectError, connect, type Edit, type LumencastLight, show } from '@lumencast/three';
@@ -33,6 +35,14 @@ interface Packed {
   readonly files: readonly { readonly path: string }[];
 }
 
+/** A checkout whose remote asks for a password. */
+const REMOTE = {
+  ...process.env,
+  GIT_CONFIG_COUNT: '1',
+  GIT_CONFIG_KEY_0: 'remote.origin.url',
+  GIT_CONFIG_VALUE_0: 'https://me:secret@example.org/light/lumencast.git',
+};
+
 describe('npm pack', () => {
   let folder: string;
   const packed = new Map<string, Packed>();
@@ -42,7 +52,7 @@ describe('npm pack', () => {
     const modules = join(folder, 'node_modules');
     for (const name of ['client', 'three']) {
       const pack = ['pack', '--json', '--pack-destination', folder];
-      const said = execFileSync('npm', pack, { cwd: join(WEB, name), encoding: 'utf8' });
+      const said = execFileSync('npm', pack, { cwd: join(WEB, name), encoding: 'utf8', env: REMOTE });
       const [tarball] = JSON.parse(said.slice(said.indexOf('['))) as [Packed];
       packed.set(name, tarball);
       const place = join(modules, '@lumencast', name);
@@ -73,6 +83,25 @@ describe('npm pack', () => {
     const path = join(folder, 'node_modules/@lumencast/three/package.json');
     const { dependencies } = JSON.parse(readFileSync(path, 'utf8')) as { dependencies: object };
     expect(dependencies).toEqual({ '@lumencast/client': packed.get('client')!.version });
+  });
+
+  it.each(['client', 'three'])('names the repository that %s is from', (name) => {
+    const read = (path: string) => JSON.parse(readFileSync(path, 'utf8')) as { repository?: object };
+    expect(read(join(folder, 'node_modules/@lumencast', name, 'package.json')).repository).toEqual({
+      type: 'git',
+      url: 'git+https://example.org/light/lumencast.git',
+      directory: `web/${name}`,
+    });
+    expect(read(join(WEB, name, 'package.json')).repository, 'only while it is packed').toBeUndefined();
+  });
+
+  it.each([
+    ['git@example.org:light/lumencast.git', 'git+https://example.org/light/lumencast.git'],
+    ['ssh://git@example.org/light/lumencast.git', 'git+https://example.org/light/lumencast.git'],
+    ['/home/me/lumencast', undefined],
+    ['file:///home/me/lumencast', undefined],
+  ])('makes an address that anyone can open of %s', (remote, url) => {
+    expect(repositoryUrl(remote)).toBe(url);
   });
 
   it.each(['bundler', 'nodenext'])(
