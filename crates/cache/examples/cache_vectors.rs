@@ -10,6 +10,7 @@
 //! is to be seen then: of each field coefficient 0 of its first and its last probe, red, or null where
 //! nothing is shown; the age of the newest light; the scene's time. What is to be seen is written here by
 //! hand, from the rules of docs/wire.md.
+#![expect(clippy::print_stdout, reason = "a program for the terminal")]
 
 use glam::{Quat, UVec3, Vec3};
 use lumencast_codec::{

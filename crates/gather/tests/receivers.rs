@@ -54,7 +54,7 @@ fn neighbours_change_nothing() {
     let receiver = |i: u8| {
         let position = Vec3::new(0.03 * f32::from(i) - 0.9, 0.1, 0.0);
         let lumel = Receiver::point(position, Vec3::Y);
-        if i % 3 == 0 { Receiver::probe(position) } else { lumel }
+        if i.is_multiple_of(3) { Receiver::probe(position) } else { lumel }
     };
     let counts = [1, 5, 0, 63, 1, 64, 2, 130, 0, 7, 1, 1, 300, 3];
     let receivers: Arc<[Receiver]> = (0..counts.len() as u8).map(receiver).collect();
