@@ -10,7 +10,7 @@
 //! use lumencast_scene::Scene;
 //! use lumencast_solve::{Effort, GatherOptions, bake, volumes};
 //!
-//! let mut scene = Scene::builtin("cornell")?;
+//! let mut scene = Scene::open("cornell")?;
 //! let mut tracer = CpuPathTracer::new(Options::default())?;
 //! let volumes = volumes(&mut scene, &mut tracer)?;
 //! let (effort, options) = (Effort::of_samples(1024), GatherOptions::default());
