@@ -15,6 +15,8 @@ export function repositoryUrl(remote) {
   const url = new URL(address);
   if (url.protocol !== 'https:' && url.protocol !== 'http:') return undefined;
   url.username = url.password = '';
+  // A port of ssh is none of the web's.
+  if (remote.startsWith('ssh:')) url.port = '';
   return `git+${url.href}`;
 }
 

@@ -314,6 +314,10 @@ fn saved() -> Value {
         steps.shows_all(1.0, 4.0);
         steps.light(2.0, &server.light(1.0));
         steps.shows_all(3.0, 1.0);
+        // It takes as long as a tick of the server's, not of the file's.
+        steps.light(3.0, &server.light(1.0));
+        steps.light(3.04, &server.light(2.0));
+        steps.shows_all(3.08, 2.0);
     })
 }
 

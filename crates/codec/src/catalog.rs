@@ -148,7 +148,7 @@ mod tests {
         wavelets["shape"]["basis"] = json!("wavelets");
         let hologram = json!({ "kind": "hologram", "id": [] });
         value["fields"].as_array_mut().unwrap().extend([wavelets, hologram, json!(7)]);
-        let unknown = [(Some(3), "volume"), (None, "hologram"), (None, "")];
+        let unknown = [(Some(3), "volume"), (None, "hologram")];
         let unknown = unknown.map(|(id, kind)| UnknownField { id, kind: kind.into() }).to_vec();
         let expected = Catalog { unknown, ..catalog() };
         assert_eq!(Catalog::decode(value.to_string().as_bytes()), Ok(expected));

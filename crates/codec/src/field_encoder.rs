@@ -8,12 +8,12 @@ use crate::{EncodedRegion, ProbeEncoder, UpdateInfo};
 /// Encodes the updates of a field, by its kind.
 #[derive(Clone, Debug)]
 pub enum FieldEncoder {
-    /// Of a volume of probes.
+    /// Encodes a volume of probes.
     Volume(ProbeEncoder),
 }
 
 impl FieldEncoder {
-    /// For a field of this shape.
+    /// Prepares for a field of this shape.
     pub fn new(field: &Field) -> Self {
         match field {
             Field::Volume(volume) => {
@@ -34,6 +34,13 @@ impl FieldEncoder {
     ) -> Vec<EncodedRegion> {
         match (self, field) {
             (Self::Volume(encoder), Field::Volume(volume)) => encoder.encode(volume, info, watched),
+        }
+    }
+
+    /// Numbers of the field's regions.
+    pub fn regions(&self) -> impl Iterator<Item = u32> + '_ {
+        match self {
+            Self::Volume(encoder) => encoder.regions().map(|region| region.id),
         }
     }
 

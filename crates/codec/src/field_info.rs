@@ -28,7 +28,7 @@ pub struct FieldInfo {
     pub source: String,
     /// The run of the server that computes it, where that is not the catalog's; see
     /// [`crate::Catalog::epoch_of`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "epoch", skip_serializing_if = "Option::is_none")]
     pub epoch: Option<Epoch>,
     /// Its kind, and what there is to know of that. Light of one field fits another exactly when their
     /// shapes are equal.
@@ -90,6 +90,9 @@ impl FieldInfo {
     /// Reads an entry of a catalog: a field, a field of unknown kind, or an error where a known kind is
     /// told wrongly.
     pub(crate) fn read(entry: Value) -> Result<Result<Self, UnknownField>, DecodeError> {
+        if !entry.is_object() {
+            return Err(DecodeError::Malformed("an entry of fields"));
+        }
         if !Shape::is_known(&entry) {
             let id = entry["id"].as_u64().and_then(|id| u32::try_from(id).ok());
             return Ok(Err(UnknownField { id, kind: printable(&entry["kind"]) }));
@@ -169,6 +172,11 @@ impl Shape {
 fn scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<i8>, D::Error> {
     let value = Value::deserialize(from)?;
     Ok(value.as_f64().filter(|v| v.fract() == 0.0 && (-128.0..128.0).contains(v)).map(|v| v as i8))
+}
+
+/// An epoch, which null is none of.
+fn epoch<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Epoch>, D::Error> {
+    Epoch::deserialize(from).map(Some)
 }
 
 /// A source, or nothing where there is something else.

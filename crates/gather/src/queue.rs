@@ -101,7 +101,7 @@ impl Queue {
         let ends = Jobs { incoming, shared: shared.clone() };
         let body = move || {
             worker(&ends);
-            // Whatever the worker has left undone.
+            // Jobs that the worker has not done are given up.
             ends.run(|_, _| None);
         };
         let worker = std::thread::Builder::new().name(name.into()).spawn(body)?;

@@ -111,7 +111,7 @@ impl Sums {
         self.distances.extend_from_slice(entry.distances);
         self.surfaces.extend_from_slice(entry.surfaces);
         if !self.surfaces.is_empty() {
-            // Of entries without surfaces before the first that has some.
+            // Entries before the first with surfaces have none.
             self.surfaces_end.resize(self.heads.len(), 0);
             self.surfaces_end.push(self.surfaces.len() as u32);
         }

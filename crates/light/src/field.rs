@@ -26,13 +26,6 @@ impl Field {
         }
     }
 
-    /// The volume itself, where it is one.
-    pub fn into_volume(self) -> Option<ProbeVolume> {
-        match self {
-            Self::Volume(volume) => Some(volume),
-        }
-    }
-
     /// The volume, where it is one, to give it other light.
     pub fn as_volume_mut(&mut self) -> Option<&mut ProbeVolume> {
         match self {

@@ -38,10 +38,10 @@ pub struct Light {
 }
 
 impl Light {
-    /// Of fields in any order.
+    /// Light of fields, which may stand in any order.
     pub fn new(fields: impl IntoIterator<Item = impl Into<Field>>) -> Self {
         let mut fields: Vec<Field> = fields.into_iter().map(Into::into).collect();
-        fields.sort_by(|a, b| layer(a).total_cmp(&layer(b)));
+        fields.sort_by(|a, b| cell_volume(a).total_cmp(&cell_volume(b)));
         Self { fields }
     }
 
@@ -135,7 +135,7 @@ impl Light {
         if let [Field::Volume(only)] = &self.fields[..] {
             return Some(only.sample(place.position, place.normal));
         }
-        // Of the lowest order; what is added raises it to its own.
+        // It begins with the lowest order; what is added raises it to its own.
         let dark = self.volumes().next().map(|_| Sh::dark(Order::L1));
         self.shares(place).into_iter().fold(dark, |light, (volume, share)| {
             let mut light = light?;
@@ -153,8 +153,8 @@ impl Light {
     }
 }
 
-/// Fields lie over those of greater numbers: volumes by the size of their cells.
-fn layer(field: &Field) -> f32 {
+/// The size of a volume's cells, cubic metres: finer volumes lie over coarser ones.
+fn cell_volume(field: &Field) -> f32 {
     match field {
         Field::Volume(volume) => volume.grid.spacing().element_product(),
     }

@@ -8,8 +8,8 @@ use lumencast_solve::{Asked, Request};
 
 use crate::published::Moment;
 
-/// From one look at jobs under way to the next.
-const LOOK: Duration = Duration::from_micros(250);
+/// Time from one poll of jobs under way to the next.
+const POLL_INTERVAL: Duration = Duration::from_micros(250);
 
 /// How long a tick waits for the jobs that it has submitted.
 #[derive(Clone, Copy, Debug)]
@@ -94,7 +94,7 @@ impl Gathering {
                 while self.under_way.iter().any(|job| job.moment.tick == tick)
                     && Instant::now() < deadline
                 {
-                    std::thread::sleep(LOOK);
+                    std::thread::sleep(POLL_INTERVAL);
                     brought.extend(self.poll());
                 }
                 brought

@@ -4,6 +4,8 @@ use lumencast_codec::{EncodedRegion, FieldEncoder, FieldInfo, UpdateInfo};
 use lumencast_light::{Field, FieldId};
 use lumencast_solve::Solver;
 
+use crate::publish::Outlet;
+
 /// A moment of the scene.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moment {
@@ -51,6 +53,11 @@ impl Published {
     /// log2 of its scale as of the last update; none before there was any light.
     pub(crate) fn scale_log2(&self) -> Option<i8> {
         self.encoder.scale_log2()
+    }
+
+    /// Whether anyone reads any of its regions.
+    pub(crate) fn is_watched(&self, outlet: &dyn Outlet) -> bool {
+        self.encoder.regions().any(|region| outlet.is_watched(self.id.0, region))
     }
 
     /// The field's light shows this moment from now on.

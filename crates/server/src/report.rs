@@ -56,11 +56,12 @@ pub struct Report {
     pub tick: u64,
     /// Seconds by stage, in the order of [`Stage::ALL`].
     pub seconds: [f64; Stage::ALL.len()],
-    /// Whether it took longer than its period; the next one takes fewer samples.
+    /// Whether it took longer than its period, or its light is not done; the next one takes fewer
+    /// samples.
     pub late: bool,
     /// Samples a probe.
     pub samples_a_probe: u32,
-    /// Samples in all.
+    /// Samples of probes whose light came in this tick.
     pub samples: u64,
     /// Path segments traced.
     pub rays: u64,
@@ -72,7 +73,7 @@ pub struct Report {
     pub probes: u64,
     /// Of them, those inside walls.
     pub buried: u64,
-    /// Version of the scene that the light shows.
+    /// Version of the scene after the tick's edits and animation.
     pub scene_version: u64,
     /// Scene time, seconds.
     pub scene_time: f64,

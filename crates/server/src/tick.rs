@@ -79,6 +79,9 @@ const LONGEST_STEP: f64 = 0.5;
 pub struct Tick {
     scene: Scene,
     gathering: Gathering,
+    /// Fields that have looked for surfaces, and gathered no light since. Their next job is for light,
+    /// or else a scene that changes all the time would have them look for ever.
+    looked: Vec<FieldId>,
     solver: Solver,
     /// The solver's fields, in its order.
     published: Vec<Published>,
@@ -130,6 +133,7 @@ impl Tick {
         Ok(Self {
             scene,
             gathering: Gathering::new(gatherer),
+            looked: Vec::new(),
             solver,
             published,
             options,
@@ -255,10 +259,7 @@ impl Tick {
         outlet.state(state, is_snapshot);
         report.seconds[Stage::Publish as usize] = watch.lap();
 
-        let brought = self.gather(&scene, patience);
-        let gathered = || brought.iter().filter_map(|brought| brought.gathered.as_ref());
-        let build_seconds = gathered().map(|gathered| gathered.build_seconds);
-        let build = build_seconds.fold(0.0, f64::max);
+        let (brought, build) = self.gather(&scene, patience);
         let gathering = watch.lap();
         report.seconds[Stage::Accelerate as usize] = build.min(gathering);
         report.seconds[Stage::Gather as usize] = gathering - build.min(gathering);
@@ -267,22 +268,23 @@ impl Tick {
         report.seconds[Stage::Blend as usize] = watch.lap();
 
         if std::mem::take(&mut self.fields_are_news) {
-            outlet.catalog(&self.catalog());
+            self.tell_catalog(outlet);
         }
         let frames = self.encode(outlet);
         report.seconds[Stage::Encode as usize] = watch.lap();
 
-        // Where there is no new light, nobody can tell by frames.
-        let watched = !frames.is_empty() || brought.is_empty();
+        let watched = self.published.iter().any(|published| published.is_watched(outlet));
         if self.scales_are_news() {
-            outlet.catalog(&self.catalog());
+            self.tell_catalog(outlet);
         }
         for (field, frame) in frames {
             outlet.light(field, frame);
         }
         report.seconds[Stage::Publish as usize] += watch.lap();
 
-        report.rays = gathered().map(|gathered| gathered.rays).sum();
+        let gathered = || brought.iter().filter(|brought| brought.gathered.is_some());
+        report.rays = gathered().filter_map(|b| b.gathered.as_ref()).map(|g| g.rays).sum();
+        report.samples = gathered().map(|brought| brought.asked.samples()).sum();
         report.accepted = edits.accepted.len() as u64;
         report.refused = edits.refused.len() as u64;
         // Clients ask for files then that they did not need before.
@@ -351,29 +353,34 @@ impl Tick {
         self.snapshot_bytes <= room
     }
 
-    /// Sums for every field, all fields' jobs under way at once.
-    fn gather(&mut self, scene: &Arc<Snapshot>, patience: Patience) -> Vec<Brought> {
+    /// Sums for every field, all fields' jobs under way at once, and the seconds that building trees
+    /// took for them.
+    fn gather(&mut self, scene: &Arc<Snapshot>, patience: Patience) -> (Vec<Brought>, f64) {
         let moment = Moment { tick: self.number, time: scene.time, version: scene.version };
         let earlier = self.gathering.poll();
-        let mut light = self.found(earlier);
+        let (mut light, _) = self.found(earlier);
         for id in self.idle() {
-            if let Some(look) = self.solver.look(id, scene) {
+            let owes_light = self.looked.contains(&id);
+            if let Some(look) = self.solver.look(id, scene).filter(|_| !owes_light) {
                 self.gathering.submit(look, moment);
             }
         }
         let looked = self.gathering.wait(self.number, patience);
-        light.extend(self.found(looked));
+        let (more, build_for_looks) = self.found(looked);
+        light.extend(more);
 
         let previous = self.options.feedback.then(|| Arc::new(self.light().clone()));
         let (samples, pass) = (self.budget.samples(), self.number);
         for id in self.idle() {
             if let Some(job) = self.solver.job(id, scene, previous.clone(), samples, pass) {
+                self.looked.retain(|looked| *looked != id);
                 self.gathering.submit(job, moment);
             }
         }
         let brought = self.gathering.wait(self.number, patience);
-        light.extend(self.found(brought));
-        light
+        let (more, build) = self.found(brought);
+        light.extend(more);
+        (light, build.max(build_for_looks))
     }
 
     /// The fields for which no job is under way.
@@ -381,11 +388,17 @@ impl Tick {
         self.solver.ids().filter(|id| !self.gathering.is_at(*id)).collect()
     }
 
-    /// Lets fields know where surfaces are, and returns what brought light.
-    fn found(&mut self, brought: Vec<Brought>) -> Vec<Brought> {
+    /// Lets fields know where surfaces are, and returns what brought light, with the seconds that
+    /// building trees took within this tick.
+    fn found(&mut self, brought: Vec<Brought>) -> (Vec<Brought>, f64) {
+        let of_now = brought.iter().filter(|brought| brought.moment.tick == self.number);
+        let seconds =
+            of_now.filter_map(|brought| brought.gathered.as_ref()).map(|g| g.build_seconds);
+        let build = seconds.fold(0.0, f64::max);
         let (light, looks): (Vec<_>, Vec<_>) =
             brought.into_iter().partition(|brought| brought.asked.is_light());
         for Brought { asked, gathered, .. } in looks {
+            self.looked.push(asked.field);
             match gathered {
                 Some(found) => self.solver.take(&asked, &found),
                 None => {
@@ -393,7 +406,7 @@ impl Tick {
                 }
             }
         }
-        light
+        (light, build)
     }
 
     fn note_failure(&mut self, field: FieldId, outcome: &str) {
@@ -432,15 +445,20 @@ impl Tick {
         frames
     }
 
-    /// Whether clients are to be told of another scale now; they count as told then.
-    fn scales_are_news(&mut self) -> bool {
-        let scales: Vec<_> = self.published.iter().map(Published::scale_log2).collect();
-        if scales == self.told_scales || self.number < self.next_catalog {
-            return false;
-        }
-        self.told_scales = scales;
+    /// Whether clients are to be told of another scale now.
+    fn scales_are_news(&self) -> bool {
+        self.number >= self.next_catalog && self.scales() != self.told_scales
+    }
+
+    fn scales(&self) -> Vec<Option<i8>> {
+        self.published.iter().map(Published::scale_log2).collect()
+    }
+
+    /// Sends the catalog, of which clients then know.
+    fn tell_catalog(&mut self, outlet: &mut dyn Outlet) {
+        outlet.catalog(&self.catalog());
+        self.told_scales = self.scales();
         self.next_catalog = self.number + CATALOG_EVERY;
-        true
     }
 
     /// The state frame: a snapshot of the scene now and then, what changed otherwise.
@@ -466,7 +484,6 @@ impl Tick {
     fn finish(&mut self, watched: bool, mut report: Report) -> Report {
         let probes = self.solver.probe_count();
         report.samples_a_probe = self.budget.samples();
-        report.samples = probes as u64 * u64::from(report.samples_a_probe);
         report.probes = probes as u64;
         report.buried = self.solver.buried_count() as u64;
         let (gather, total) = (report.stage(Stage::Gather), report.total_seconds());

@@ -508,11 +508,22 @@ struct Held {
     inner: CpuPathTracer,
     hold: Arc<AtomicBool>,
     submitted: Arc<AtomicU64>,
+    /// Of them, those that looked for surfaces.
+    looks: Arc<AtomicU64>,
+}
+
+impl Held {
+    fn new(hold: bool) -> Self {
+        let inner = CpuPathTracer::new(Options::default()).expect("threads");
+        let hold = Arc::new(AtomicBool::new(hold));
+        Self { inner, hold, submitted: Arc::default(), looks: Arc::default() }
+    }
 }
 
 impl Gather for Held {
     fn submit(&mut self, job: Job) -> Ticket {
         self.submitted.fetch_add(1, Ordering::Relaxed);
+        self.looks.fetch_add(job.surfaces.into(), Ordering::Relaxed);
         self.inner.submit(job)
     }
 
@@ -536,9 +547,8 @@ impl Gather for Held {
 /// it all the same.
 #[test]
 fn ticks_go_on_while_a_job_takes_long() {
-    let (hold, submitted) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicU64::new(0)));
-    let inner = CpuPathTracer::new(Options::default()).expect("threads");
-    let held = Held { inner, hold: hold.clone(), submitted: submitted.clone() };
+    let held = Held::new(true);
+    let (hold, submitted) = (held.hold.clone(), held.submitted.clone());
     let mut stepped = Stepped::with(options(), Box::new(held));
     let lamp = stepped.node("lamp");
     let mut step = |mail, patience| {
@@ -547,7 +557,7 @@ fn ticks_go_on_while_a_job_takes_long() {
     };
     for seq in 1..=3 {
         let report = step(mail(seq, dim(lamp, 100.0)), Duration::ZERO);
-        assert_eq!((report.accepted, report.rays), (1, 0));
+        assert_eq!((report.accepted, report.rays, report.samples), (1, 0, 0));
         assert!(report.late, "its light is missing");
     }
     assert_eq!(submitted.load(Ordering::Relaxed), 1, "one job a field at a time");
@@ -560,6 +570,27 @@ fn ticks_go_on_while_a_job_takes_long() {
     assert!(states.len() > 3 && (0..).zip(states).all(|(tick, state)| state.tick == tick));
     let shown = ProbeHeader::read(&frames.last().expect("light").1.bytes).unwrap().info;
     assert_eq!(shown.update, 0, "there was no light before");
+}
+
+/// Where looks for surfaces outlast ticks and the scene changes in each, light is gathered all the same.
+#[test]
+fn looks_that_take_long_leave_room_for_light() {
+    let held = Held::new(false);
+    let (submitted, looks) = (held.submitted.clone(), held.looks.clone());
+    let mut fitted = options();
+    fitted.gather.fit = Some(lumencast_solve::FitOptions { points: 8 });
+    let mut stepped = Stepped::with(fitted, Box::new(held));
+    let lamp = stepped.node("lamp");
+    let mut seq = 0;
+    while submitted.load(Ordering::Relaxed) < 8 {
+        seq += 1;
+        stepped.now += PERIOD;
+        let mail = mail(seq, dim(lamp, 100.0 + seq as f32));
+        stepped.tick.step_within(stepped.now, mail, &mut stepped.kept, Duration::ZERO);
+        std::thread::yield_now();
+    }
+    let looks = looks.load(Ordering::Relaxed);
+    assert!((3..=5).contains(&looks), "{looks} of 8 jobs look for surfaces");
 }
 
 /// Volumes come and go while ticks go on: clients are told in the next catalog, what stays keeps its

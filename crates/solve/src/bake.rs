@@ -19,9 +19,9 @@ const SAMPLES_A_PASS: u32 = 256;
 /// Rounds and steps of a fit to surfaces: more change nothing that can be seen.
 const FIT_EFFORT: FitEffort = FitEffort { rounds: 4, steps: 64 };
 /// The same of what tells the noise.
-const LOOK_EFFORT: FitEffort = FitEffort { rounds: 2, steps: 32 };
-/// Passes after which the noise is looked at first.
-const FIRST_LOOK: u32 = 4;
+const NOISE_EFFORT: FitEffort = FitEffort { rounds: 2, steps: 32 };
+/// Passes after which the noise is checked first.
+const FIRST_CHECK: u32 = 4;
 /// From one look at the noise to the next, samples become at most so many times as many, since noise
 /// that is large tells little about how many are needed.
 const MOST_GROWTH: f32 = 4.0;
@@ -99,7 +99,7 @@ pub fn bake(
     let mut done = Done { share: 0.0, noise: None };
     let (mut samples, mut pass) = (0, 0);
     // Until then the noise is not looked at.
-    let mut until = effort.noise.map_or(most, |_| most.min(FIRST_LOOK * SAMPLES_A_PASS));
+    let mut until = effort.noise.map_or(most, |_| most.min(FIRST_CHECK * SAMPLES_A_PASS));
     while samples < most {
         let now = SAMPLES_A_PASS.min(most - samples);
         for id in &ids {
@@ -117,8 +117,8 @@ pub fn bake(
         if samples >= until
             && let Some((wanted, half)) = effort.noise.zip(half.as_mut())
         {
-            all.solve(LOOK_EFFORT);
-            half.solve(LOOK_EFFORT);
+            all.solve(NOISE_EFFORT);
+            half.solve(NOISE_EFFORT);
             let noise = noise::shown(&all, half);
             done.noise = Some(noise);
             if noise <= wanted {

@@ -92,11 +92,6 @@ impl History {
         self.receivers.is_empty()
     }
 
-    /// Sets the least weight of an update for one receiver.
-    pub fn set_ratio(&mut self, receiver: usize, ratio: f32) {
-        self.receivers[receiver].ratio = ratio.clamp(f32::MIN_POSITIVE, 1.0);
-    }
-
     /// Forgets all that is known of one receiver.
     pub fn forget(&mut self, receiver: usize) {
         let ladder = &mut self.receivers[receiver];

@@ -24,11 +24,21 @@ pub struct Asked {
 pub(crate) enum What {
     /// Where a scene's surfaces are.
     Surfaces,
-    /// Light at receivers.
-    Light { budgets: Vec<Budget> },
+    /// Light at receivers, of which the first ones are probes.
+    Light { budgets: Vec<Budget>, probes: usize },
 }
 
 impl Asked {
+    /// Samples of probes that it takes in all.
+    pub fn samples(&self) -> u64 {
+        match &self.what {
+            What::Surfaces => 0,
+            What::Light { budgets, probes } => {
+                budgets.iter().take(*probes).map(|budget| u64::from(budget.samples)).sum()
+            }
+        }
+    }
+
     /// Whether light comes of it: otherwise only where surfaces are.
     pub fn is_light(&self) -> bool {
         matches!(self.what, What::Light { .. })

@@ -95,8 +95,9 @@ impl Solver {
 
     /// The fields as they were last solved, in the order in which they were asked for.
     pub fn into_fields(self) -> Vec<Field> {
+        let ids: Vec<FieldId> = self.ids().collect();
         let mut fields = self.light.into_fields();
-        fields.sort_by_key(Field::id);
+        fields.sort_by_key(|field| ids.iter().position(|id| *id == field.id()));
         fields
     }
 
@@ -128,10 +129,12 @@ impl Solver {
         pass: u64,
     ) -> Option<Request> {
         let options = self.options;
-        let seed = pass << 8 | u64::from(field.0);
+        // Numbers of fields beyond a byte stand above those of passes.
+        let (low, high) = (u64::from(field.0 & 0xff), u64::from(field.0 >> 8));
+        let seed = (pass << 8 | low) ^ (high << 40);
         let volume = self.volume_mut(field)?;
         let job = volume.job(scene.clone(), previous, samples, &options, seed);
-        let what = What::Light { budgets: job.budgets.clone() };
+        let what = What::Light { budgets: job.budgets.clone(), probes: volume.probe_count() };
         Some(Request { job, asked: Asked { field, what } })
     }
 
@@ -143,7 +146,7 @@ impl Solver {
         let Some(volume) = self.volume_mut(asked.field) else { return };
         match &asked.what {
             What::Surfaces => volume.found(gathered),
-            What::Light { budgets } => volume.blend(gathered, budgets),
+            What::Light { budgets, .. } => volume.blend(gathered, budgets),
         }
     }
 

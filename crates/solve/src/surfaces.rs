@@ -32,8 +32,7 @@ pub(crate) struct Surfaces {
     lookouts: Arc<[Receiver]>,
     /// How many of them are probes.
     probes: usize,
-    /// A lookout.
-    points: u32,
+    points_a_lookout: u32,
     around: Surroundings,
     /// Where the points were when their histories began.
     began: Vec<Option<SurfacePoint>>,
@@ -53,7 +52,7 @@ impl Surfaces {
         Self {
             lookouts,
             probes: grid.probe_count(),
-            points: each as u32,
+            points_a_lookout: each as u32,
             around: Surroundings::default(),
             began: vec![None; points],
             history: History::new(blend, points, 1),
@@ -68,7 +67,7 @@ impl Surfaces {
             bounces: 0,
             surfaces: true,
             seed: SEED,
-            ..Job::new(scene.clone(), self.lookouts.clone(), self.points)
+            ..Job::new(scene.clone(), self.lookouts.clone(), self.points_a_lookout)
         })
     }
 
@@ -99,7 +98,7 @@ impl Surfaces {
     /// At which points to gather next, `samples` a probe in all: at all that count, or at those whose
     /// turn it is.
     pub(crate) fn budgets(&mut self, samples: u32) -> impl Iterator<Item = Budget> + '_ {
-        let points = self.points;
+        let points = self.points_a_lookout;
         let turns = (SAMPLES_A_TURN * points).div_ceil(samples.max(1)).max(1);
         let each = (samples * turns).div_ceil(points);
         let turn = self.turn % turns as usize;
@@ -136,7 +135,7 @@ impl Surfaces {
             places.map(|at| (at.position, at.normal)).collect()
         };
         let all = self.around.points().len();
-        let own = (self.probes * self.points as usize).min(all);
+        let own = (self.probes * self.points_a_lookout as usize).min(all);
         let seen = counting(0..own);
         if seen.is_empty() { counting(own..all) } else { seen }
     }

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::{Grid, Order};
+use lumencast_light::{Field, Grid, Order};
 use lumencast_scene::{Environment, Material, Scene, VolumeSpec};
 use lumencast_solve::{Done, Effort, FitOptions, GatherOptions, bake};
 use lumencast_testkit::scenes::{Stage, lambert};
@@ -72,7 +72,7 @@ fn what_stands_on_the_border_is_lit_from_outside() {
         let volume = VolumeSpec { grid, order: Order::L2 };
         let (effort, gather) = (Effort::of_samples(1024), gather(Some(FIT)));
         let light = bake(&stage.snapshot(), &[volume], &mut tracer(), effort, gather, |_| ());
-        let light = light.expect("a volume").fields.remove(0).into_volume().expect("a volume");
+        let Field::Volume(light) = light.expect("a volume").fields.remove(0);
         for normal in Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
             let (u, v) = normal.any_orthonormal_pair();
             for (x, y) in [(0.0, 0.0), (0.8, 0.3), (-0.5, 0.9)] {

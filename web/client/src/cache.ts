@@ -98,14 +98,12 @@ export class Cache {
   load(file: Uint8Array, now: number): SavedScene {
     if (this.current && !this.saved) throw new Error('light of a server is there already');
     const { catalog, edits, files, frames } = readLightFile(file);
-    const fields = new Map(
-      catalog.fields.map((field) => [field.id, this.fieldCache(field, catalog.tickSeconds)]),
-    );
+    const fields = new Map(catalog.fields.map((field) => [field.id, this.fieldCache(field)]));
     let savedTime = 0;
     for (const { field, region, frame } of frames) {
       const cache = fields.get(field);
       // Keyframes are of layer 0.
-      if (cache?.has(region)) savedTime = cache.add(region, 0, frame, now).head.time;
+      if (cache?.has(region)) savedTime = cache.add(region, 0, frame, now, catalog.tickSeconds).head.time;
     }
     this.current = catalog;
     this.fields = fields;
@@ -133,7 +131,7 @@ export class Cache {
         old.delete(field.id);
       } else {
         if (same) this.leave(same);
-        this.fields.set(field.id, this.fieldCache(field, catalog.tickSeconds));
+        this.fields.set(field.id, this.fieldCache(field));
       }
     }
     const gone = [...old.values()].filter(({ field }) => !this.fields.has(field.id));
@@ -227,11 +225,12 @@ export class Cache {
     now: number,
   ): Received | undefined {
     const cache = this.fields.get(field);
-    return cache?.has(region) ? cache.add(region, layer, bytes, now) : undefined;
+    if (!this.current || !cache?.has(region)) return undefined;
+    return cache.add(region, layer, bytes, now, this.current.tickSeconds);
   }
 
-  private fieldCache(field: FieldInfo, tickSeconds: number): FieldCache {
-    const cache = createFieldCache(field, tickSeconds, (region, { tick }) => {
+  private fieldCache(field: FieldInfo): FieldCache {
+    const cache = createFieldCache(field, (region, { tick }) => {
       // That of a file is not announced, nor that of a field that is no more.
       if (this.fields.get(field.id) !== cache) return;
       // It takes the place of its field's old light, and of that of fields that are gone.

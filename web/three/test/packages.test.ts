@@ -98,6 +98,7 @@ describe('npm pack', () => {
   it.each([
     ['git@example.org:light/lumencast.git', 'git+https://example.org/light/lumencast.git'],
     ['ssh://git@example.org/light/lumencast.git', 'git+https://example.org/light/lumencast.git'],
+    ['ssh://git@example.org:2222/light/lumencast.git', 'git+https://example.org/light/lumencast.git'],
     ['/home/me/lumencast', undefined],
     ['file:///home/me/lumencast', undefined],
   ])('makes an address that anyone can open of %s', (remote, url) => {

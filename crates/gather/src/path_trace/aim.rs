@@ -18,7 +18,7 @@ use crate::surface::gamma;
 use crate::world::{Passing, World};
 use crate::{Budget, Job, Receiver};
 
-/// Of a lumel's size, how far off the surface its samples start.
+/// Samples start so far off the surface, as a share of the lumel's size.
 const LIFT: f32 = 1e-3;
 
 /// What all samples of a receiver share.

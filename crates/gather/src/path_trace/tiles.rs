@@ -38,7 +38,7 @@ impl Tile {
 struct BatchSums {
     sum: Vec<Vec3>,
     squares: Vec<f32>,
-    /// Of distances and their squares; empty where nobody asked.
+    /// Sums of distances and of their squares; empty where nobody asked.
     distances: Vec<Vec2>,
     /// Empty where nobody asked.
     surfaces: Vec<Option<SurfacePoint>>,

@@ -33,10 +33,10 @@ export interface FieldCache {
   forgetUpdates(): void;
   /**
    * Takes in a frame of the track of a layer of a region that this field has. A frame's head is read at
-   * once. Its light may be there later, if a decoder takes its time: `onLight` is called when it is.
+   * once; `tickSeconds` is the length of its server's ticks. Its light may be there later, if a decoder takes its time: `onLight` is called when it is.
    * @throws WireError; nothing has changed then.
    */
-  add(region: number, layer: number, frame: Uint8Array, now: number): Received;
+  add(region: number, layer: number, frame: Uint8Array, now: number, tickSeconds: number): Received;
   /** Of the regions' newest light the oldest and the newest. */
   span(): { readonly oldest: Arrival; readonly newest: Arrival } | undefined;
   /** The light at `now`; `undefined` when no region has any. `ageOf` tells the age of a tick's light. */
@@ -44,16 +44,12 @@ export interface FieldCache {
 }
 
 const CACHES: {
-  readonly [K in FieldKind]: (field: FieldInfo<K>, tickSeconds: number, onLight: OnLight) => FieldCache;
+  readonly [K in FieldKind]: (field: FieldInfo<K>, onLight: OnLight) => FieldCache;
 } = {
-  volume: (field, tickSeconds, onLight) => new VolumeCache(field, tickSeconds, onLight),
+  volume: (field, onLight) => new VolumeCache(field, onLight),
 };
 
 /** A cache of a field's kind, without light. */
-export function createFieldCache<K extends FieldKind>(
-  field: FieldInfo<K>,
-  tickSeconds: number,
-  onLight: OnLight,
-): FieldCache {
-  return CACHES[field.kind](field, tickSeconds, onLight);
+export function createFieldCache<K extends FieldKind>(field: FieldInfo<K>, onLight: OnLight): FieldCache {
+  return CACHES[field.kind](field, onLight);
 }

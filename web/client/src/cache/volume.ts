@@ -41,7 +41,6 @@ export class VolumeCache implements FieldCache {
 
   constructor(
     public field: FieldInfo<'volume'>,
-    private readonly tickSeconds: number,
     private readonly onLight: OnLight,
   ) {
     const { grid, order, regions } = field.shape;
@@ -76,7 +75,7 @@ export class VolumeCache implements FieldCache {
     }
   }
 
-  add(region: number, layer: number, frame: Uint8Array, now: number): Received {
+  add(region: number, layer: number, frame: Uint8Array, now: number, tickSeconds: number): Received {
     const state = this.regions.get(region);
     if (!state) throw new RangeError(`field ${this.field.id} has no region ${region}`);
     const { header: head } = splitProbeFrame(frame);
@@ -91,7 +90,7 @@ export class VolumeCache implements FieldCache {
     if (!news) return { head, news };
     if (state.to) {
       // Frames that come in a burst blend over the time in which they were made.
-      const made = before ? (head.tick - before.tick) * this.tickSeconds : 0;
+      const made = before ? (head.tick - before.tick) * tickSeconds : 0;
       const from = state.from ?? new Float32Array(coefficients.length);
       blend(state.from ?? state.to, state.to, weight(state, now), from);
       state.from = from;

@@ -27,7 +27,13 @@ export class ProbeSpheres {
   update(light: LightState, now: number): void {
     if (now - this.#at < INTERVAL) return;
     this.#at = now;
-    for (const lit of light.fields.filter(isVolume)) {
+    const volumes = light.fields.filter(isVolume);
+    for (const [id, spheres] of this.#fields) {
+      if (volumes.some(({ field }) => field.id === id)) continue;
+      spheres.dispose();
+      this.#fields.delete(id);
+    }
+    for (const lit of volumes) {
       let spheres = this.#fields.get(lit.field.id);
       if (spheres?.field !== lit.field) {
         spheres?.dispose();
