@@ -91,6 +91,7 @@ fn ctrl_c_ends_it_with_0() {
 #[test]
 fn a_second_ctrl_c_ends_it_at_once() {
     let mut server = Serving::start("cornell", &["--volume", "2x2x2"]);
+    server.wait_for_metric("lumencast_ticks_total", |n| n > 0.0);
     // A request that never ends holds the server up far longer than the time between two signals.
     let mut asking = TcpStream::connect(server.address).expect("a connection");
     asking.write_all(b"GET /healthz HTTP/1.1\r\n").expect("half a request");
