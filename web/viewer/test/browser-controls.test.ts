@@ -260,7 +260,10 @@ describe('a person at the page', () => {
       .toBeGreaterThan(0.1);
     await page.click('.inspector [title^="Close"]');
     expect(await page.isVisible('.inspector')).toBe(false);
-    expect(difference(before, await picture())).toBeGreaterThan(0.02);
+    // What noise and the light's way to its end change is far less than the box's edges.
+    const after = await picture();
+    const edges = before.filter((pixel, i) => pixel.some((value, c) => Math.abs(value - after[i][c]) > 40));
+    expect(edges.length / before.length).toBeGreaterThan(0.002);
   });
 
   it('changes a lamp in the inspector, and its light follows', async () => {
