@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::ops::Deref;
 
 use lumencast_codec::{Catalog, ClientEdit, Epoch, FieldInfo, LightFile, LightTrack, StateFrame};
-use lumencast_light::Light;
+use lumencast_light::{FieldId, Light};
 use lumencast_scene::Edit;
 
 use crate::CacheError;
@@ -131,7 +131,7 @@ impl Cache {
                 let old = before.field(info.id).filter(|old| old.shape == info.shape)?;
                 Some(before.epoch_of(old))
             });
-            let known = self.light.fields().iter().find(|field| field.id().0 == info.id);
+            let known = self.light.field(FieldId(info.id));
             shown.push(match known {
                 Some(field) if same.is_some() => field.clone(),
                 _ => FieldCache::lit_by(&self.light, info),

@@ -410,9 +410,13 @@ impl Tick {
     }
 
     fn note_failure(&mut self, field: FieldId, outcome: &str) {
-        if let Some(published) = self.published.iter_mut().find(|known| known.id == field) {
+        if let Some(published) = self.published_mut(field) {
             published.note_failure(outcome);
         }
+    }
+
+    fn published_mut(&mut self, field: FieldId) -> Option<&mut Published> {
+        self.published.iter_mut().find(|published| published.id == field)
     }
 
     /// Takes in what was gathered; a field whose job has failed keeps its light.
@@ -423,8 +427,7 @@ impl Tick {
                 continue;
             };
             self.solver.take(asked, gathered);
-            if let Some(published) = self.published.iter_mut().find(|known| known.id == asked.field)
-            {
+            if let Some(published) = self.published_mut(asked.field) {
                 published.show(*moment);
             }
         }
