@@ -1,4 +1,4 @@
-//! What all gatherers have in common.
+//! The interface that all gatherers share.
 
 use crate::job::Job;
 use crate::sums::Sums;
@@ -10,18 +10,18 @@ pub struct Ticket(pub u64);
 /// State of a submitted job.
 #[derive(Debug)]
 pub enum Progress {
-    /// Not done yet; the share of samples taken, 0 to 1.
+    /// The job waits or runs; holds the share of samples taken, 0 to 1.
     Working(f32),
-    /// Done: one entry a budget, in order. A ticket gives its result once.
+    /// The job is done. A ticket gives its result once.
     Done(Gathered),
-    /// No such ticket, or its result was taken already.
+    /// There is no such ticket, or its result was taken, or the job was cancelled or failed.
     Unknown,
 }
 
 /// The result of a job.
 #[derive(Debug)]
 pub struct Gathered {
-    /// One entry a budget, in the order of the job.
+    /// One entry for each budget, in the order of the job.
     pub sums: Sums,
     /// [`lumencast_scene::Snapshot::version`] of the scene it was computed from.
     pub scene_version: u64,
@@ -37,10 +37,10 @@ pub struct Gathered {
 pub trait Gather: Send {
     /// Starts a job and returns at once.
     fn submit(&mut self, job: Job) -> Ticket;
-    /// Asks for a job.
+    /// Returns the state of a job without waiting; hands over its result where the job is done.
     fn poll(&mut self, ticket: Ticket) -> Progress;
-    /// Waits until a job is done.
+    /// Waits until a job is done. Returns `None` where [`Progress::Unknown`] would be returned.
     fn wait(&mut self, ticket: Ticket) -> Option<Gathered>;
-    /// Gives a job up; its result is dropped.
+    /// Cancels a job and drops its result.
     fn cancel(&mut self, ticket: Ticket);
 }

@@ -1,4 +1,4 @@
-//! What is asked of a gatherer.
+//! Jobs: what a caller asks of a gatherer.
 
 use std::sync::Arc;
 
@@ -9,38 +9,40 @@ use lumencast_scene::Snapshot;
 /// One request for light.
 #[derive(Clone, Debug)]
 pub struct Job {
-    /// The scene at the moment to compute.
+    /// The scene at the moment to compute light for.
     pub scene: Arc<Snapshot>,
-    /// The light as it was known before, if paths are to go on in it: the surface that a path ends at
-    /// then also sends what it scatters, of punctual lights and of this light. Each job so adds
-    /// another bounce to what the last one found (the feedback of the first paper). Without it,
-    /// light that is scattered more than `bounces` times is left out.
+    /// Light of an earlier job, for feedback of bounces (the first paper). Where it is given, the
+    /// surface at the end of a path also sends what it scatters of punctual lights and of this
+    /// light. Each job then adds one bounce to the result of the last. Without it, light that is
+    /// scattered more than `bounces` times is missing.
     pub previous: Option<Arc<Light>>,
-    /// Places that light arrives at, which may be kept from job to job.
+    /// Places that light arrives at. Several jobs may share the list.
     pub receivers: Arc<[Receiver]>,
-    /// Which of them to gather at, in any order, and how many samples each takes.
+    /// Receivers to gather at, in any order, with their numbers of samples.
     pub budgets: Vec<Budget>,
     /// Order of the expansion for probes.
     pub order: Order,
-    /// Surface scattering events on a path seen from a receiver: 0 sees only emission and
-    /// environment, 1 light scattered once, and so on.
+    /// Surface scattering events on a path from a receiver: 0 sees only emission and environment, 1
+    /// also light scattered once, and so on.
     pub bounces: u32,
-    /// Upper limit of one path vertex's contribution (luminance, cd/m²) to light that was scattered
-    /// before it arrives, against fireflies; infinite for none. The second paper's clamp (chapter 5).
+    /// Upper limit of one path vertex's contribution to light that is scattered before it arrives,
+    /// as luminance in cd/m². It removes fireflies (the second paper's clamp, chapter 5); infinite
+    /// for none.
     pub clamp: f32,
-    /// Asks for [`crate::SumsAt::distances`]: up to how many metres a distance counts. What is farther,
-    /// or nowhere, counts as so far.
+    /// Asks for [`crate::SumsAt::distances`] and gives their upper limit in metres. Farther
+    /// surfaces, and directions without a surface, count as this distance.
     pub distances: Option<f32>,
     /// Asks for [`crate::SumsAt::surfaces`].
     pub surfaces: bool,
-    /// Rotates the lattice and seeds the sampler: another tick, other directions. Results depend on
-    /// it and on the receivers' numbers, never on which others are gathered at, nor on the number of
-    /// threads.
+    /// Rotates the lattice of directions and seeds the sampler; each tick takes another seed.
+    /// Results depend on it and on the receivers' indices. They do not depend on which other
+    /// receivers a job has, nor on the number of threads.
     pub seed: u64,
 }
 
 impl Job {
-    /// A job of so many samples a receiver; the rest as in [`Job::with_budgets`].
+    /// A job with the same number of samples for each receiver; the rest as in
+    /// [`Job::with_budgets`].
     pub fn new(scene: Arc<Snapshot>, receivers: impl Into<Arc<[Receiver]>>, samples: u32) -> Self {
         let receivers = receivers.into();
         let budget = |receiver| Budget { receiver, samples };
@@ -48,7 +50,7 @@ impl Job {
         Self::with_budgets(scene, receivers, budgets)
     }
 
-    /// A job of L2 with three bounces, without clamp, distances, surfaces, or light from before.
+    /// A job of L2 with three bounces, without clamp, distances, surfaces or earlier light.
     pub fn with_budgets(
         scene: Arc<Snapshot>,
         receivers: impl Into<Arc<[Receiver]>>,
@@ -68,36 +70,39 @@ impl Job {
         }
     }
 
-    /// All samples of all budgets.
+    /// Sum of the samples of all budgets.
     pub fn samples(&self) -> u64 {
         self.budgets.iter().map(|budget| u64::from(budget.samples)).sum()
     }
 }
 
-/// How many samples a receiver takes.
+/// The number of samples that a receiver takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
-    /// Index into [`Job::receivers`]. A receiver draws the same samples whichever others are gathered at.
+    /// Index into [`Job::receivers`]. A receiver draws the same samples whatever other budgets a
+    /// job has.
     pub receiver: u32,
-    /// Directions to sample; none leave its sums empty.
+    /// Number of directions to sample; with 0 the sums are empty.
     pub samples: u32,
 }
 
 /// A place that light arrives at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Receiver {
-    /// A point in space that light reaches from everywhere: its sums are coefficients of radiance.
+    /// A point in space that light reaches from all directions: its sums are coefficients of
+    /// radiance.
     Probe {
         /// World position, metres.
         position: Vec3,
     },
-    /// A piece of a surface: its sum is irradiance.
+    /// A parallelogram on a surface, or a point of it: its sum is irradiance.
     Lumel {
-        /// World position of its middle, metres.
+        /// World position of its centre, metres.
         position: Vec3,
         /// World unit normal.
         normal: Vec3,
-        /// Two edges of the parallelogram about the middle that it covers, metres; zero for a point.
+        /// Edge vectors of the parallelogram, which is centred on `position`, metres; zero for a
+        /// point.
         footprint: [Vec3; 2],
     },
 }
@@ -108,12 +113,13 @@ impl Receiver {
         Self::Probe { position }
     }
 
-    /// A point of a surface.
+    /// A lumel without extent at a world position (metres) with a unit normal.
     pub fn point(position: Vec3, normal: Vec3) -> Self {
         Self::Lumel { position, normal, footprint: [Vec3::ZERO; 2] }
     }
 
-    /// Terms of a sample, and so entries of [`crate::SumsAt::sum`], for probes of an order.
+    /// Number of entries of [`crate::SumsAt::sum`]: one for each coefficient of a probe, one for a
+    /// lumel.
     pub fn terms(&self, order: Order) -> usize {
         match self {
             Self::Probe { .. } => order.coefficients(),

@@ -1,7 +1,7 @@
-//! Gathering of light: receivers in, sums out.
+//! Gathers light: receivers go in, sums of arriving light come out.
 //!
-//! A gatherer knows a snapshot of the scene and receivers, not volumes or lightmaps. It works on its
-//! own threads; the caller submits and polls.
+//! A gatherer knows a snapshot of the scene and a list of receivers. It knows nothing of volumes or
+//! lightmaps. It works on its own threads; the caller submits jobs and polls for results.
 
 mod accel;
 mod bsdf;

@@ -1,7 +1,8 @@
-//! How fast rays and paths are on this machine.
+//! Measures how fast this machine traces rays and paths.
 //!
-//! Rays are those that cost most: after two diffuse bounces from a camera, in shuffled order, so that
-//! neighbours in the list share nothing. Any-hit rays go from the same points towards the lights.
+//! Closest-hit rays are incoherent: each leaves the second surface of a camera path in a diffuse
+//! direction. They are shuffled, so neighbours in the list share nothing. Any-hit rays start at the
+//! same points and go towards the lights.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -17,7 +18,7 @@ use crate::path_trace::{Levels, MaterialModel, Options, Trees};
 use crate::sampling::{Sampler, cosine_hemisphere, mix2};
 use crate::world::{Passing, World, WorldCache, itself};
 
-/// The instructions that rays are traced with on this machine, for people.
+/// Name of the instruction set that rays are traced with on this machine, for display.
 #[must_use]
 pub fn instructions() -> &'static str {
     match Kernel::detect() {
@@ -29,13 +30,14 @@ pub fn instructions() -> &'static str {
     }
 }
 
-/// Rays that a thread takes at a time.
+/// Number of rays that a thread takes at a time.
 const CHUNK: usize = 1024;
 
-/// As many paths as rays are wanted are tried at most so often, since in open scenes many leave.
+/// Upper limit of rounds. Each round tries as many paths as rays are wanted; in open scenes many
+/// leave.
 const ROUNDS: usize = 8;
 
-/// A ray to be measured with, relative to the snapshot's origin.
+/// A ray for measurements, relative to the snapshot's origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TestRay {
     /// Metres.
@@ -51,7 +53,7 @@ pub struct TestRay {
 pub struct TestHit {
     /// Metres.
     pub t: f32,
-    /// Number of the triangle in [`RayBench::triangles`].
+    /// Index of the triangle in [`RayBench::triangles`].
     pub triangle: u32,
 }
 
@@ -60,21 +62,22 @@ fn numbered(rays: &[TestRay]) -> impl Iterator<Item = (Ray, usize)> + '_ {
     rays.iter().enumerate().map(move |(n, r)| (ray(r), n))
 }
 
-/// A scene with rays to trace through it. Surfaces with holes count as whole.
+/// A scene with rays to trace through it. Alpha masks and blending are ignored.
 #[derive(Debug)]
 pub struct RayBench {
     world: World,
     pool: rayon::ThreadPool,
-    /// Number of each instance's primitives' first triangle.
+    /// For each instance, the index of each primitive's first triangle in [`RayBench::triangles`].
     first_triangle: Vec<Vec<u32>>,
-    /// Rays to find the nearest surface of.
+    /// Rays for [`RayBench::trace_closest`].
     pub closest: Vec<TestRay>,
-    /// Rays to find any surface on.
+    /// Rays for [`RayBench::trace_any`].
     pub any: Vec<TestRay>,
 }
 
 impl RayBench {
-    /// Builds, and finds about `count` rays of each kind; fewer where paths leave the scene.
+    /// Builds the acceleration structure and finds about `count` rays of each kind. It finds fewer
+    /// where paths leave the scene.
     ///
     /// # Errors
     /// Where the system gives no threads.
@@ -124,8 +127,8 @@ impl RayBench {
         self.closest = found.into_iter().map(|(_, ray, _)| ray).collect();
     }
 
-    /// The bounce ray and the shadow ray that leave a camera path's second surface, and a key to
-    /// shuffle by.
+    /// The bounce ray and the shadow ray that leave a camera path's second surface. The first
+    /// number is a key to shuffle by.
     fn rays_of_path(
         &self,
         view: View,
@@ -191,7 +194,8 @@ impl RayBench {
         })
     }
 
-    /// What `chunk` finds of each ray, which until then is `nothing`.
+    /// Calls `chunk` for slices of the rays on all threads. Each result is `nothing` until `chunk`
+    /// sets it.
     fn trace<T: Send + Sync + Clone>(
         &self,
         rays: &[TestRay],
@@ -217,7 +221,7 @@ impl RayBench {
         self.world.accel().bytes()
     }
 
-    /// Runs on the threads that rays are traced with.
+    /// Runs a closure in the thread pool that traces the rays.
     pub fn install<T: Send>(&self, run: impl FnOnce() -> T + Send) -> T {
         self.pool.install(run)
     }
@@ -228,32 +232,32 @@ fn world(scene: &Arc<Snapshot>, levels: Levels, trees: Trees) -> World {
     World::new(scene.clone(), MaterialModel::Lambert, Kernel::detect(), &mut cache)
 }
 
-/// Seconds of building every hierarchy of a scene from nothing, on the calling thread's pool.
+/// Seconds to build all hierarchies of a scene from nothing, on the calling thread's pool.
 #[must_use]
 pub fn build_seconds(scene: &Arc<Snapshot>, levels: Levels, trees: Trees) -> f64 {
     update_seconds(&mut AccelCache::new(levels).with_trees(trees), scene)
 }
 
-/// The most memory, bytes, that building every hierarchy of a scene takes at once, what is kept of it
-/// included; to be asked before other work leaves memory to be used again. `None` where the system
-/// does not tell.
+/// Peak of additional memory, bytes, while all hierarchies of a scene are built; it includes what
+/// is kept. Call it before other work frees memory that the build could reuse. `None` where the
+/// system does not tell.
 #[must_use]
 pub fn build_peak_bytes(scene: &Arc<Snapshot>, levels: Levels) -> Option<u64> {
-    // Linux forgets the peak so far (man 5 proc_pid_clear_refs).
+    // This resets the peak on Linux (man 5 proc_pid_clear_refs).
     std::fs::write("/proc/self/clear_refs", "5").ok()?;
     let before = memory("VmRSS:")?;
     update_seconds(&mut AccelCache::new(levels), scene);
     Some(memory("VmHWM:")?.saturating_sub(before))
 }
 
-/// A line of this process's status, bytes.
+/// Reads one line of this process's status, in bytes.
 fn memory(line: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let value = status.lines().find_map(|l| l.strip_prefix(line))?;
     Some(1024 * value.trim().strip_suffix(" kB")?.parse::<u64>().ok()?)
 }
 
-/// Seconds of building the top level anew over `count` instances of a scene's first mesh, which
+/// Seconds to build the top level over `count` instances of a scene's first mesh. The instances
 /// overlap a little ([`scattered`]).
 #[must_use]
 pub fn top_level_seconds(scene: &Snapshot, count: u32) -> f64 {
@@ -267,7 +271,7 @@ pub fn top_level_seconds(scene: &Snapshot, count: u32) -> f64 {
     update_seconds(&mut cache, &many)
 }
 
-/// Places for `count` copies of a scene's first instance, in a cube of 100 m.
+/// Transforms that scatter `count` copies of a scene's first instance in a cube of 100 m.
 #[must_use]
 pub fn scattered(scene: &Snapshot, count: u32) -> Vec<Affine3A> {
     let Some(instance) = scene.instances.first() else { return Vec::new() };
@@ -279,7 +283,7 @@ pub fn scattered(scene: &Snapshot, count: u32) -> Vec<Affine3A> {
     (0..count).map(place).collect()
 }
 
-/// Seconds of bringing a cache to a scene; dropping the result is not counted.
+/// Seconds to update a cache to a scene, without the time to drop the result.
 fn update_seconds(cache: &mut AccelCache, scene: &Arc<Snapshot>) -> f64 {
     let start = Instant::now();
     let accel = cache.update(scene, Kernel::detect());

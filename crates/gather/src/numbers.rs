@@ -1,8 +1,9 @@
-//! Values as numbers in a row, for columns of them (`path_trace/columns.rs`).
+//! Structs as arrays of numbers, for the columns in `path_trace/columns.rs`.
 
-/// Gives a struct `NUMBERS`, how many numbers it consists of, `to_array` and `from_array`. Its fields stand
-/// in the order of the numbers, each with its kind: `f32`, `u32`, `bool`, `pair` (two numbers), `Vec3` or
-/// `Mat3`. All indices are constants, so that loops over columns become vector instructions.
+/// Gives a struct `NUMBERS` (the count of numbers in it), `to_array` and `from_array`. The macro
+/// lists the struct's fields in array order, each with its kind. A kind is `f32`, `u32`, `bool`,
+/// `pair` (two numbers), `Vec3` or `Mat3`. All indices are constants, so the compiler vectorises
+/// loops over columns.
 macro_rules! numbers {
     ($of:ident of $number:ty { $($field:ident: $kind:tt),+ $(,)? }) => {
         impl $of {

@@ -1,5 +1,5 @@
-//! Jobs that wait their turn: tickets, and the thread that works on them one after the other. It knows
-//! no gatherer.
+//! A queue of jobs: tickets, and the thread that works on the jobs one after the other. It does not
+//! depend on any gatherer.
 
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,14 +11,14 @@ use std::thread::JoinHandle;
 use crate::gatherer::{Gather, Gathered, Progress, Ticket};
 use crate::job::Job;
 
-/// How far a job is.
+/// Progress and cancellation of a job, shared between caller and worker.
 #[derive(Debug, Default)]
 pub(crate) struct Watch {
     pub(crate) samples_done: AtomicU64,
     pub(crate) cancelled: AtomicBool,
 }
 
-/// A queue of jobs with its worker. Dropping it gives its jobs up and waits for the worker.
+/// A queue of jobs with its worker. Dropping it cancels its jobs and waits for the worker.
 #[derive(Debug)]
 pub(crate) struct Queue {
     shared: Arc<Shared>,
@@ -45,7 +45,8 @@ impl Shared {
         self.states.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A state is dropped where the job cannot be done any more, so that nobody waits for it.
+    /// Stores a job's result. Without a result it drops the job's state, so that nobody waits for
+    /// it.
     fn finish(&self, ticket: Ticket, result: Option<Gathered>) {
         let mut states = self.states();
         match result {
@@ -59,7 +60,7 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    /// The watch of a job that nobody has given up.
+    /// The watch of a job that has not been cancelled.
     fn watch(&self, ticket: Ticket) -> Option<Arc<Watch>> {
         match self.states().get(&ticket) {
             Some(State::Working { watch, .. }) => Some(watch.clone()),
@@ -75,12 +76,12 @@ pub(crate) struct Jobs {
 }
 
 impl Jobs {
-    /// Works on jobs, in the order in which they were submitted, until the queue is dropped. `work`
-    /// gives nothing where the job was cancelled.
+    /// Works on jobs in the order of submission until the queue is dropped. `work` returns `None`
+    /// where the job was cancelled.
     pub(crate) fn run(&self, mut work: impl FnMut(&Job, &Watch) -> Option<Gathered>) {
         while let Ok((ticket, job)) = self.incoming.recv() {
             let Some(watch) = self.shared.watch(ticket) else { continue };
-            // A panic in one job must not leave the caller waiting for it for ever.
+            // The caller would wait for ever if a panic in one job ended the worker.
             let result = catch_unwind(AssertUnwindSafe(|| work(&job, &watch)));
             self.shared.finish(ticket, result.ok().flatten());
         }
@@ -88,7 +89,7 @@ impl Jobs {
 }
 
 impl Queue {
-    /// Starts the worker: a thread of this name that calls `worker` once.
+    /// Starts the worker: a thread named `name` that calls `worker` once.
     ///
     /// # Errors
     /// Where the system gives no thread.
@@ -101,7 +102,7 @@ impl Queue {
         let ends = Jobs { incoming, shared: shared.clone() };
         let body = move || {
             worker(&ends);
-            // Jobs that the worker has not done are given up.
+            // If the worker has returned, the remaining jobs are cancelled.
             ends.run(|_, _| None);
         };
         let worker = std::thread::Builder::new().name(name.into()).spawn(body)?;
@@ -164,7 +165,7 @@ impl Drop for Queue {
             }
         }
         if let Some(worker) = self.worker.take() {
-            // A panic there has been reported by its own thread.
+            // The worker's thread has reported its panic itself.
             let _ = worker.join();
         }
     }

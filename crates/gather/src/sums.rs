@@ -1,14 +1,15 @@
-//! What a gatherer found.
+//! Results of a gatherer.
 
 use glam::Vec3;
 
-/// What arrived at a job's receivers, in columns: an entry for each of its budgets, in their order.
+/// Light that arrived at a job's receivers, in columns: one entry for each budget, in their order.
 ///
-/// A *term* is what one sample adds: for a probe 4π·Y_lm(ω), one of each of `order.coefficients()`,
-/// directions being spread evenly over the sphere; for a lumel the single π, directions being spread
-/// by the cosine about its normal and origins over its footprint.
+/// A *term* is the weight of one sample. A probe has `order.coefficients()` terms, 4π·Y_lm(ω), with
+/// directions spread uniformly over the sphere. A lumel has the single term π. Its directions are
+/// distributed by the cosine about its normal, its origins uniformly over its footprint.
 ///
-/// Costs, in memory: 16 bytes a term, and 16 an entry.
+/// Memory: 16 bytes a term and 16 bytes an entry, plus distances and surfaces where they are asked
+/// for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sums {
     heads: Vec<Head>,
@@ -16,52 +17,52 @@ pub struct Sums {
     squares: Vec<f32>,
     distances: Vec<[f32; 2]>,
     surfaces: Vec<Option<SurfacePoint>>,
-    /// Where each entry's surfaces end; empty where nobody asked for them.
+    /// End of each entry's surfaces in `surfaces`; empty where no job asked for surfaces.
     surfaces_end: Vec<u32>,
 }
 
-/// What there is one of an entry.
+/// The part of an entry that has a fixed size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Head {
-    /// Where its terms end.
+    /// End of the entry's terms in `sum` and `squares`.
     end: u32,
     count: u32,
     back_face_fraction: f32,
     culled_fraction: f32,
 }
 
-/// What arrived at one receiver.
+/// Light that arrived at one receiver.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SumsAt<'a> {
-    /// Sum over samples of terms times radiance, cd/m²: divided by `count`, the unbiased estimate
-    /// of the coefficients of arriving radiance, or of irradiance in lux.
+    /// Sum over samples of terms times radiance, cd/m². Divided by `count` it is an unbiased
+    /// estimate: of the coefficients of arriving radiance (cd/m²), or of irradiance (lux).
     pub sum: &'a [Vec3],
-    /// Sum over samples of the squares of the luminance of the same.
+    /// Sum over samples of the squared luminance of terms times radiance.
     pub squares: &'a [f32],
-    /// Samples taken.
+    /// Number of samples taken.
     pub count: u32,
-    /// Share of the samples that met the back of a surface first, by its winding: near 1 for probes
-    /// inside of solid things.
+    /// Share of the samples that first met the back of a surface (by winding order), 0 to 1. It is
+    /// near 1 for probes inside solid objects.
     pub back_face_fraction: f32,
-    /// Share of the samples that met a back first that nobody is meant to see, its material being
-    /// single-sided.
+    /// Share of the samples that first met the back of a single-sided material, 0 to 1. Such backs
+    /// are not meant to be seen.
     pub culled_fraction: f32,
     /// Sums over samples of terms times the distance to the first surface, and times its square
-    /// (metres, square metres); empty unless [`crate::Job::distances`] asks for them.
+    /// (metres, square metres). Empty unless [`crate::Job::distances`] asks for them.
     pub distances: &'a [[f32; 2]],
-    /// The surface that each sample met first, if any; empty unless [`crate::Job::surfaces`] asks for
-    /// them.
+    /// The surface that each sample met first, `None` where there is none. Empty unless
+    /// [`crate::Job::surfaces`] asks for them.
     pub surfaces: &'a [Option<SurfacePoint>],
 }
 
-/// A point of a surface, as it is seen from somewhere.
+/// A point on a surface as seen from a receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// World, metres.
+    /// World position, metres.
     pub position: Vec3,
-    /// World unit normal of the triangle, on the side that is seen.
+    /// World unit normal of the triangle, on the seen side.
     pub normal: Vec3,
-    /// Whether that side is the triangle's front, by its winding, whatever its material shows.
+    /// Whether the seen side is the front, by winding order; the material does not matter.
     pub front: bool,
 }
 
@@ -76,10 +77,10 @@ impl Sums {
         self.heads.is_empty()
     }
 
-    /// The entry of a budget.
+    /// The entry of a budget, by its index in the job.
     ///
     /// # Panics
-    /// If there are not so many.
+    /// If the index is out of range.
     pub fn at(&self, entry: usize) -> SumsAt<'_> {
         let head = self.heads[entry];
         let before = entry.checked_sub(1);
@@ -102,8 +103,8 @@ impl Sums {
         (0..self.len()).map(|entry| self.at(entry))
     }
 
-    /// Adds an entry. Either all entries have distances, or none has; so with surfaces, unless an entry
-    /// has no samples.
+    /// Adds an entry. Either all entries have distances or none has. The same holds for surfaces,
+    /// except that an entry without samples may lack them.
     pub fn push(&mut self, entry: SumsAt<'_>) {
         let SumsAt { sum, squares, count, back_face_fraction, culled_fraction, .. } = entry;
         self.sum.extend_from_slice(sum);
@@ -111,7 +112,7 @@ impl Sums {
         self.distances.extend_from_slice(entry.distances);
         self.surfaces.extend_from_slice(entry.surfaces);
         if !self.surfaces.is_empty() {
-            // Entries before the first with surfaces have none.
+            // Earlier entries without surfaces end at 0.
             self.surfaces_end.resize(self.heads.len(), 0);
             self.surfaces_end.push(self.surfaces.len() as u32);
         }
@@ -129,7 +130,8 @@ impl<'a> FromIterator<SumsAt<'a>> for Sums {
 }
 
 impl<'a> SumsAt<'a> {
-    /// The estimates: coefficients of radiance, or irradiance; not numbers where there is no sample.
+    /// The estimates: coefficients of radiance (cd/m²) or irradiance (lux). NaN where there is no
+    /// sample.
     pub fn mean(&self) -> impl Iterator<Item = Vec3> + use<'a> {
         let count = self.count as f32;
         self.sum.iter().map(move |sum| sum / count)

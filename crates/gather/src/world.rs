@@ -16,7 +16,7 @@ use crate::lights::{AreaSample, Lights, emitters};
 use crate::sampling::{luminance, mix2, unit};
 use crate::surface::{Frames, MaterialModel, Point, Triangle};
 
-/// What is kept from one snapshot to the next.
+/// Structures that are reused from one snapshot to the next.
 #[derive(Debug, Default)]
 pub(crate) struct WorldCache {
     accel: AccelCache,
@@ -35,7 +35,7 @@ impl WorldCache {
     }
 }
 
-/// Light buffers, kept while the snapshot stays.
+/// The light buffers of the last snapshot, reused while the snapshot is the same.
 #[derive(Debug, Default)]
 struct LightBufferCache(Option<(Arc<Snapshot>, MaterialModel, Arc<[LightBuffer]>)>);
 
@@ -53,12 +53,11 @@ impl LightBufferCache {
     }
 }
 
-/// Directional lights that have a light buffer at most; rays towards others are traced like any.
+/// Most directional lights that get a light buffer. Rays towards others walk the hierarchy.
 const LIGHT_BUFFERS: usize = 4;
 
-/// A snapshot with its acceleration structure and tables of lights. All places are relative to the
-/// snapshot's origin; receivers, cameras and fields, which have theirs in the world, are brought here by
-/// those who ask.
+/// A snapshot with its acceleration structure and tables of lights. All positions are relative to
+/// the snapshot's origin. Receivers, cameras and fields have world positions; callers convert them.
 #[derive(Debug)]
 pub(crate) struct World {
     snapshot: Arc<Snapshot>,
@@ -73,24 +72,25 @@ pub(crate) struct World {
     fallback: Material,
 }
 
-/// A primitive of an instance.
+/// One primitive of one instance.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     material: u32,
     opaque: bool,
-    /// Number of its first triangle among the emitters.
+    /// Index of its first triangle among the emitters; `None` where it does not emit.
     emitters: Option<u32>,
 }
 
-/// A triangle that a ray starts at or is aimed at, which therefore does not count.
+/// The triangle that a ray starts at or is aimed at: instance, primitive, triangle. The ray ignores
+/// it.
 pub(crate) type Itself = (u32, u32, u32);
 
-/// What a ray passes by.
+/// The surfaces that a ray ignores.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Passing {
-    /// The triangles that it starts at and is aimed at.
+    /// The triangles that the ray starts at and is aimed at.
     pub(crate) ends: [Option<Itself>; 2],
-    /// Decides about surfaces that cover only in part.
+    /// Decides by hash whether a partly transparent surface stops the ray.
     pub(crate) key: u64,
 }
 
@@ -137,15 +137,15 @@ impl World {
         towards.filter_map(|to| LightBuffer::new(&self.accel, to, slack, is_opaque)).collect()
     }
 
-    /// What rays through a picture meet first, for those who follow many. `None` where it would not
-    /// help: in several hierarchies, or without surfaces.
+    /// Finds what the rays through a picture meet first; worth its cost for many rays. `None` where
+    /// the scene has several hierarchies or no surfaces.
     pub(crate) fn item_buffer(&self, pyramid: &Pyramid) -> Option<ItemBuffer> {
         ItemBuffer::new(&self.accel, pyramid, |instance, primitive| {
             self.part(instance, primitive).opaque
         })
     }
 
-    /// The largest coordinate of any surface, metres; 0 without any.
+    /// The largest absolute coordinate of any surface, metres; 0 without surfaces.
     pub(crate) fn extent(&self) -> f32 {
         let bounds = self.accel.bounds();
         if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() }
@@ -178,12 +178,12 @@ impl World {
         self.lights.emitters = emitters;
     }
 
-    /// What rays are traced with.
+    /// The instruction set that rays are traced with.
     pub(crate) fn kernel(&self) -> Kernel {
         self.accel.kernel()
     }
 
-    /// The acceleration structure alone, for which every surface is whole.
+    /// The acceleration structure alone, which treats every surface as opaque.
     pub(crate) fn accel(&self) -> &Accel {
         &self.accel
     }
@@ -201,7 +201,7 @@ impl World {
         triangles
     }
 
-    /// A ray that reaches for a source of light.
+    /// A shadow ray to a light chosen at random, from a point without a surface of its own.
     pub(crate) fn aim(&self, from: Vec3, choice: f32, u: Vec2) -> Option<Ray> {
         let facing = |_: Vec3| Scatter { value: Vec3::ONE, pdf: 0.0 };
         let endless = |direction| Ray { origin: from, direction, t_max: f32::INFINITY };
@@ -218,8 +218,8 @@ impl World {
         }
     }
 
-    /// A point of an emissive triangle or a direction of an environment picture, to be reached for from
-    /// a place in space.
+    /// Chooses a point of an emissive triangle or a direction of an environment picture, as seen
+    /// from `from`.
     pub(crate) fn source(&self, from: Vec3, choice: f32, u: Vec2) -> Option<AreaSource> {
         Some(match self.lights.sample_area(from, choice, u)? {
             AreaSample::Sky { direction, radiance, pdf } => {
@@ -240,7 +240,7 @@ impl World {
         &self.snapshot.lights
     }
 
-    /// The point of the world, metres, that places in here are relative to.
+    /// The world position, metres, that all positions in this struct are relative to.
     pub(crate) fn origin(&self) -> Vec3 {
         self.snapshot.origin
     }
@@ -269,8 +269,8 @@ impl World {
         &self.frames[instance as usize]
     }
 
-    /// The surfaces that rays of unit direction meet first. Rays come with a number, by which
-    /// `passing` and `found` know them; they are done in no particular order.
+    /// Finds the surfaces that rays of unit direction meet first. Each ray comes with a number,
+    /// which is passed to `passing` and `found`. Rays finish in no particular order.
     pub(crate) fn closest(
         &self,
         rays: impl Iterator<Item = (Ray, u32)>,
@@ -281,7 +281,7 @@ impl World {
         self.accel.closest(rays, stacks, |&n, hit| self.stops(hit, &passing(n)), found);
     }
 
-    /// Like [`Self::closest`], for rays most of which are those of an item buffer.
+    /// Like [`Self::closest`]; looks rays up in an item buffer and traces the rest.
     pub(crate) fn closest_seen(
         &self,
         items: &ItemBuffer,
@@ -296,7 +296,7 @@ impl World {
         self.accel.closest(undecided.into_iter(), stacks, stops, found);
     }
 
-    /// Whether something lies on each of the rays; otherwise like [`Self::closest`].
+    /// Tells whether something lies on each of the rays; otherwise like [`Self::closest`].
     pub(crate) fn occluded(
         &self,
         rays: impl Iterator<Item = (Ray, u32)> + Clone,
@@ -315,13 +315,14 @@ impl World {
         self.accel.occluded(others.chain(undecided), stacks, stops, found);
     }
 
-    /// Whether a ray that passes some surfaces by ends at this one.
+    /// Whether a ray ends at this hit, given what it ignores.
     #[inline]
     fn stops(&self, hit: &Hit, passing: &Passing) -> bool {
         !passing.ends.contains(&Some(itself(hit))) && self.covers(hit, passing.key)
     }
 
-    /// Whether the surface is there at all, for this ray.
+    /// Whether the surface is opaque to the ray with this key. Partly transparent ones decide by
+    /// hash.
     #[inline]
     fn covers(&self, hit: &Hit, key: u64) -> bool {
         let part = self.part(hit.instance, hit.primitive);
@@ -338,8 +339,8 @@ impl World {
         coverage >= 1.0 || unit(mix2(key, place) as u32) < coverage
     }
 
-    /// Asks for a hit's indices of vertices. What is asked for arrives while other work is done;
-    /// [`Self::point`] and its scattering read, one after the other, indices, vertices, texels.
+    /// Prefetches a hit's vertex indices. [`Self::point`] and its scattering read indices, vertices
+    /// and texels one after the other; the prefetch overlaps that with other work.
     #[inline]
     pub(crate) fn fetch_triangle(&self, hit: &Hit) {
         Triangle::fetch(self.instance(hit.instance), hit.primitive, hit.triangle);
@@ -351,18 +352,19 @@ impl World {
         Triangle::new(self.instance(hit.instance), hit.primitive, hit.triangle)
     }
 
-    /// The point of a hit.
+    /// Position, normals and material of a hit; `None` for triangles so thin that they have no
+    /// normal.
     pub(crate) fn point(&self, hit: &Hit, direction: Vec3) -> Option<Point<'_>> {
         let material = self.material(hit.instance, hit.primitive);
         Point::new(hit, self.triangle(hit), self.frames(hit.instance), material, direction)
     }
 
-    /// The number of a hit's triangle among the emitters.
+    /// The index of a hit's triangle among the emitters; `None` where it does not emit.
     pub(crate) fn emitter(&self, hit: &Hit) -> Option<u32> {
         Some(self.part(hit.instance, hit.primitive).emitters? + hit.triangle)
     }
 
-    /// Radiance that a point of an emitter sends out, holes counted.
+    /// Radiance (cd/m²) of a point of an emitter, times the coverage of the surface there.
     pub(crate) fn emitted(&self, sample: &emitters::EmitterSample) -> Vec3 {
         let triangle =
             Triangle::new(self.instance(sample.instance), sample.primitive, sample.triangle);
@@ -376,20 +378,20 @@ impl World {
     }
 }
 
-/// A source of light with an extent, as it is seen from somewhere.
+/// A light source with an extent, as seen from a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AreaSource {
-    /// Towards it, as far as nothing may lie on the way.
+    /// The shadow ray to the source.
     pub(crate) ray: Ray,
     /// cd/m².
     pub(crate) radiance: Vec3,
-    /// Density per steradian with which it was chosen.
+    /// Density per steradian of the choice.
     pub(crate) pdf: f32,
-    /// Its triangle.
+    /// The source's triangle, which the ray ignores; `None` for the environment.
     pub(crate) target: Option<Itself>,
 }
 
-/// Names a hit's triangle.
+/// The name of a hit's triangle.
 pub(crate) fn itself(hit: &Hit) -> Itself {
     (hit.instance, hit.primitive, hit.triangle)
 }
@@ -401,7 +403,7 @@ mod tests {
 
     use super::*;
 
-    /// A sheet that is half there over a floor, under suns that span so much.
+    /// A sheet of 50 % coverage over a floor, under suns of these angular diameters.
     fn sheet_over_floor(angles: &[f32]) -> Arc<Snapshot> {
         let mut stage = Stage::default();
         let grey = lambert(Vec3::splat(0.5), Vec3::ZERO);
@@ -435,7 +437,7 @@ mod tests {
         assert_eq!(found.len(), 2);
         let again = world(&snapshot, MaterialModel::Full, &mut one).light_buffers;
         assert!(Arc::ptr_eq(&found, &again));
-        // Under others, other surfaces are whole.
+        // Another material model makes other surfaces opaque, so the buffers differ.
         let lambert = world(&snapshot, MaterialModel::Lambert, &mut one).light_buffers;
         assert!(!Arc::ptr_eq(&found, &lambert));
         let many = sheet_over_floor(&[0.0; 2 * LIGHT_BUFFERS]);
@@ -443,7 +445,7 @@ mod tests {
         assert_eq!(many.len(), LIGHT_BUFFERS);
     }
 
-    /// What is there in part is there for the same rays, whatever answers.
+    /// Partly transparent surfaces let the same rays pass, whichever structure answers.
     #[test]
     fn rays_pass_sheets_by_their_keys() {
         let world = &world(

@@ -15,36 +15,37 @@ use super::pages::Pages;
 use bins::Plane;
 use few::{FEW, Parting};
 
-/// Below this depth, splits halve the number of items, so that depth is bounded whatever the input.
+/// Below this depth, splits halve the number of items, which bounds the depth for any input.
 const SAH_DEPTH: u32 = 40;
-/// No tree has more levels: what is left below [`SAH_DEPTH`] is at most 2³⁰ items, halved.
+/// Greatest number of levels of a tree: the at most 2³⁰ items below [`SAH_DEPTH`] are halved.
 pub(super) const DEEPEST: u32 = SAH_DEPTH + 31;
 /// Ranges smaller than this are built by one thread.
 const PARALLEL: usize = 1024;
-/// Ranges not smaller than this are looked at by several.
+/// Ranges of at least this size are scanned by several threads.
 const LARGE: usize = 16 * PARALLEL;
 /// Cost of visiting a node, in units of testing one full leaf.
 const NODE_COST: f32 = 0.6;
 
-/// A thing to be put into a tree, or several that stay together.
+/// An entry of a tree: one thing (a triangle or an instance), or several that stay together.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Item {
-    /// Its box's least coordinates; in the fourth number's bits the first thing, and [`ORDINARY`].
+    /// The box's least coordinates. The bits of `w` hold the index of the first thing and
+    /// [`ORDINARY`].
     low: Vec4,
-    /// Its greatest; in the fourth number's bits how many things, and [`ORDINARY`].
+    /// The box's greatest coordinates. The bits of `w` hold the number of things and [`ORDINARY`].
     high: Vec4,
 }
 
-/// Makes ordinary numbers of small integers' bits, since arithmetic is slow with subnormal ones.
+/// A bit that makes the bits of small integers normal numbers; arithmetic with subnormals is slow.
 const ORDINARY: u32 = 1 << 30;
 
 impl Item {
-    /// So many things, from an index on, within a box.
+    /// An item of `count` things from `index` on, within a box.
     ///
     /// # Panics
     ///
-    /// If there are more than 2³⁰.
+    /// If an index or a count is 2³⁰ or more.
     pub(super) fn new(bounds: Aabb, index: u32, count: u32) -> Self {
         assert!(index < ORDINARY && count < ORDINARY, "more than 2³⁰ triangles");
         let corner = |at: Vec3A, number: u32| at.extend(f32::from_bits(number | ORDINARY));
@@ -64,7 +65,7 @@ impl Item {
         self.high.w.to_bits() & !ORDINARY
     }
 
-    /// The things that it stands for.
+    /// The indices of its things.
     pub(super) fn indices(&self) -> Range<usize> {
         let first = (self.low.w.to_bits() & !ORDINARY) as usize;
         first..first + self.count() as usize
@@ -78,22 +79,22 @@ pub(super) struct BinaryTree {
     items: Pages<Item>,
 }
 
-/// A leaf, or a node with two sides.
+/// A leaf, or a node with two children.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 struct BinaryNode {
     min: [f32; 3],
-    /// Of a leaf the first of its items.
+    /// A leaf's first item.
     first: u32,
     max: [f32; 3],
-    /// Of a leaf how many; else how far behind the node its right side begins, and [`INNER`]. The
-    /// left side begins right behind it.
+    /// A leaf's number of items. For an inner node, [`INNER`] and the offset from the node to its
+    /// right child; the left child follows the node.
     rest: u32,
 }
 
 const INNER: u32 = 1 << 31;
 
-/// What lies below a node.
+/// The subtree below a node.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Subtree<'a> {
     nodes: &'a [BinaryNode],
@@ -101,7 +102,7 @@ pub(super) struct Subtree<'a> {
 }
 
 impl BinaryTree {
-    /// Builds a tree whose leaves hold at most `leaf` things, which no item may exceed.
+    /// Builds a tree whose leaves hold at most `leaf` things. No item may have more.
     pub(super) fn new(mut items: Pages<Item>, leaf: usize) -> Self {
         let mut nodes = Pages::zeroed((2 * items.len()).max(1));
         let extent = Extent::of(&items);
@@ -114,7 +115,7 @@ impl BinaryTree {
         Subtree { nodes: &self.nodes, items: &self.items }
     }
 
-    /// How many places its nodes take, of which leaves leave some empty.
+    /// Number of places for nodes; where leaves hold several items, some places stay empty.
     pub(super) fn len(&self) -> usize {
         self.nodes.len()
     }
@@ -126,34 +127,34 @@ impl<'a> Subtree<'a> {
         Aabb { min: min.into(), max: max.into() }
     }
 
-    /// How many places behind this node its right side begins, of which its left side has all but one;
-    /// `None` for a leaf.
+    /// Offset from this node to its right child; `None` for a leaf. The left subtree has the places
+    /// between.
     pub(super) fn right(&self) -> Option<usize> {
         let rest = self.nodes[0].rest;
         (rest & INNER != 0).then_some((rest & !INNER) as usize)
     }
 
-    /// Both sides; `None` for a leaf.
+    /// Both children; `None` for a leaf.
     pub(super) fn sides(&self) -> Option<[Self; 2]> {
         let side = |from: usize| Self { nodes: &self.nodes[from..], ..*self };
         self.right().map(|right| [side(1), side(right)])
     }
 
-    /// Of a leaf.
+    /// The items of a leaf.
     pub(super) fn items(&self) -> &'a [Item] {
         let BinaryNode { first, rest, .. } = self.nodes[0];
         &self.items[first as usize..(first + rest) as usize]
     }
 }
 
-/// What is known of a range of items.
+/// Bounds and size of a range of items.
 #[derive(Clone, Copy, Debug)]
 struct Extent {
-    /// Around the items.
+    /// Box around the items.
     bounds: Aabb,
-    /// Around their centres, twice.
+    /// Box around the items' centres, times two.
     centers: Aabb,
-    /// How many things they stand for, as far as an `f32` can count.
+    /// Number of things in the items, as exactly as an `f32` counts.
     count: f32,
 }
 
@@ -178,7 +179,7 @@ impl Extent {
     }
 }
 
-/// Around the centres of items, twice.
+/// Box around the items' centres, times two.
 fn centers(items: &[Item]) -> Aabb {
     if items.len() >= LARGE {
         let (front, back) = items.split_at(items.len() / 2);
@@ -188,12 +189,12 @@ fn centers(items: &[Item]) -> Aabb {
     items.iter().fold(Aabb::EMPTY, |centers, item| centers.with(item.center_twice()))
 }
 
-/// A subtree to be built.
+/// A subtree under construction.
 struct Builder<'a> {
-    /// At least one fewer than twice the items.
+    /// Places for nodes: at least twice the number of items less one.
     nodes: &'a mut [BinaryNode],
     items: &'a mut [Item],
-    /// Where they begin among all.
+    /// Index of the first item among all items of the tree.
     first: u32,
     extent: Extent,
     depth: u32,
@@ -229,8 +230,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Splits the items: how many lie on the left, and what is known of both sides. `None` where a leaf is
-    /// cheaper.
+    /// Splits the items. Returns the number of items on the left and the extents of both sides;
+    /// `None` where a leaf is cheaper.
     fn split(&mut self, leaf: f32) -> Option<(usize, [Extent; 2])> {
         let Extent { bounds, centers, count } = self.extent;
         let area = bounds.half_area();
@@ -255,7 +256,7 @@ impl Builder<'_> {
         Some(if cost.is_finite() { self.partition(&plane) } else { self.halve() })
     }
 
-    /// Brings the left side to the front.
+    /// Moves the items left of a plane to the front.
     fn partition(&mut self, plane: &Plane) -> (usize, [Extent; 2]) {
         let middle = bring_left(self.items, plane);
         debug_assert!(0 < middle && middle < self.items.len(), "binning and partition agree");
@@ -278,12 +279,12 @@ impl Builder<'_> {
     }
 }
 
-/// Brings items left of a plane to the front; how many they are.
+/// Moves the items left of a plane to the front; returns their number.
 fn bring_left(items: &mut [Item], plane: &Plane) -> usize {
     if items.len() >= LARGE {
         let (front, back) = items.split_at_mut(items.len() / 2);
         let (a, b) = rayon::join(|| bring_left(front, plane), || bring_left(back, plane));
-        // The front's right changes places with the back's left.
+        // Swaps the right items of the front half with the left items of the back half.
         let moved = b.min(front.len() - a);
         front[a..a + moved].swap_with_slice(&mut back[b - moved..b]);
         return a + b;
@@ -291,14 +292,14 @@ fn bring_left(items: &mut [Item], plane: &Plane) -> usize {
     let mut middle = 0;
     for n in 0..items.len() {
         let is_left = plane.is_left(&items[n]);
-        // Also where it stays right, so that there is no branch to guess.
+        // It also swaps items that stay right, which avoids an unpredictable branch.
         items.swap(n, middle);
         middle += usize::from(is_left);
     }
     middle
 }
 
-/// Cost of testing `n` things, in full leaves.
+/// Cost of testing `n` things, in units of full leaves.
 fn leaf_cost(n: f32, leaf: f32) -> f32 {
     (n / leaf).max(0.5)
 }
@@ -308,7 +309,7 @@ mod tests {
     use super::*;
     use crate::accel::tests::random;
 
-    /// Boxes of many sizes, two things in every third, and a heap of equal ones.
+    /// Boxes of many sizes, every third of two things, with a cluster of equal boxes.
     pub(super) fn items(count: u32) -> Vec<Item> {
         let item = |n: u32| {
             let at = if n.is_multiple_of(8) { Vec3A::ONE } else { Vec3A::from(random(50, n)) };
@@ -322,7 +323,7 @@ mod tests {
         (0..count).map(item).collect()
     }
 
-    /// Indices by leaf, in order; boxes hold what is below them.
+    /// Collects indices by leaf, in order, and checks that boxes enclose what is below them.
     pub(super) fn leaves(tree: Subtree<'_>, all: &mut Vec<Vec<usize>>) {
         let holds = |inner: Aabb| assert_eq!(tree.bounds().union(inner), tree.bounds());
         if let Some(sides) = tree.sides() {

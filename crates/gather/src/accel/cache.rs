@@ -10,13 +10,13 @@ use rayon::prelude::*;
 
 use super::{Accel, Kernel, Levels, Trees, TriangleBvh};
 
-/// Keeps one hierarchy a mesh (by the mesh's pointer) and one a deforming instance (by its node),
-/// and drops those that the latest snapshot does not use. With one level, keeps that of the latest
-/// snapshot.
+/// Hierarchies of the latest snapshot: one for each mesh (by the mesh's address) and one for each
+/// deforming instance (by its node). Those that the latest snapshot does not use are dropped. With
+/// one level, it keeps the single hierarchy of the latest snapshot.
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
     levels: Levels,
-    /// How those that last are built.
+    /// Effort to build hierarchies of rigid meshes and of whole scenes.
     trees: Trees,
     whole: Option<(Arc<Snapshot>, Arc<TriangleBvh>)>,
     pub(super) rigid: HashMap<Address, Kept<()>>,
@@ -25,14 +25,14 @@ pub(crate) struct AccelCache {
 
 #[derive(Debug)]
 pub(super) struct Kept<D> {
-    /// Keeps the address from being used again.
+    /// Keeps the mesh's address from being reused.
     mesh: Arc<Mesh>,
-    /// What the hierarchy was last fitted to.
+    /// The deformation that the hierarchy was last fitted to.
     deformation: D,
     bvh: Arc<TriangleBvh>,
 }
 
-/// Where a mesh lies; only compared, while [`Kept`] keeps the place from being used again.
+/// Address of a mesh. It is only compared, while [`Kept`] keeps the mesh alive.
 pub(super) type Address = usize;
 
 fn address(mesh: &Arc<Mesh>) -> Address {
@@ -44,7 +44,7 @@ impl AccelCache {
         Self { levels, ..Self::default() }
     }
 
-    /// Which does less for hierarchies than it would.
+    /// A cache that builds its hierarchies with this effort.
     pub(crate) fn with_trees(self, trees: Trees) -> Self {
         Self { trees, ..self }
     }
@@ -53,7 +53,7 @@ impl AccelCache {
         self.levels
     }
 
-    /// The structure of a snapshot; what has not changed since the last one is taken from there.
+    /// The acceleration structure of a snapshot; unchanged parts are reused.
     pub(crate) fn update(&mut self, snapshot: &Arc<Snapshot>, kernel: Kernel) -> Accel {
         if self.levels == Levels::One && copies_are_few(&snapshot.instances) {
             let whole = (0, Affine3A::IDENTITY, self.whole(snapshot));
@@ -96,7 +96,8 @@ fn deforming_key(instance: &Instance) -> (NodeId, Address) {
     (instance.node, address(&instance.mesh))
 }
 
-/// Brings what is kept to what there is now, several at once, and drops the rest unless it is to stay.
+/// Updates the kept hierarchies to the present ones, in parallel. It drops the rest, except those
+/// that are to stay.
 fn update_all<K, I, D>(
     all: &mut HashMap<K, Kept<D>>,
     now: impl Iterator<Item = (K, I)>,
@@ -115,8 +116,8 @@ fn update_all<K, I, D>(
 }
 
 impl Kept<()> {
-    /// Whether somebody else has the mesh, as a scene has those of files that edits have added: what is
-    /// taken away and added again is not built again, however often.
+    /// Whether somebody else owns the mesh, as a scene owns the meshes of files that edits have
+    /// added. An object that is removed and added again then needs no new build.
     fn is_owned(&self) -> bool {
         Arc::strong_count(&self.mesh) > 1
     }
@@ -148,18 +149,19 @@ impl Kept<Arc<Deformation>> {
         };
         if !Arc::ptr_eq(&kept.deformation, deformation) {
             kept.deformation = deformation.clone();
-            // A job in flight may still trace the old one: `make_mut` then copies it.
+            // A running job may still trace the old hierarchy; `make_mut` then copies it.
             Arc::make_mut(&mut kept.bvh).refit(&kept.mesh, deformation.vertices());
         }
         kept
     }
 }
 
-/// Up to so many triangles, however often the same one, are taken into one hierarchy anyway: about
-/// 40 MB.
+/// Up to this number of triangles (about 40 MB), one hierarchy is used however many copies there
+/// are.
 const FEW: usize = 1 << 19;
 
-/// Whether a scene's instances have at most twice as many triangles as its meshes, or [`FEW`].
+/// Whether a scene's instances have at most twice as many triangles as its distinct meshes, or at
+/// most [`FEW`].
 fn copies_are_few(instances: &[Instance]) -> bool {
     let mut seen = HashSet::new();
     let (mut all, mut distinct) = (0, 0);

@@ -1,15 +1,18 @@
-//! Which triangles may rays of one kind meet, by where they go in a plane across them?
+//! Finds the triangles that rays of one kind may meet, by their position in a plane across the
+//! rays.
 //!
-//! Rays that are parallel, or that all start at one point, are told apart by two coordinates. So the
-//! plane across them is divided into cells, and each cell knows what lies over it: blocks of triangles,
-//! the highest first, down to a height where one opaque triangle covers the whole cell. Most rays then
-//! meet few blocks; and a ray's cell is known before it is looked at, so that it can be asked for
-//! early. Cells over which too many blocks lie (a car in a desert) leave their rays to the hierarchy.
+//! Rays that are parallel, or that all start at one point, are told apart by two coordinates. So
+//! the plane across them is divided into cells, and each cell lists what lies over it. The list
+//! holds blocks of triangles, the highest first, down to a height where one opaque triangle covers
+//! the whole cell. Most rays then meet few blocks. A ray's cell is known before it is read, so it
+//! can be prefetched. Cells with too many blocks over them (a car in a desert) leave their rays to
+//! the hierarchy.
 //!
-//! Blocks are those of the hierarchy and are tested by the same instructions, so that a ray finds
-//! here what it finds there. What a cell lists, and what covers it, errs towards testing.
+//! Blocks are those of the hierarchy and are tested by the same instructions. So a ray finds here
+//! what it finds there. Lists and covers are conservative: they err towards testing.
 //!
-//! Coordinates are those of a [`Shape`]: two across the rays, in which they do not move, and a height.
+//! Coordinates are those of a [`Shape`]: two across the rays, constant along each ray, and a
+//! height.
 
 mod fill;
 mod shape;
@@ -25,19 +28,19 @@ use super::walk::fetch_line;
 use fill::Grid;
 pub(super) use shape::{Flat, Shape, corners};
 
-/// Rays whose cells are asked for before the first of them is looked at.
+/// Number of rays whose cells are prefetched before the first of them is read.
 pub(super) const AHEAD: usize = 16;
 
-/// What lies over each cell.
+/// The lists of blocks over each cell.
 #[derive(Debug)]
 pub(super) struct Cells {
     pub(super) kernel: Kernel,
-    /// Whose blocks are listed.
+    /// The hierarchy whose blocks are listed.
     pub(super) bvh: Arc<TriangleBvh>,
-    /// The instance that the blocks count from.
+    /// The instance that the blocks' instances are relative to.
     pub(super) instance: u32,
     grid: Grid,
-    /// Row by row, and one that ends the last one's list.
+    /// Cells row by row, and one more that ends the last cell's list.
     cells: Pages<Cell>,
     listed: Pages<Listed>,
 }
@@ -45,9 +48,9 @@ pub(super) struct Cells {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 struct Cell {
-    /// Below this, an opaque triangle covers all of it.
+    /// Height below which an opaque triangle covers the whole cell.
     covered_below: f32,
-    /// The first that is listed for it; the last is the one before the next cell's.
+    /// Index of its first entry in `listed`; its list ends where the next cell's begins.
     first: u32,
 }
 
@@ -55,13 +58,13 @@ struct Cell {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Listed {
-    /// No point of its triangles over the cell lies higher.
+    /// Upper limit of the height of its triangles over the cell.
     pub(super) height: f32,
     pub(super) block: u32,
 }
 
 impl Listed {
-    /// In place of more than are worth listing.
+    /// Stands for a list that is too long.
     pub(super) const TOO_MANY: Self = Self { height: f32::INFINITY, block: u32::MAX };
 
     pub(super) fn is_too_many(&self) -> bool {
@@ -69,44 +72,44 @@ impl Listed {
     }
 }
 
-/// What is allowed for rounding, in the units of shapes.
+/// Margins for rounding, in the units of shapes.
 #[derive(Clone, Copy)]
 pub(super) struct Margins {
-    /// On either side of a cell.
+    /// Added on either side of a cell.
     pub(super) aside: f64,
-    /// Beside a triangle at which rays start.
+    /// Distance from a triangle at which rays that leave it may start.
     pub(super) beside: f64,
-    /// Of heights.
+    /// Added to heights.
     pub(super) above: f64,
-    /// Of heights, as a share of them.
+    /// Added to heights, as a share of them.
     pub(super) share: f64,
 }
 
-/// What a cell knows.
+/// The content of a cell.
 pub(super) struct Over<'a> {
-    /// Below this, an opaque triangle covers all of it.
+    /// Height below which an opaque triangle covers the whole cell.
     pub(super) covered_below: f32,
-    /// What lies over it, the highest first.
+    /// Blocks over the cell, the highest first.
     pub(super) listed: &'a [Listed],
 }
 
 impl Cells {
     #[cfg(test)]
     pub(super) fn count(&self) -> usize {
-        // One ends the last one's list.
+        // The last cell only ends the list of the one before.
         self.cells.len() - 1
     }
 
-    /// Asks for the cell at a place, and gives its number.
+    /// Prefetches the cell at a place and returns its number.
     #[inline(always)]
     pub(super) fn find(&self, at: [f32; 2]) -> usize {
-        // Beyond the last there is nothing.
+        // This number is beyond the last cell.
         let cell = self.grid.cell(at).unwrap_or(self.cells.len());
         fetch_line(self.cells.as_ptr().wrapping_add(cell).cast());
         cell
     }
 
-    /// Asks for what lies over a cell; `None` for the number of a place beyond all cells.
+    /// Prefetches the list of a cell. `None` for the number of a place beyond all cells.
     #[inline(always)]
     pub(super) fn look_up(&self, cell: usize) -> Option<Over<'_>> {
         let [cell, next] = self.cells.get(cell..cell + 2)? else { return None };

@@ -1,8 +1,8 @@
-//! From a binary tree to nodes of eight children.
+//! Turns a binary tree into nodes of eight children.
 //!
-//! Which inner nodes vanish is chosen so that the expected cost of a ray is least, by dynamic
-//! programming over the tree (Ylitie, Karras and Laine 2017, "Efficient incoherent ray traversal on
-//! GPUs through compressed wide BVHs", section 3.2).
+//! Dynamic programming over the tree chooses the inner nodes to remove so that the expected cost of
+//! a ray is least (Ylitie, Karras and Laine 2017, "Efficient incoherent ray traversal on GPUs
+//! through compressed wide BVHs", section 3.2).
 
 use bytemuck::Pod;
 use rayon::prelude::*;
@@ -11,18 +11,18 @@ use super::build::{BinaryTree, Item, Subtree};
 use super::pages::{Pages, split};
 use super::wide::{LEAF, Node};
 
-/// Cost of visiting a node, of visiting a leaf: one.
+/// Cost of visiting a node; visiting a leaf costs one.
 const NODE_COST: f32 = 1.0;
 
-/// Down to this depth, subtrees are planned on several threads.
+/// Subtrees above this depth are planned on several threads.
 const PARALLEL_DEPTH: u32 = 6;
 
-/// Of an inner node's forest of at most 1, 2, … 8 children, how many go to its left side; 0 where one
-/// child fewer is as good.
+/// A cut of an inner node: for forests of at most 1, 2, … 8 children, the number of children on its
+/// left side. It is 0 where one child fewer is as good.
 type Cut = [u8; 8];
 
-/// Least cost of a subtree as a forest of at most 1, 2, … 8 children. Notes each node's cut in its
-/// place.
+/// Least costs of a subtree as a forest of at most 1, 2, … 8 children. It stores each node's cut at
+/// the node's place in `cuts`.
 fn plan(tree: Subtree<'_>, cuts: &mut [Cut], depth: u32) -> [f32; 8] {
     let area = tree.bounds().half_area();
     let Some(([left, right], second)) = tree.sides().zip(tree.right()) else { return [area; 8] };
@@ -35,7 +35,7 @@ fn plan(tree: Subtree<'_>, cuts: &mut [Cut], depth: u32) -> [f32; 8] {
     };
     let mut costs = [0.0; 8];
     for roots in 2..=8 {
-        // The first that is cheapest.
+        // The first of the cheapest wins.
         let (mut best, mut least) = (1, f32::INFINITY);
         for k in 1..roots {
             let cost = left[k - 1] + right[roots - k - 1];
@@ -46,7 +46,7 @@ fn plan(tree: Subtree<'_>, cuts: &mut [Cut], depth: u32) -> [f32; 8] {
         costs[roots - 1] = least;
         cut[roots - 1] = best as u8;
     }
-    // As one child: a node of its own, with eight.
+    // As a single child it is a node with eight children of its own.
     costs[0] = NODE_COST * area + costs[7];
     for roots in 2..=8 {
         if costs[roots - 2] <= costs[roots - 1] {
@@ -59,7 +59,7 @@ fn plan(tree: Subtree<'_>, cuts: &mut [Cut], depth: u32) -> [f32; 8] {
     costs
 }
 
-/// What lies below a node, and how it is to be cut.
+/// A subtree and the cuts of its nodes.
 #[derive(Clone, Copy)]
 struct Planned<'p, 'a> {
     tree: Subtree<'a>,
@@ -75,7 +75,7 @@ impl Planned<'_, '_> {
     }
 }
 
-/// The forest of at most `roots` children that [`plan`] chose.
+/// Appends the forest of at most `roots` children that [`plan`] chose.
 fn open<'p, 'a>(planned: Planned<'p, 'a>, roots: usize, children: &mut Vec<Planned<'p, 'a>>) {
     match planned.sides() {
         Some([left, right]) if roots > 1 => match usize::from(planned.cuts[0][roots - 1]) {
@@ -89,7 +89,7 @@ fn open<'p, 'a>(planned: Planned<'p, 'a>, roots: usize, children: &mut Vec<Plann
     }
 }
 
-/// Nodes of eight children, and what their leaves hold.
+/// Nodes of eight children, with the items of their leaves.
 #[derive(Debug, Default)]
 struct Part<'a> {
     /// Parents come before their children; the root is the first.
@@ -97,16 +97,17 @@ struct Part<'a> {
     leaves: Vec<&'a [Item]>,
 }
 
-/// A child whose subtree another part is to hold.
+/// A child whose subtree is in another part.
 struct Deferred<'p, 'a> {
-    /// The node that it is a child of, and which.
+    /// The node that it is a child of, and its lane there.
     node: usize,
     lane: usize,
     planned: Planned<'p, 'a>,
 }
 
 impl<'a> Part<'a> {
-    /// Adds a node and so many levels of nodes below it; what lies below those is deferred. Its index.
+    /// Adds a node and `levels` levels of nodes below it; subtrees below those are deferred.
+    /// Returns the node's index.
     fn add<'p>(
         &mut self,
         planned: Planned<'p, 'a>,
@@ -125,7 +126,8 @@ impl<'a> Part<'a> {
             None if planned.tree.items().is_empty() => {}
             None => children.push(planned),
         }
-        // Rays to any hit take the last first, and leaves may end them.
+        // Any-hit rays visit the last lane first; leaves come last, since a hit in one ends the
+        // ray.
         children.sort_by_key(|child| child.tree.right().is_none());
         for (lane, planned) in children.into_iter().enumerate() {
             self.nodes[index].set_bounds(lane, planned.tree.bounds());
@@ -142,14 +144,15 @@ impl<'a> Part<'a> {
         index as u32
     }
 
-    /// All that lies below a node.
+    /// The whole subtree of a node.
     fn of(planned: Planned<'_, 'a>) -> Self {
         let mut part = Self::default();
         part.add(planned, u32::MAX, &mut Vec::new());
         part
     }
 
-    /// Puts nodes and leaves where they are to lie, finished: they begin at these indices.
+    /// Writes the finished nodes and leaves to their places; `places.begin` holds their first
+    /// indices.
     fn put<T: Send>(&self, places: Places<'_, T>, leaf: impl Fn(&[Item]) -> T + Sync) {
         let [node, first_leaf] = places.begin;
         for (place, from) in places.nodes.iter_mut().zip(&self.nodes) {
@@ -164,23 +167,23 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Where a part's nodes and leaves are to lie.
+/// The places of a part's nodes and leaves, and the indices of the first of each.
 struct Places<'p, T> {
     nodes: &'p mut [Node],
     leaves: &'p mut [T],
     begin: [u32; 2],
 }
 
-/// Levels of nodes that one thread makes, before others make what is below, in trees not smaller than
-/// [`LARGE`].
+/// In trees of at least [`LARGE`] places, the number of levels that one thread builds before others
+/// build the rest.
 const UPPER: u32 = 2;
 const LARGE: usize = 1 << 13;
 
-/// Leaves that a thread makes at least.
+/// Least number of leaves that a thread makes.
 const RUN: usize = 64;
 
-/// Collapses a binary tree: nodes, parents before their children, the root first, and leaves made of
-/// their items.
+/// Collapses a binary tree. Returns the nodes, parents before their children and the root first,
+/// and the leaves made of their items.
 pub(super) fn collapse<T: Pod + Send + Sync>(
     tree: &BinaryTree,
     leaf: impl Fn(&[Item]) -> T + Sync,
@@ -192,7 +195,7 @@ pub(super) fn collapse<T: Pod + Send + Sync>(
     upper.add(Planned { tree: tree.root(), cuts: &cuts }, levels, &mut deferred);
     let lower: Vec<_> = deferred.par_iter().map(|child| Part::of(child.planned)).collect();
 
-    // Where each part's nodes and leaves begin.
+    // First node and first leaf of each part.
     let mut count = [upper.nodes.len(), upper.leaves.len()].map(|n| n as u32);
     let mut begins = vec![[0; 2]];
     for (child, part) in deferred.iter().zip(&lower) {

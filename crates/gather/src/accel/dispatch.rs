@@ -1,5 +1,5 @@
-//! The choice of instructions for a whole batch of rays: the one place that calls what is compiled for
-//! a processor's own.
+//! Selects the instruction set for a whole batch of rays. This is the one place that calls code
+//! compiled for a particular processor.
 
 use super::item_buffer::ItemBuffer;
 use super::kernel::Kernel;
@@ -8,7 +8,7 @@ use super::light_buffer::LightBuffer;
 use super::walk::{Stacks, put, trace_with};
 use super::{Accel, Hit, Ray};
 
-/// Calls a function by its twin that is compiled for the kernel's instructions.
+/// Calls the twin of a function that is compiled for the kernel's instructions.
 macro_rules! dispatch {
     ($kernel:expr, $twin:ident$(::<$($generic:ident),*>)?($($argument:expr),*), $portable:expr) => {
         match $kernel {
@@ -16,7 +16,7 @@ macro_rules! dispatch {
             #[cfg(target_arch = "x86_64")]
             Kernel::Avx2(_) => {
                 #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
-                // SAFETY: `Avx2` is made only by `Kernel::detect`, after the check for what it needs.
+                // SAFETY: only `Kernel::detect` makes `Avx2`, after the check for what it needs.
                 unsafe {
                     super::kernel_avx2::$twin$(::<$($generic),*>)?($($argument),*);
                 }
@@ -24,7 +24,7 @@ macro_rules! dispatch {
             #[cfg(target_arch = "aarch64")]
             Kernel::Neon => {
                 #[expect(unsafe_code, reason = "calls code compiled for NEON")]
-                // SAFETY: `kernel_neon` refuses to compile for a target without NEON.
+                // SAFETY: `kernel_neon` does not compile for a target without NEON.
                 unsafe {
                     super::kernel_neon::$twin$(::<$($generic),*>)?($($argument),*);
                 }
@@ -34,16 +34,16 @@ macro_rules! dispatch {
 }
 
 impl Kernel {
-    /// Runs `work`, compiled for the kernel's instructions. It has to be a closure that is always inlined,
-    /// of functions that are: what is called in it keeps the target's.
+    /// Runs `work`, compiled for the kernel's instructions. It has to be a closure that is always
+    /// inlined and calls only such functions; other functions keep the target's instructions.
     #[inline(always)]
     pub(crate) fn run(self, work: impl FnOnce()) {
         dispatch!(self, run(work), work());
     }
 }
 
-/// Finds the nearest hit of each ray, or with `ANY` the first found, and tells of each ray as soon as
-/// it is done. What comes with a ray is passed on to `accept` and `found`.
+/// Finds the nearest hit of each ray, or with `ANY` the first hit found. It reports each ray as
+/// soon as the ray is done. The value that comes with a ray is passed to `accept` and `found`.
 #[inline]
 pub(super) fn trace<const ANY: bool, T: Copy>(
     accel: &Accel,
@@ -70,8 +70,8 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
 }
 
 impl ItemBuffer {
-    /// Finds the nearest surface that `accept` lets count on each of the rays, like [`Accel::closest`].
-    /// Rays that it cannot tell of are passed to `undecided`.
+    /// Finds the nearest surface on each ray that `accept` accepts, like [`Accel::closest`]. Rays
+    /// that it cannot decide go to `undecided`.
     #[inline]
     pub(crate) fn closest<T: Copy>(
         &self,
@@ -89,8 +89,9 @@ impl ItemBuffer {
 }
 
 impl LightBuffer {
-    /// Whether any surface that `accept` lets count lies on each of the rays, which it must be for;
-    /// otherwise like [`Accel::occluded`]. Rays that it cannot tell of are passed to `undecided`.
+    /// Tells whether any surface that `accept` accepts lies on each ray; otherwise like
+    /// [`Accel::occluded`]. The buffer must answer the rays ([`Self::answers`]). Rays that it
+    /// cannot decide go to `undecided`.
     #[inline]
     pub(crate) fn occluded<T: Copy>(
         &self,

@@ -1,11 +1,13 @@
-//! What camera rays meet first, found without a walk through a tree.
+//! First hits of camera rays, found without a walk through a tree.
 //!
-//! They all start at one point, so that two coordinates tell what a ray may meet ([`super::cells`];
-//! Weghorst, Hooper and Greenberg 1984, "Improved Computational Methods for Ray Tracing", there called
-//! an item buffer). A cell is about a pixel; most list the one or two blocks that are seen there.
+//! Camera rays all start at one point, so two coordinates tell what a ray may meet
+//! ([`super::cells`]). Weghorst, Hooper and Greenberg 1984, "Improved Computational Methods for Ray
+//! Tracing", call this an item buffer. A cell is about a pixel; most list the one or two blocks
+//! that are seen there.
 //!
-//! Coordinates are the camera's, divided by the depth; a height is 1 over the depth. So planes stay
-//! planes, the nearest are the highest, and what is true of parallel rays is true of these.
+//! Coordinates are the camera's, divided by the depth; a height is 1 over the depth. In them planes
+//! stay planes and the nearest surfaces are the highest. So what holds for parallel rays holds for
+//! these.
 
 use glam::Vec3;
 
@@ -15,27 +17,28 @@ use super::triangle_bvh::Block;
 use super::walk::{Setup, TriangleHits, nearest};
 use super::{Accel, Hit, Ray, fetch_ahead};
 
-/// What is nearer to the eye than this share of the scene's size is listed for all cells.
+/// Triangles nearer to the eye than this share of the scene's size are listed for all cells.
 const NEAR: f64 = 1e-4;
-/// Most cells; where pixels are more, some share a cell.
+/// Upper limit of the number of cells. Where there are more pixels, some share a cell.
 const CELLS: f64 = (1 << 21) as f64;
-/// How much farther than what a ray has met a block may seem to be and still be tested.
+/// Tolerance of distances: a block that begins beyond the nearest hit by less than this factor is
+/// still tested.
 const FARTHER: f32 = 1.0 + 1e-5;
 
-/// The rays through a picture, from one point.
+/// The rays of a picture, from one point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pyramid {
-    /// Where they all start, metres.
+    /// Origin of all rays, metres.
     pub(crate) eye: Vec3,
-    /// To the right, up and ahead; unit, in any angles that span space.
+    /// Unit vectors to the right, up and ahead; they need not be orthogonal.
     pub(crate) axes: [Vec3; 3],
-    /// How far they go to the right and up, at most, for one step ahead.
+    /// Greatest extent of the rays to the right and up, for one unit ahead.
     pub(crate) half: [f32; 2],
-    /// Rays that differ by less, a step ahead, may as well be looked up together.
+    /// Size of a pixel, one unit ahead: rays that differ by less may share a cell.
     pub(crate) pixel: f32,
 }
 
-/// What is seen from a point.
+/// The surfaces seen from a point.
 #[derive(Debug)]
 pub(crate) struct ItemBuffer {
     eye: Vec3,
@@ -44,8 +47,9 @@ pub(crate) struct ItemBuffer {
 }
 
 impl ItemBuffer {
-    /// For rays of a pyramid. `is_opaque` tells of the primitives (instance, primitive) whose triangles
-    /// stop every ray. `None` where the structure is not a single hierarchy in the world, or is empty.
+    /// Builds the buffer for the rays of a pyramid. `is_opaque` tells whether the triangles of a
+    /// primitive (instance, primitive) stop every ray. `None` where the structure is not a single
+    /// hierarchy in the world, or is empty.
     pub(crate) fn new(
         accel: &Accel,
         pyramid: &Pyramid,
@@ -53,7 +57,7 @@ impl ItemBuffer {
     ) -> Option<Self> {
         let half = pyramid.half.map(f64::from);
         let pixel = f64::from(pyramid.pixel);
-        // Of a few roundings of a unit direction, divided by how far it goes ahead.
+        // This bounds a few roundings of a unit direction, divided by its component ahead.
         let share = 32.0 * f64::from(f32::EPSILON);
         let aside = share * (1.0 + half[0] + half[1]).powi(2);
         let margins = Margins { aside, beside: 0.0, above: 0.0, share };
@@ -77,13 +81,13 @@ impl ItemBuffer {
         self.cells.count()
     }
 
-    /// What its rays are to be tested by.
+    /// The instruction set that its rays are tested with.
     pub(super) fn kernel(&self) -> Kernel {
         self.cells.kernel
     }
 
-    /// [`Self::closest`], by what tests a block. Each step is taken for several rays before the next,
-    /// while what they ask for is on its way.
+    /// [`Self::closest`] with a given block test. Each step is taken for several rays before the
+    /// next step, so that prefetches have time to arrive.
     #[inline(always)]
     pub(super) fn closest_with<T: Copy>(
         &self,
@@ -105,7 +109,7 @@ impl ItemBuffer {
             for query in queries.drain(..) {
                 let is_listed = !query.listed.first().is_some_and(Listed::is_too_many);
                 let hit = is_listed.then(|| self.first_met(&query, &accept, &triangles)).flatten();
-                // To have passed what covers the cell would be a surprise.
+                // A ray that misses the triangle that covers its cell is left to the hierarchy.
                 if hit.is_some() || is_listed && !query.covered {
                     found(query.with, hit);
                 } else {
@@ -115,17 +119,17 @@ impl ItemBuffer {
         }
     }
 
-    /// Asks for the cell that a ray goes through.
+    /// Prefetches the cell that a ray goes through.
     #[inline(always)]
     fn query<T>(&self, ray: Ray, with: T) -> Query<'_, T> {
         let [x, y, z] = self.axes.map(|axis| axis.dot(ray.direction));
-        // Rays from elsewhere go through none, nor do those that go back or end.
+        // Rays from another origin have no cell. Neither have rays that go backwards or end.
         let is_seen = ray.origin == self.eye && z > 0.0 && ray.t_max == f32::INFINITY;
         let at = if is_seen { [x / z, y / z] } else { [f32::NAN; 2] };
         Query { with, ray, depth: z, cell: self.cells.find(at), covered: false, listed: &[] }
     }
 
-    /// Asks for what is seen through the cell.
+    /// Gives the query the list of its cell, and prefetches the list's first block.
     #[inline(always)]
     fn look_up<'a, T>(&'a self, query: &mut Query<'a, T>) {
         let over = self.cells.look_up(query.cell);
@@ -138,7 +142,7 @@ impl ItemBuffer {
         }
     }
 
-    /// What the ray meets first of all that is listed.
+    /// The nearest hit among the listed blocks.
     #[inline(always)]
     fn first_met<T>(
         &self,
@@ -151,7 +155,7 @@ impl ItemBuffer {
         let mut t_max = f32::INFINITY;
         let mut best = None;
         for listed in *listed {
-            // All that is left is farther away.
+            // All remaining blocks are farther away.
             if best.is_some() && listed.height * query.depth * t_max * FARTHER < 1.0 {
                 break;
             }
@@ -171,30 +175,30 @@ impl ItemBuffer {
     }
 }
 
-/// A ray on its way through the steps.
+/// A ray on its way through the steps of a lookup.
 struct Query<'a, T> {
     with: T,
     ray: Ray,
-    /// Depth for each unit of t.
+    /// Increase of depth for each unit of t.
     depth: f32,
     cell: usize,
-    /// Something covers the cell.
+    /// Whether an opaque triangle covers the cell.
     covered: bool,
-    /// What is seen through it.
+    /// Blocks seen through the cell, the nearest first.
     listed: &'a [Listed],
 }
 
-/// How triangles are seen.
+/// The projection of triangles.
 struct Camera {
     eye: [f64; 3],
     axes: [[f64; 3]; 3],
-    /// What is nearer is not divided by its depth.
+    /// The part of a triangle nearer than this depth is not projected.
     near: f64,
     rectangle: Flat,
 }
 
 impl Camera {
-    /// A point's coordinates to the right, up and ahead.
+    /// Coordinates of a point to the right, up and ahead, relative to the eye.
     fn seen(&self, point: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = [0, 1, 2].map(|axis| point[axis] - self.eye[axis]);
         self.axes.map(|axis| axis[0] * x + axis[1] * y + axis[2] * z)
@@ -205,7 +209,7 @@ impl Camera {
         [x * height, y * height, height]
     }
 
-    /// `None` behind the eye.
+    /// The projection of a triangle; `None` behind the eye.
     fn shape(&self, corners: [[f64; 3]; 3]) -> Option<Shape> {
         let corners = corners.map(|corner| self.seen(corner));
         let nearest = corners.iter().fold(f64::INFINITY, |nearest, p| nearest.min(p[2]));
@@ -227,7 +231,7 @@ impl Camera {
     }
 }
 
-/// How 1 over the depth grows across the plane through three points.
+/// Slopes of 1 over the depth, across the plane through three points.
 fn plane([a, b, c]: [[f64; 3]; 3]) -> [f64; 2] {
     let from_first = |p: [f64; 3]| [0, 1, 2].map(|k| p[k] - a[k]);
     let ([bx, by, bz], [cx, cy, cz]) = (from_first(b), from_first(c));
@@ -236,7 +240,7 @@ fn plane([a, b, c]: [[f64; 3]; 3]) -> [f64; 2] {
     [normal[0] / distance, normal[1] / distance]
 }
 
-/// The part of a convex polygon whose depth is at least `depth`; at most, where `sign` is −1.
+/// The part of a convex polygon whose depth is at least `depth`, or at most where `sign` is −1.
 fn clipped(polygon: &[[f64; 3]], depth: f64, sign: f64) -> Vec<[f64; 3]> {
     let above = |point: &[f64; 3]| sign * (point[2] - depth);
     let mut kept = Vec::with_capacity(polygon.len() + 1);

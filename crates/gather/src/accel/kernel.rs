@@ -1,6 +1,6 @@
-//! Which instructions this processor has.
+//! The instruction sets that rays are traced with.
 
-/// Which instructions to use.
+/// An instruction set that this processor has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kernel {
     /// Plain Rust.
@@ -19,7 +19,7 @@ pub(crate) enum Kernel {
 pub(crate) struct Avx2(());
 
 impl Kernel {
-    /// The fastest that this processor has.
+    /// The fastest instruction set that this processor has.
     pub(crate) fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2")
@@ -28,7 +28,8 @@ impl Kernel {
         {
             return Self::Avx2(Avx2(()));
         }
-        // Never false; asked so that `Portable`, which tests compare with, is no dead code.
+        // This is always true. The test keeps `Portable`, which tests compare with, from being dead
+        // code.
         #[cfg(target_arch = "aarch64")]
         if cfg!(target_feature = "neon") {
             return Self::Neon;

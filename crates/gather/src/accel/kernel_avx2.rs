@@ -1,4 +1,5 @@
-//! Eight boxes, or four triangles, at a time with AVX2 and FMA; see [`super::walk`].
+//! The box and triangle tests with AVX2 and FMA: eight boxes or four triangles at a time; see
+//! [`super::walk`].
 
 use std::arch::x86_64::{
     __m128, __m256, __m256i, _CMP_LE_OQ, _mm_add_ps, _mm_and_ps, _mm_cmpge_ps, _mm_cmpgt_ps,
@@ -35,7 +36,8 @@ pub(super) fn trace<const ANY: bool, T: Copy>(
         accept,
         found,
         |node, ray, t_max, stack| {
-            // All in one place: called as a function, it would pass its vectors through memory.
+            // This is written in one place: a function of its own would pass its vectors through
+            // memory.
             let (enter, leave) = slabs(node, ray, t_max);
             let (children, distances) = stack.room();
             let met = if ANY {
@@ -83,7 +85,7 @@ pub(super) fn closest_seen<T: Copy>(
     buffer.closest_with(rays, accept, found, undecided, triangles);
 }
 
-/// [`slabs`] as tests want it.
+/// [`slabs`] in the form that tests compare.
 #[cfg(test)]
 #[target_feature(enable = "avx2,fma")]
 pub(super) fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
@@ -91,16 +93,16 @@ pub(super) fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
     BoxHits { mask: not_after(enter, leave), t: bytemuck::cast(enter) }
 }
 
-/// Where the ray enters boxes and where it leaves them, between 0 and `t_max`; it misses those that
-/// it leaves first.
+/// The distances at which the ray enters and leaves each box, between 0 and `t_max`. It misses a
+/// box that it leaves before it enters.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn slabs(node: &Node, ray: &Setup, t_max: f32) -> (__m256, __m256) {
     let mut enter = _mm256_setzero_ps();
     let mut leave = _mm256_set1_ps(f32::INFINITY);
     for axis in 0..3 {
-        // Read where they are needed: read before a branch, numbers that lie side by side are loaded
-        // as one vector and taken out of it again.
+        // These are read where they are needed. Before a branch, the compiler would load adjacent
+        // numbers as one vector and then extract them again.
         let origin = _mm256_broadcast_ss(&ray.origin[axis]);
         let inverse = _mm256_broadcast_ss(&ray.inverse[axis]);
         let [near, far] = planes(node, ray, axis).map(|plane| _mm256_sub_ps(plane, origin));
@@ -111,7 +113,7 @@ fn slabs(node: &Node, ray: &Setup, t_max: f32) -> (__m256, __m256) {
     (enter, _mm256_min_ps(leave, _mm256_set1_ps(t_max)))
 }
 
-/// The boxes' planes across an axis that the ray meets first, and those that it meets last.
+/// The boxes' planes across an axis: those that the ray meets first, then those that it meets last.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn planes(node: &Node, ray: &Setup, axis: usize) -> [__m256; 2] {
@@ -120,8 +122,8 @@ fn planes(node: &Node, ray: &Setup, axis: usize) -> [__m256; 2] {
         debug_assert!(at.is_multiple_of(32) && at < size_of_val(&node.planes));
         let plane = std::ptr::from_ref(&node.planes).wrapping_byte_add(at).cast::<f32>();
         #[expect(unsafe_code, reason = "from an index, the place takes three instructions more")]
-        // SAFETY: `Setup` has multiples of 32 up to 160 for the nearer planes, of the six times eight
-        // numbers that begin here; the other one of the pair differs in the bit of 32.
+        // SAFETY: six arrays of eight numbers begin here. `Setup` gives the nearer planes at
+        // multiples of 32 bytes up to 160. The other plane of the pair differs in the bit of 32.
         unsafe {
             _mm256_loadu_ps(plane)
         }
@@ -129,14 +131,14 @@ fn planes(node: &Node, ray: &Setup, axis: usize) -> [__m256; 2] {
     [read(near), read(near ^ 32)]
 }
 
-/// Lanes where `a` is not greater than `b`.
+/// The lanes where `a` is not greater than `b`.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn not_after(a: __m256, b: __m256) -> u32 {
     _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32
 }
 
-/// Eight numbers of four bits, of which three count in a permutation.
+/// Splits a number into eight of four bits each, for a permutation, which reads three bits of each.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn four_bits_each(numbers: u32) -> __m256i {
@@ -144,7 +146,8 @@ fn four_bits_each(numbers: u32) -> __m256i {
     _mm256_srlv_epi32(_mm256_set1_epi32(numbers as i32), places)
 }
 
-/// For every set of lanes its members, eight bits each, the lowest first; then ones.
+/// For every set of lanes its members, eight bits each, the lowest first; the rest is filled with
+/// ones.
 static MEMBERS: [u64; 256] = {
     let mut table = [u64::MAX; 256];
     let mut set = 0;
@@ -162,7 +165,8 @@ static MEMBERS: [u64; 256] = {
     table
 };
 
-/// The members of a set of lanes, for a permutation that puts them first, and behind them −1.
+/// The members of a set of lanes, followed by −1. A permutation by them moves the members to the
+/// front.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn members(set: u32) -> __m256i {
@@ -201,7 +205,7 @@ pub(super) fn triangles(block: &Block, ray: &Setup, t_max: f32) -> TriangleHits 
     }
 }
 
-/// Sheared x and y, and z, of a corner of each triangle.
+/// Sheared x and y, and unsheared z, of a corner of each triangle.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn corner(block: &Block, vertex: usize, ray: &Setup) -> [__m128; 3] {
@@ -214,7 +218,8 @@ fn corner(block: &Block, vertex: usize, ray: &Setup) -> [__m128; 3] {
     [sheared(0), sheared(1), z]
 }
 
-/// Of x and y. Not fused: swapping `a` and `b` must give the exact negative.
+/// The cross product of x and y. It is not fused: swapping `a` and `b` must give the exact
+/// negative.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn cross(a: [__m128; 3], b: [__m128; 3]) -> __m128 {
@@ -236,7 +241,7 @@ fn permuted_bits(lanes: &[u32; 8], permutation: __m256i) -> __m256i {
     _mm256_permutevar8x32_epi32(lanes, permutation)
 }
 
-/// Work that is compiled for this processor as it stands, where it is inlined.
+/// Runs `work`, compiled for AVX2 as far as it is inlined here.
 #[target_feature(enable = "avx2,fma,popcnt")]
 pub(super) fn run(work: impl FnOnce()) {
     work();

@@ -1,4 +1,5 @@
-//! Eight boxes, or four triangles, at a time with NEON; see [`super::walk`].
+//! The box and triangle tests with NEON: eight boxes or four triangles at a time; see
+//! [`super::walk`].
 
 use std::arch::aarch64::{
     float32x4_t, uint32x4_t, vaddq_f32, vaddvq_u32, vandq_u32, vceqq_f32, vcgeq_f32, vcgtq_f32,
@@ -13,7 +14,7 @@ use super::walk::{BoxHits, Setup, Stacks, TriangleHits, WIDEN, put, trace_with};
 use super::wide::Node;
 use super::{Accel, Hit, Ray};
 
-// So that code compiled for NEON may be called wherever this module is.
+// This makes it sound to call code compiled for NEON wherever this module exists.
 const _: () = assert!(cfg!(target_feature = "neon"), "the target has no NEON");
 
 /// [`super::dispatch::trace`] compiled for NEON.
@@ -62,8 +63,8 @@ pub(super) fn closest_seen<T: Copy>(
     buffer.closest_with(rays, accept, found, undecided, triangles);
 }
 
-/// Minima and maxima are those that pass over a NaN, as `f32::min` and `f32::max` do: of a ray that
-/// is not finite, what counts is the axes that are.
+/// Minima and maxima ignore a NaN, as `f32::min` and `f32::max` do. For a ray that is not finite,
+/// only the finite axes count.
 #[target_feature(enable = "neon")]
 #[inline]
 pub(super) fn boxes(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
@@ -121,7 +122,7 @@ pub(super) fn triangles(block: &Block, ray: &Setup, t_max: f32) -> TriangleHits 
     }
 }
 
-/// Sheared x and y, and z, of a corner of each triangle.
+/// Sheared x and y, and unsheared z, of a corner of each triangle.
 #[target_feature(enable = "neon")]
 #[inline]
 fn corner(block: &Block, vertex: usize, ray: &Setup) -> [float32x4_t; 3] {
@@ -134,14 +135,15 @@ fn corner(block: &Block, vertex: usize, ray: &Setup) -> [float32x4_t; 3] {
     [sheared(0), sheared(1), z]
 }
 
-/// Of x and y. Not fused: swapping `a` and `b` must give the exact negative.
+/// The cross product of x and y. It is not fused: swapping `a` and `b` must give the exact
+/// negative.
 #[target_feature(enable = "neon")]
 #[inline]
 fn cross(a: [float32x4_t; 3], b: [float32x4_t; 3]) -> float32x4_t {
     vsubq_f32(vmulq_f32(a[0], b[1]), vmulq_f32(a[1], b[0]))
 }
 
-/// One bit a lane: NEON has no instruction for it.
+/// Packs lanes into one bit each, for which NEON has no instruction.
 #[target_feature(enable = "neon")]
 #[inline]
 fn mask(lanes: uint32x4_t) -> u32 {
@@ -160,7 +162,7 @@ fn load8(lanes: &[f32; 8]) -> [float32x4_t; 2] {
     bytemuck::cast(*lanes)
 }
 
-/// Work that is compiled for this processor as it stands, where it is inlined.
+/// Runs `work`, compiled for NEON as far as it is inlined here.
 #[target_feature(enable = "neon")]
 pub(super) fn run(work: impl FnOnce()) {
     work();

@@ -1,4 +1,4 @@
-//! Eight boxes, or four triangles, one after the other in plain Rust; see [`super::walk`].
+//! The box and triangle tests in plain Rust, one lane after the other; see [`super::walk`].
 
 use super::triangle_bvh::{Block, LANES};
 use super::walk::{BoxHits, Setup, TriangleHits, WIDEN};
@@ -26,7 +26,7 @@ pub(super) fn boxes_portable(node: &Node, ray: &Setup, t_max: f32) -> BoxHits {
 
 pub(super) fn triangles_portable(block: &Block, ray: &Setup, t_max: f32) -> TriangleHits {
     let mut hits = TriangleHits { mask: 0, t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES] };
-    // Sheared x and y, and z, of a corner.
+    // Sheared x and y, and unsheared z, of a corner.
     let corner = |vertex: usize, lane: usize| {
         let at = |k: usize| block.corners[vertex][ray.axes[k]][lane] - ray.origin[ray.axes[k]];
         let z = at(2);

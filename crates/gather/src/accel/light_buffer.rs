@@ -1,11 +1,13 @@
-//! Rays towards a directional light without a size, answered without a walk through a tree.
+//! Shadow rays towards a directional light without a size, answered without a walk through a tree.
 //!
-//! They are all parallel, so that two coordinates tell what a ray may meet ([`super::cells`]; Haines and
-//! Greenberg 1986, "The Light Buffer: A Shadow-Testing Accelerator"). Most rays end at their cell: all
-//! that starts below an opaque triangle which covers it is in shadow, and nothing lies over others.
+//! These rays are all parallel, so two coordinates tell what a ray may meet ([`super::cells`];
+//! Haines and Greenberg 1986, "The Light Buffer: A Shadow-Testing Accelerator"). Most rays need
+//! only their cell: whatever starts below an opaque triangle that covers the cell is in shadow, and
+//! empty cells occlude nothing.
 //!
-//! Coordinates are those of the triangle test: what is sheared so that the rays become the last axis
-//! ([`Setup`]); a height is the distance along a ray from the plane through the world's origin.
+//! Coordinates are those of the triangle test: space is sheared so that the rays become the last
+//! axis ([`Setup`]). A height is the distance along a ray from the plane through the world's
+//! origin.
 
 use glam::{Vec3, Vec3A};
 
@@ -15,25 +17,25 @@ use super::triangle_bvh::{Block, LANES};
 use super::walk::{Setup, TriangleHits, nearest};
 use super::{Accel, Hit, Ray, fetch_ahead};
 
-/// Cells a leaf's place for a triangle. Four times as many, or half as many, trace as fast; filling
-/// takes 2.2 or 0.7 times as long.
+/// Number of cells for each triangle slot of the leaves. Half or four times as many trace as fast;
+/// filling takes 0.7 or 2.2 times as long.
 const CELLS: f64 = 1.0;
 
-/// What lies between a directional light and the surfaces of a scene.
+/// The occluders between a directional light and the surfaces of a scene.
 #[derive(Debug)]
 pub(crate) struct LightBuffer {
-    /// Of every ray, but for its origin.
+    /// The setup of every ray; its origin is unused.
     setup: Setup,
-    /// Along every ray.
+    /// The unit direction of every ray, towards the light.
     direction: Vec3,
     cells: Cells,
 }
 
 impl LightBuffer {
-    /// For rays along `direction` (unit) from the surfaces of a scene. `is_opaque` tells of the
-    /// primitives (instance, primitive) whose triangles stop every ray that does not start at them;
-    /// `slack`, metres, is how far beside its triangle a ray may start. `None` where the structure is
-    /// not a single hierarchy in the world, or is empty.
+    /// Builds the buffer for rays along `direction` (unit) from the surfaces of a scene.
+    /// `is_opaque` tells whether the triangles of a primitive (instance, primitive) stop every ray
+    /// that does not start at them. `slack`, metres, is how far beside its triangle a ray may
+    /// start. `None` where the structure is not a single hierarchy in the world, or is empty.
     pub(crate) fn new(
         accel: &Accel,
         direction: Vec3,
@@ -44,7 +46,7 @@ impl LightBuffer {
         let setup = Setup::new(Vec3A::ZERO, direction.into());
         let bounds = accel.bounds();
         let extent = f64::from(bounds.min.abs().max(bounds.max.abs()).max_element());
-        // Of a few roundings of coordinates, each sheared by at most one.
+        // This bounds a few roundings of coordinates, each sheared by a factor of at most one.
         let aside = 32.0 * f64::from(f32::EPSILON) * extent;
         let beside = aside + 2.0 * f64::from(slack);
         let margins = Margins { aside, beside, above: aside, share: 0.0 };
@@ -58,19 +60,19 @@ impl LightBuffer {
         Some(Self { setup, direction, cells })
     }
 
-    /// Whether it is for this ray, if that starts at a surface of the scene.
+    /// Whether the buffer answers this ray, provided that the ray starts at a surface of the scene.
     #[inline(always)]
     pub(crate) fn answers(&self, ray: &Ray) -> bool {
         ray.direction == self.direction && ray.t_max == f32::INFINITY
     }
 
-    /// What its rays are to be tested by.
+    /// The instruction set that its rays are tested with.
     pub(super) fn kernel(&self) -> Kernel {
         self.cells.kernel
     }
 
-    /// [`Self::occluded`], by what tests a block. Each step is taken for several rays before the next,
-    /// while what they ask for is on its way.
+    /// [`Self::occluded`] with a given block test. Each step is taken for several rays before the
+    /// next step, so that prefetches have time to arrive.
     #[inline(always)]
     pub(super) fn occluded_with<T: Copy>(
         &self,
@@ -116,7 +118,7 @@ impl LightBuffer {
         }
     }
 
-    /// Asks for the cell over which a ray starts.
+    /// Prefetches the cell over which a ray starts.
     #[inline(always)]
     fn query<T>(&self, ray: Ray, with: T) -> Query<'_, T> {
         let [x, y, z] = self.setup.axes.map(|axis| ray.origin[axis]);
@@ -125,7 +127,7 @@ impl LightBuffer {
         Query { with, ray, height: z * shear[2], cell, listed: &[] }
     }
 
-    /// What the cell alone tells; else asks for what lies over it.
+    /// Answers the ray by its cell alone; otherwise gives the query the cell's list.
     #[inline(always)]
     fn look_up<'a, T>(&'a self, query: &mut Query<'a, T>) -> Option<bool> {
         let Some(over) = self.cells.look_up(query.cell) else { return Some(false) };
@@ -137,20 +139,20 @@ impl LightBuffer {
     }
 }
 
-/// A point as the rays see it.
+/// Coordinates of a point in the rays' sheared space.
 fn sheared(setup: &Setup, point: [f64; 3]) -> [f64; 3] {
     let shear = setup.shear.map(f64::from);
     let [x, y, z] = setup.axes.map(|axis| point[axis]);
     [x - shear[0] * z, y - shear[1] * z, z * shear[2]]
 }
 
-/// A ray on its way through the steps.
+/// A ray on its way through the steps of a lookup.
 struct Query<'a, T> {
     with: T,
     ray: Ray,
-    /// Where it starts.
+    /// Height of the ray's origin.
     height: f32,
     cell: usize,
-    /// What lies over the cell.
+    /// Blocks over the cell, the highest first.
     listed: &'a [Listed],
 }

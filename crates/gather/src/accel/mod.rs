@@ -1,14 +1,17 @@
-//! Which surface does a ray meet?
+//! Ray tracing: finds the surface that a ray meets.
 //!
-//! Two levels: one bounding-volume hierarchy a mesh in object space ([`triangle_bvh`]), kept from
-//! snapshot to snapshot by [`cache`], and a small one over the placed instances, rebuilt whenever
-//! the scene has changed. Or one, over all triangles of a moment ([`Levels`]). All are built as binary
-//! trees by binned SAH ([`build`]), collapsed ([`mod@collapse`]) to eight children a node ([`wide`]) and walked by the
-//! code in [`kernel`], with AVX2 or NEON where the processor has it.
+//! With two levels ([`Levels`]) each mesh has a bounding-volume hierarchy in object space
+//! ([`triangle_bvh`]), which [`cache`] keeps from snapshot to snapshot. A small hierarchy over the
+//! placed instances is rebuilt whenever the scene has changed. With one level, a single hierarchy
+//! holds all triangles of a moment.
 //!
-//! What holds at edges: triangles of one mesh that share an edge (bit-equal positions) leave no gap,
-//! since the edge functions of both are exact negatives of each other and box tests err outwards.
-//! Between different instances rays are transformed separately, so no such promise is made.
+//! Hierarchies are built as binary trees by binned SAH ([`build`]) and collapsed ([`mod@collapse`])
+//! to eight children a node ([`wide`]). [`walk`] traverses them, with AVX2 or NEON where the
+//! processor has it ([`kernel`]).
+//!
+//! Triangles of one mesh that share an edge (bit-equal positions) leave no gap. The edge functions
+//! of both are exact negatives of each other, and box tests err outwards. Rays are transformed
+//! separately for each instance, so there may be gaps between instances.
 
 mod build;
 mod cache;
@@ -46,24 +49,27 @@ use build::{BinaryTree, Item};
 use pages::Pages;
 use wide::{LEAF, Node};
 
-/// How many hierarchies lie above each other.
+/// Number of levels of hierarchies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Levels {
-    /// One a mesh, and one over the instances: where something moves, little has to be built anew.
+    /// One hierarchy for each mesh, and one over the instances. Where something moves, little is
+    /// rebuilt.
     #[default]
     Two,
-    /// One over all triangles of the scene: for many samples of one moment, since rays need not pass
-    /// from instance to instance (the Breakfast room, of 53 overlapping ones: nearest hits 1.35 times
-    /// as fast). Where instances share meshes so often that it would take far more memory, two.
+    /// One hierarchy over all triangles of the scene, for many samples of one moment. Rays need not
+    /// pass from instance to instance. Nearest hits are 1.35 times as fast in the Breakfast room,
+    /// which has 53 overlapping instances. Two levels are used where shared meshes would take far
+    /// more memory.
     One,
 }
 
-/// How much is done for a hierarchy.
+/// Effort to build a hierarchy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Trees {
-    /// Built top down, and that is it: for what changes its shape.
+    /// Built top down, for geometry that deforms.
     AsBuilt,
-    /// Then improved, for about as long again: for what lasts (Sponza: nearest hits 1.15 times as fast).
+    /// Built and then improved, which takes about as long again; for geometry that lasts. Nearest
+    /// hits on Sponza are 1.15 times as fast.
     #[default]
     Improved,
 }
@@ -73,26 +79,26 @@ pub enum Trees {
 pub(crate) struct Ray {
     /// Metres.
     pub(crate) origin: Vec3,
-    /// Any length above zero; t counts in its lengths.
+    /// Direction of any length above zero; t is in units of that length.
     pub(crate) direction: Vec3,
-    /// Where it ends; may be infinite.
+    /// End of the ray; may be infinite.
     pub(crate) t_max: f32,
 }
 
-/// Of its way, how far before what it reaches for a ray ends (as pbrt-v4's `ShadowEpsilon`). A light may
-/// lie in the very plane of a surface: 800 roundings of its distance let it be seen beside that surface
-/// where the plane is as flat as 1 in 100.
+/// Share of its length by which a shadow ray ends early (as pbrt-v4's `ShadowEpsilon`). A light may
+/// lie in the plane of a surface. This share is 800 roundings of the distance. So the surface does
+/// not hide the light where rays meet the plane at slopes of 1 in 100 or more.
 const SHORT: f32 = 1e-4;
 
 impl Ray {
-    /// From `origin` to what lies `to` from there, metres, and ends just before that.
+    /// The ray from `origin` to just before the point at `origin + to`, metres.
     #[inline(always)]
     pub(crate) fn reaching(origin: Vec3, to: Vec3) -> Self {
         let direction = to.normalize_or(Vec3::Y);
         Self { origin, direction, t_max: Self::end_before(to.length()) }
     }
 
-    /// Where a ray ends that reaches for what lies so many metres away.
+    /// End of a shadow ray to a point at this distance in metres.
     #[inline(always)]
     pub(crate) fn end_before(distance: f32) -> f32 {
         distance * (1.0 - SHORT)
@@ -102,7 +108,7 @@ impl Ray {
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hit {
-    /// Distance in lengths of the ray's direction.
+    /// Distance in units of the direction's length.
     pub(crate) t: f32,
     /// Barycentric weight of the triangle's second vertex.
     pub(crate) u: f32,
@@ -122,7 +128,7 @@ struct Placed {
     /// Index into the snapshot's instances.
     instance: u32,
     object_from_world: Affine3A,
-    /// The transform only moves, so that directions stay as they are.
+    /// Whether the transform is a translation, so that directions stay as they are.
     only_moves: bool,
     bvh: Arc<TriangleBvh>,
 }
@@ -145,8 +151,8 @@ pub(crate) struct Accel {
 }
 
 impl Accel {
-    /// Builds the top level over instances given as (index, transform, hierarchy). Those without
-    /// triangles are left out.
+    /// Builds the top level over instances given as (index, world_from_object, hierarchy).
+    /// Instances without triangles are left out.
     pub(crate) fn new(
         instances: impl IntoIterator<Item = (u32, Affine3A, Arc<TriangleBvh>)>,
         kernel: Kernel,
@@ -170,12 +176,13 @@ impl Accel {
         self.kernel
     }
 
-    /// World bounds of everything; empty for an empty scene.
+    /// World bounds of all instances; empty for an empty scene.
     pub(crate) fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// The only hierarchy there is, if it lies in the world, and the instance that it counts from.
+    /// The only hierarchy with the instance that it counts from, if there is one and it is in world
+    /// space.
     fn whole(&self) -> Option<(u32, &Arc<TriangleBvh>)> {
         match self.placed.as_slice() {
             [only] if only.object_from_world == Affine3A::IDENTITY => {
@@ -185,7 +192,7 @@ impl Accel {
         }
     }
 
-    /// Bytes that it takes, hierarchies that instances share counted once.
+    /// Size in bytes; hierarchies that instances share count once.
     pub(crate) fn bytes(&self) -> usize {
         let mut seen = std::collections::HashSet::new();
         let shared = self.placed.iter().filter(|p| seen.insert(Arc::as_ptr(&p.bvh)));
@@ -194,8 +201,8 @@ impl Accel {
             + shared.map(|p| p.bvh.bytes()).sum::<usize>()
     }
 
-    /// The nearest surface on each ray that `accept` lets count. What comes with a ray tells `accept`
-    /// and `found` which it is; they are done in no particular order.
+    /// Finds the nearest surface on each ray that `accept` accepts. The value that comes with a ray
+    /// is passed to `accept` and `found`. Rays finish in no particular order.
     #[inline]
     pub(crate) fn closest<T: Copy>(
         &self,
@@ -207,7 +214,7 @@ impl Accel {
         dispatch::trace::<false, T>(self, rays, stacks, accept, found);
     }
 
-    /// Whether any surface that `accept` lets count lies on each ray; otherwise like
+    /// Tells whether any surface that `accept` accepts lies on each ray; otherwise like
     /// [`Self::closest`].
     #[inline]
     pub(crate) fn occluded<T: Copy>(
@@ -223,7 +230,7 @@ impl Accel {
     }
 }
 
-/// A tree over boxes, one a leaf; leaf indices are those of the boxes.
+/// A tree over boxes, one in each leaf. Leaf indices are indices of the boxes.
 fn over_boxes(boxes: &[Aabb]) -> (Pages<Node>, Aabb) {
     let items = (0..).zip(boxes).map(|(index, &bounds)| Item::new(bounds, index, 1));
     let tree = BinaryTree::new(items.collect::<Vec<_>>().into(), 1);
@@ -276,7 +283,7 @@ impl Aabb {
         (0..8).map(corner)
     }
 
-    /// The box around the transformed box, widened by the rounding of the transform.
+    /// The box around the transformed box, widened by the rounding error of the transform.
     fn transformed(&self, to: &Affine3A) -> Self {
         let center = to.transform_point3a(self.center());
         let half = 0.5 * (self.max - self.min);

@@ -1,8 +1,8 @@
 //! Slices in huge pages.
 //!
-//! Incoherent rays touch a few lines here and there of tens of megabytes, more 4 KiB pages than a
-//! processor remembers addresses of. In 2 MiB pages (which Linux gives on request only) closest-hit
-//! rays on Sponza are 6 % faster.
+//! Incoherent rays touch single cache lines scattered over tens of megabytes. Those lie in more 4
+//! KiB pages than the processor's TLB holds. In 2 MiB pages, which Linux gives on request only,
+//! closest-hit rays on Sponza are 6 % faster.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -13,17 +13,17 @@ use memmap2::MmapMut;
 use rayon::prelude::*;
 
 const HUGE: usize = 2 << 20;
-/// Values that a thread makes at least.
+/// Least number of values that a thread makes.
 const RUN: usize = 256;
 
-/// A slice whose length is fixed, in huge pages where it fills some and the system has them.
+/// A slice of fixed length. It lies in huge pages where it is large enough and the system has them.
 pub(super) enum Pages<T> {
     Few(Vec<T>),
     Mapped { memory: MmapMut, first: usize, bytes: usize, of: PhantomData<T> },
 }
 
 impl<T: Pod + Send + Sync> Pages<T> {
-    /// So many values, all bytes 0.
+    /// A slice of `count` values whose bytes are all 0.
     pub(super) fn zeroed(count: usize) -> Self {
         let bytes = count * size_of::<T>();
         let mapped = if bytes < HUGE { None } else { map(bytes) };
@@ -36,7 +36,7 @@ impl<T: Pod + Send + Sync> Pages<T> {
         }
     }
 
-    /// So many values, each made where it is to lie, on several threads.
+    /// A slice of `count` values, which several threads compute in place.
     pub(super) fn filled(count: usize, value: impl Fn(usize) -> T + Send + Sync) -> Self {
         let mut pages = Self::zeroed(count);
         let places = pages.par_iter_mut().with_min_len(RUN).enumerate();
@@ -44,7 +44,7 @@ impl<T: Pod + Send + Sync> Pages<T> {
         pages
     }
 
-    /// Slices one after the other.
+    /// Concatenates slices.
     pub(super) fn concat(parts: &[impl AsRef<[T]> + Sync]) -> Self {
         let lengths = || parts.iter().map(|part| part.as_ref().len());
         let mut pages = Self::zeroed(lengths().sum());
@@ -60,18 +60,18 @@ impl<T> From<Vec<T>> for Pages<T> {
     }
 }
 
-/// Cuts a slice into parts of these lengths, whose sum is its own.
+/// Splits a slice into parts of these lengths, whose sum is the slice's length.
 pub(super) fn split<T>(mut rest: &mut [T], lengths: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
     let parts = lengths.map_while(|length| rest.split_off_mut(..length));
     parts.collect()
 }
 
-/// Room for so many bytes from the next multiple of a huge page on.
+/// Maps memory for `bytes` bytes that begin at a multiple of the huge page size.
 fn map(bytes: usize) -> Option<MmapMut> {
     let memory = MmapMut::map_anon(bytes + HUGE).ok()?;
     #[cfg(target_os = "linux")]
     {
-        // Where it is refused, pages are small; all else stays the same.
+        // If the system refuses, pages are small and all else stays the same.
         let _ = memory.advise(memmap2::Advice::HugePage);
     }
     Some(memory)

@@ -47,7 +47,7 @@ fn occluded(accel: &Accel, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> bool {
     occluded
 }
 
-/// Small triangles strewn through the unit cube.
+/// Small triangles scattered through the unit cube.
 fn soup(count: u32, size: f32) -> Arc<Mesh> {
     let mut positions = Vec::new();
     for i in 0..count {
@@ -58,7 +58,8 @@ fn soup(count: u32, size: f32) -> Arc<Mesh> {
     mesh(positions, triangles)
 }
 
-/// A closed ball with bumps of so much of its radius; vertices are shared, so edges are bit-equal.
+/// A closed ball of radius 1 with bumps of this relative height. Vertices are shared, so edges are
+/// bit-equal.
 fn ball(rings: u32, bumps: f32) -> Arc<Mesh> {
     let around = 2 * rings;
     let mut positions = vec![Vec3::Y, Vec3::NEG_Y];
@@ -96,7 +97,7 @@ fn ray(origin: Vec3, direction: Vec3) -> Ray {
     Ray { origin, direction, t_max: f32::INFINITY }
 }
 
-/// Distance along a ray by f64 Möller–Trumbore over every triangle.
+/// Distance along a ray by Möller–Trumbore in f64, over every triangle.
 fn by_brute_force(meshes: &[(Affine3A, Arc<Mesh>)], ray: &Ray) -> Option<f64> {
     let mut best: Option<f64> = None;
     let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
@@ -146,7 +147,7 @@ fn finds_what_brute_force_finds() {
             let found = closest(&accel, &ray, |_| true);
             let expected = by_brute_force(&meshes, &ray);
             hits += u32::from(found.is_some());
-            // At an edge the two may decide differently, which is rare.
+            // At an edge the two may rarely decide differently.
             let same = match (found, expected) {
                 (Some(hit), Some(t)) => (f64::from(hit.t) - t).abs() < 1e-4 * t.max(0.1),
                 (found, expected) => found.is_none() && expected.is_none(),
@@ -166,7 +167,7 @@ fn finds_what_brute_force_finds() {
     }
 }
 
-/// Rays of very different lengths, some of which meet nothing, in turns and one by one.
+/// Rays of very different lengths, some of which meet nothing, traced in batches and one by one.
 #[test]
 fn rays_in_flight_do_not_disturb_each_other() {
     for kernel in kernels() {
@@ -174,7 +175,8 @@ fn rays_in_flight_do_not_disturb_each_other() {
         let turned = |k: u16| (Affine3A::from_rotation_y(f32::from(k)), soup.clone());
         let accel = accel(&[0, 1, 2, 3, 4].map(turned), kernel);
         let mut stacks = Stacks::default();
-        // The second time with stacks that have been used; few, and more than are in flight.
+        // Later rounds reuse the stacks of earlier ones. Counts are below and above the number in
+        // flight.
         for count in [1000, 0, 1, 2, 3, 4, 7] {
             let rays: Vec<_> = (0..count)
                 .map(|i| {
@@ -183,7 +185,7 @@ fn rays_in_flight_do_not_disturb_each_other() {
                     Ray { t_max, ..ray(origin, random(8, i) - origin) }
                 })
                 .collect();
-            // Every fifth ray passes the triangles of even number by.
+            // Every fifth ray ignores the triangles of even number.
             let accept = |n: u32, hit: &Hit| !n.is_multiple_of(5) || hit.triangle % 2 == 1;
             let numbered = || rays.iter().copied().zip(0..);
             let (mut hits, mut occlusions) = (vec![None; rays.len()], vec![None; rays.len()]);
@@ -214,7 +216,7 @@ fn rays_in_flight_do_not_disturb_each_other() {
     }
 }
 
-/// Were farther children visited first, results would be the same, but later.
+/// The walk visits near children first. Otherwise results would be the same but later.
 #[test]
 fn near_surfaces_are_met_first() {
     let mut tried = Vec::new();
@@ -252,8 +254,8 @@ fn refused_hits_let_the_next_one_through() {
     }
 }
 
-/// From inside a closed mesh no ray gets out, wherever it is aimed; most are aimed at edges and
-/// vertices. Axis-parallel rays, which have zeros in their directions, are among them.
+/// No ray leaves a closed mesh from inside. Most are aimed at edges and vertices; some are
+/// axis-parallel, with zeros in their directions.
 #[test]
 fn closed_meshes_leak_nowhere() {
     let ball = ball(24, 0.1);
@@ -290,7 +292,7 @@ fn closed_meshes_leak_nowhere() {
     }
 }
 
-/// A mesh whose triangles do not share bit-equal edges does leak, so the test above can fail.
+/// A mesh whose triangles do not share bit-equal edges leaks, so the test above can fail.
 #[test]
 fn a_gap_of_a_millionth_is_found() {
     let mut ball = (*ball(24, 0.1)).clone();
@@ -390,8 +392,8 @@ fn cache_keeps_what_has_not_changed() {
     assert!(cache.rigid.is_empty() && cache.deforming.is_empty());
 }
 
-/// One hierarchy over all triangles finds what two levels find, names it alike, and is kept for as long
-/// as the snapshot is the same; meshes that are there very often are not multiplied.
+/// One hierarchy over all triangles finds what two levels find, under the same names. It is kept
+/// while the snapshot is the same. Meshes with very many instances are not copied.
 #[test]
 fn one_level_finds_what_two_levels_find() {
     let (soup, ball) = (soup(300, 0.15), ball(12, 0.2));
@@ -439,7 +441,7 @@ fn one_level_finds_what_two_levels_find() {
     assert_eq!(cache.update(&snapshot(many), Kernel::detect()).placed.len(), 3000);
 }
 
-/// Rays that leave a surface do not meet it again, at any scale and place.
+/// Rays that leave a surface do not meet it again, at any scale and position.
 #[test]
 fn surfaces_do_not_shade_themselves() {
     let ball = ball(16, 0.0);
@@ -472,13 +474,13 @@ fn surfaces_do_not_shade_themselves() {
         let center = world_from_object.transform_point3(Vec3::ZERO);
         for i in 0..3000 {
             let direction = sphere(random(8, i).truncate());
-            // From outside, where the ball is convex: nothing lies ahead.
+            // From outside, where the ball is convex, nothing lies ahead of a leaving ray.
             let from_outside = ray(center + direction * 4.0 * scale, -direction);
             let Some(hit) = closest(world.accel(), &from_outside, |_| true) else { continue };
             let Some(point) = world.point(&hit, from_outside.direction) else { continue };
             let point = point.place;
             let away = (point.normal + 0.99 * sphere(random(9, i).truncate())).normalize();
-            // No identity given: only the offset protects.
+            // The ray does not ignore its own triangle, so only the offset protects.
             let leaving = ray(point.leave(away), away);
             assert!(!occluded(world.accel(), &leaving, |_| true), "{scale} {place} {i}");
             let moved = (point.leave(away) - point.position).length();

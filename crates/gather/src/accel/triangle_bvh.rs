@@ -1,4 +1,4 @@
-//! The hierarchy over triangles: of one mesh, in object space, or of a whole scene, in the world.
+//! A hierarchy over triangles: of one mesh in object space, or of a whole scene in world space.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3A};
@@ -12,27 +12,29 @@ use super::triangles::{Triangle, Triangles};
 use super::wide::{LEAF, Node};
 use super::{Aabb, Trees};
 
-/// Triangles a leaf.
+/// Number of triangles in a leaf.
 pub(super) const LANES: usize = 4;
-/// When refitting has made the tree this much dearer than it was when built, it is built anew.
+/// Ratio of the tree's cost to its cost when built. When refitting exceeds it, the tree is rebuilt.
 pub(super) const REBUILD_COST: f32 = 1.8;
 const UNUSED: u32 = u32::MAX;
 
-/// Up to four triangles, laid out so that one instruction tests all: three cache lines. Eight to a
-/// block cost more memory traffic than the fewer visits save (any-hit rays on Sponza 5 % slower).
+/// Up to four triangles, laid out so that one instruction tests all of them: three cache lines.
+/// Blocks of eight cost more memory traffic than they save in visits (any-hit rays on Sponza are 5
+/// % slower).
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Block {
-    /// Vertex, axis, lane. Unused lanes hold a triangle without area, which no ray meets.
+    /// Corners by vertex, axis and lane. Unused lanes hold a triangle without area, which no ray
+    /// meets.
     pub(super) corners: [[[f32; LANES]; 3]; 3],
     pub(super) primitive: [u32; LANES],
     pub(super) triangle: [u32; LANES],
-    /// Counted from the instance that the hierarchy is placed as.
+    /// Index relative to the instance that the hierarchy is placed as.
     pub(super) instance: [u32; LANES],
 }
 
 impl Block {
-    /// At most [`LANES`] triangles.
+    /// A block of at most [`LANES`] triangles.
     pub(super) fn of<'t>(triangles: impl Iterator<Item = &'t Triangle>) -> Self {
         let mut lanes = [Triangle::new([Vec3A::ZERO; 3], [0, 0, UNUSED]); LANES];
         lanes.iter_mut().zip(triangles).for_each(|(lane, triangle)| *lane = *triangle);
@@ -65,7 +67,7 @@ pub(crate) struct TriangleBvh {
     pub(super) nodes: Pages<Node>,
     pub(super) blocks: Pages<Block>,
     bounds: Aabb,
-    /// SAH cost when built.
+    /// SAH cost of the tree when it was built.
     cost: f32,
 }
 
@@ -93,29 +95,30 @@ impl TriangleBvh {
         Self { nodes, blocks, bounds: tree.root().bounds(), cost }
     }
 
-    /// Bytes of its nodes and triangles.
+    /// Size of its nodes and triangles in bytes.
     pub(crate) fn bytes(&self) -> usize {
         size_of_val::<[Node]>(&self.nodes) + size_of_val::<[Block]>(&self.blocks)
     }
 
-    /// Object-space bounds.
+    /// Bounds in the hierarchy's space: object space or the world.
     pub(crate) fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// Brings the hierarchy to new vertices of the same mesh: its boxes are fitted anew, and where
-    /// that leaves too poor a tree it is rebuilt. Costs about a tenth of building.
+    /// Updates the hierarchy to new vertices of the same mesh. It refits the boxes, and rebuilds
+    /// the tree where refitting makes it too poor. Refitting costs about a tenth of building.
     pub(crate) fn refit(&mut self, mesh: &Mesh, deformed: &[Vertices]) {
         let fitted = self.fit(mesh, deformed);
-        // What is not finite has no box, and what was not when the tree was built is not in it.
+        // Triangles that were not finite when the tree was built are not in it, so fewer are
+        // fitted.
         let lacks_some = fitted < mesh.triangle_count();
         if lacks_some || cost(&self.nodes) > REBUILD_COST * self.cost {
             *self = Self::build(mesh, Some(deformed), Trees::AsBuilt);
         }
     }
 
-    /// Fits boxes and triangles to new vertices, whatever becomes of the tree, and counts those
-    /// triangles that are finite.
+    /// Fits boxes and triangles to new vertices without regard to the tree's quality. Returns the
+    /// number of finite triangles.
     pub(super) fn fit(&mut self, mesh: &Mesh, deformed: &[Vertices]) -> usize {
         let mut finite = 0;
         let source = Source { mesh, deformed: Some(deformed) };
@@ -149,18 +152,18 @@ impl TriangleBvh {
     }
 }
 
-/// Expected number of nodes and leaves that a random ray through the root's box visits.
+/// Expected number of nodes and leaves visited by a random ray through the root's box.
 pub(super) fn cost(nodes: &[Node]) -> f32 {
     let area = |node: &Node| -> f32 {
         node.lanes().map(|(lane, _)| node.lane_bounds(lane).half_area()).sum()
     };
-    // The sum does not depend on the threads.
+    // The chunks are fixed, so the sum does not depend on the threads.
     let chunks = nodes.par_chunks(CHUNK).map(|nodes| nodes.iter().map(area).sum());
     let areas: Vec<f32> = chunks.collect();
     areas.iter().sum::<f32>() / nodes[0].bounds().half_area().max(f32::MIN_POSITIVE)
 }
 
-/// Nodes that a thread looks at together.
+/// Number of nodes that a thread takes together.
 const CHUNK: usize = 1024;
 
 fn around(corners: [Vec3A; 3]) -> Aabb {

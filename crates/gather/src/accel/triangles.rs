@@ -1,5 +1,5 @@
-//! Triangles on their way into a tree: gathered from meshes into one list, and put into boxes, neighbours
-//! in pairs.
+//! Triangles as input of a tree: gathered from meshes into one list, and boxed, neighbours in
+//! pairs.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, Vec3, Vec3A, Vec4};
@@ -10,13 +10,14 @@ use super::Aabb;
 use super::build::Item;
 use super::pages::{Pages, split};
 
-/// Triangles that a thread looks at together.
+/// Number of triangles that a thread takes together.
 const CHUNK: usize = 4096;
-/// Two triangles stay together if the box around both has at most this share of the sum of their own
-/// boxes' areas.
+/// Two triangles become one item if the area of their common box is at most this share of the sum
+/// of their own boxes' areas.
 const PAIRED: f32 = 0.9;
 
-/// A triangle's corners; in their fourth numbers' bits its instance, its primitive and its index there.
+/// A triangle's corners. The bits of `w` hold its instance, its primitive and its index in the
+/// primitive.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(transparent)]
 pub(super) struct Triangle(pub(super) [Vec4; 3]);
@@ -33,12 +34,12 @@ impl Triangle {
     }
 }
 
-/// Triangles of a primitive that follow each other, and where they are.
+/// Consecutive triangles of a primitive, with their transform.
 #[derive(Clone, Copy)]
 struct Run<'a> {
     instance: u32,
     primitive: u32,
-    /// Index of the first.
+    /// Index of the first triangle.
     first: u32,
     triangles: &'a [[u32; 3]],
     positions: &'a [Vec3],
@@ -46,7 +47,7 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// All triangles of a mesh, moved; `deformed` are its vertices in place of those at rest.
+    /// The triangles of a mesh, transformed. `deformed` vertices replace those at rest.
     fn of(
         instance: u32,
         mesh: &'a Mesh,
@@ -70,19 +71,19 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Triangles, and boxes around them as items of a tree.
+/// Triangles, and the boxes around them as items of a tree.
 pub(super) struct Triangles {
     pub(super) all: Pages<Triangle>,
     pub(super) items: Pages<Item>,
 }
 
 impl Triangles {
-    /// Of a mesh at rest, or with `deformed` vertices (one entry a primitive).
+    /// Triangles of a mesh at rest, or with `deformed` vertices (one entry for each primitive).
     pub(super) fn of_mesh(mesh: &Mesh, deformed: Option<&[Vertices]>) -> Self {
         Self::new(&Run::of(0, mesh, deformed, Affine3A::IDENTITY).collect::<Vec<_>>())
     }
 
-    /// Of all instances, in world space.
+    /// Triangles of all instances, in world space.
     pub(super) fn of_instances(instances: &[Instance]) -> Self {
         let runs = (0..).zip(instances).flat_map(|(n, instance)| {
             let deformed = instance.deformation.as_ref().map(|d| d.vertices());
@@ -112,9 +113,9 @@ impl Triangles {
     }
 }
 
-/// Triangles from an index on, given by their boxes, as items: neighbours that are two halves of a
-/// quad, as most are, as one. Nearly as good a tree over half as many items. What is not finite is
-/// left out.
+/// Makes items of triangles, given by their boxes, from index `first` on. Neighbours that are two
+/// halves of a quad, as most are, become one item. That halves the number of items, and the tree is
+/// nearly as good. Triangles that are not finite are left out.
 fn paired(first: usize, boxes: impl Iterator<Item = Aabb>) -> Vec<Item> {
     let mut items = Vec::with_capacity(boxes.size_hint().0);
     let mut last: Option<(u32, Aabb)> = None;
@@ -153,7 +154,7 @@ mod tests {
         assert_eq!(found(&[quad, quad, aside]), [7..9, 9..10]);
         assert_eq!(found(&[aside, quad, quad, quad]), [7..8, 8..10, 10..11]);
         assert_eq!(found(&[quad, lost, quad]), [7..8, 9..10]);
-        // Side by side, their box is as large as both.
+        // Side by side, the area of their common box is the sum of both areas.
         let beside = at([1.0, 0.0, 0.0], [2.0, 1.0, 0.0]);
         assert_eq!(found(&[quad, beside]), [7..8, 8..9]);
         assert!(found(&[lost]).is_empty() && found(&[]).is_empty());

@@ -1,22 +1,24 @@
 //! The walk through the hierarchies.
 //!
-//! Several rays are in flight at once, one step of each in turn: a step waits for a node from the
-//! caches, then for one instruction after another, and meanwhile the processor works on the next
-//! ray's. That only helps while it knows which instructions come next, so with AVX2 children are
-//! put on the stack without a branch on which and how many they are. Their order is not that of their
-//! distances, which would have to be sorted, but one that the tree holds for the eight octants of
-//! directions (Fuetterling et al. 2017, "Accelerated single ray tracing for wide vector units").
+//! Several rays are in flight at once, one step of each in turn. A step waits for a node from the
+//! caches and then for one instruction after another. Meanwhile the processor works on the next
+//! ray. That only helps if it can predict the next instructions. So with AVX2 children are pushed
+//! without a branch on which and how many they are. Sorting them by distance would cost branches;
+//! the tree instead stores an order for each octant of directions (Fuetterling et al. 2017,
+//! "Accelerated single ray tracing for wide vector units").
 //!
-//! The walk itself ([`trace_with`]) is written once; what tests eight boxes or a block of triangles is
-//! passed in, so that it can be compiled for AVX2 or NEON or neither; [`super::dispatch`] chooses.
+//! [`trace_with`] is the walk itself. The tests of eight boxes and of a block of triangles are
+//! passed in, so that it can be compiled for AVX2, NEON or neither; [`super::dispatch`] chooses.
 //!
-//! Boxes: the slab test with far distances widened by 1 + 2γ(3), so that rounding errs towards
-//! visiting (Ize 2013, "Robust BVH ray traversal"). Triangles: the vertices are sheared so that the
-//! ray becomes the z axis, and the signs of the edges' 2D cross products decide (Woop, Benthin and
-//! Wald 2013, "Watertight ray/triangle intersection"). A vertex's sheared place does not depend on
-//! the triangle, and for an edge that two triangles share both compute exact negatives (so no
-//! fused multiply-add there); zero counts as inside for both. So a ray cannot slip between them,
-//! neither at edges nor at vertices, and the paper's second try in f64 is not needed for that.
+//! Boxes: the slab test, with far distances widened by 1 + 2γ(3) so that rounding errs towards
+//! visiting (Ize 2013, "Robust BVH ray traversal").
+//!
+//! Triangles: the vertices are sheared so that the ray becomes the z axis, and the signs of the
+//! edges' 2D cross products decide (Woop, Benthin and Wald 2013, "Watertight ray/triangle
+//! intersection"). A vertex's sheared place does not depend on the triangle. Two triangles that
+//! share an edge compute exact negatives for it, which is why there is no fused multiply-add. Zero
+//! counts as inside for both. So a ray cannot slip between them, neither at edges nor at vertices.
+//! The paper's fallback to f64 is not needed for that.
 
 use glam::Vec3A;
 
@@ -25,31 +27,30 @@ use super::triangle_bvh::{Block, LANES};
 use super::wide::{LEAF, Node};
 use super::{Accel, Hit, Placed, Ray};
 
-/// Directions' components are kept at least this far from zero, so that no infinities arise.
+/// Least absolute value of a direction's components in box tests, so that no infinities arise.
 pub(super) const TINY: f32 = 1e-18;
 /// 1 + 2γ(3).
 pub(super) const WIDEN: f32 = 1.0 + 2.0 * 3.0 * f32::EPSILON;
 
-/// Rays in flight. One fewer is 5 % faster where all is in the caches (`cornell`), two more are 8 %
-/// faster where nothing is (shuffled rays on Sponza); whole paths do not care.
+/// Number of rays in flight. Three are 5 % faster where all data is in the caches (`cornell`). Six
+/// are 8 % faster where none is (shuffled rays on Sponza). Whole paths take the same time.
 const IN_FLIGHT: usize = 4;
 
-/// What is still to be visited by the rays in flight; kept by the caller so that rays need not allocate.
+/// Stacks of the rays in flight; the caller keeps them so that rays need not allocate.
 #[derive(Debug, Default)]
 pub(crate) struct Stacks(Box<[Stack; IN_FLIGHT]>);
 
-/// The most that a ray ever has still to visit. A tree has at most [`DEEPEST`] binary levels,
-/// each node takes one of them at least and leaves at most seven children behind: 498 entries for
-/// each of the two hierarchies.
+/// Capacity of a stack. A tree has at most [`DEEPEST`] binary levels. Each node takes at least one
+/// of them and leaves at most seven children behind: 498 entries for each of the two hierarchies.
 const DEPTH: usize = 1024;
 const _: () = assert!(2 * (1 + 7 * DEEPEST as usize) <= DEPTH);
 
-/// What is still to be visited by one ray, the next on top.
+/// The nodes and leaves that one ray still has to visit, the next on top.
 #[derive(Debug)]
 pub(super) struct Stack {
-    /// Nodes and leaves.
+    /// Children of nodes, with [`LEAF`] for leaves.
     children: [u32; DEPTH + 8],
-    /// Where the ray enters their boxes; only kept for rays to the nearest hit.
+    /// Distances at which the ray enters the children's boxes; only kept for closest-hit rays.
     distances: [f32; DEPTH + 8],
     len: usize,
 }
@@ -76,13 +77,13 @@ impl Stack {
         (self.children[at], if ANY { 0.0 } else { self.distances[at] })
     }
 
-    /// What [`Self::pop`] would take; anything where there is nothing.
+    /// The child that [`Self::pop`] would take; any value where the stack is empty.
     #[inline(always)]
     fn next(&self) -> u32 {
         self.children[self.len.wrapping_sub(1) % DEPTH]
     }
 
-    /// Room for a node's children above what is there. What counts of it, [`Self::keep`] says.
+    /// Room for a node's children on top of the stack. [`Self::keep`] adds the first of them.
     #[inline(always)]
     pub(super) fn room(&mut self) -> (&mut [u32; 8], &mut [f32; 8]) {
         let at = self.len % DEPTH;
@@ -94,7 +95,7 @@ impl Stack {
         }
     }
 
-    /// Adds what was written to the room's beginning.
+    /// Adds the first `count` children of the room to the stack.
     #[inline(always)]
     pub(super) fn keep(&mut self, count: u32) {
         self.len += count as usize;
@@ -102,19 +103,20 @@ impl Stack {
     }
 }
 
-/// A ray as the box and triangle tests want it.
+/// A ray in the form that box and triangle tests need.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setup {
     pub(super) origin: [f32; 3],
     pub(super) inverse: [f32; 3],
-    /// A bit for each axis along which it goes down, so that it meets the greatest coordinates first;
-    /// x is the lowest.
+    /// A bit for each axis along which the ray goes down and meets the greatest coordinates first;
+    /// x is the lowest bit.
     pub(super) octant: u32,
-    /// How many bytes into a node the planes are that it meets first.
+    /// For each axis, the offset in bytes into a node of the planes that the ray meets first.
     pub(super) near: [u32; 3],
-    /// The axes, the direction's longest last.
+    /// The three axes; the last is the one along which the direction is longest.
     pub(super) axes: [usize; 3],
-    /// What to subtract of the last axis to shear the ray upright, and what scales t.
+    /// Factors of the last axis to subtract from the other two, which shear the ray upright, and
+    /// the factor that turns the last coordinate into t.
     pub(super) shear: [f32; 3],
 }
 
@@ -142,7 +144,7 @@ impl Setup {
         }
     }
 
-    /// Whether it meets the greatest coordinates first.
+    /// Whether the ray meets the greatest coordinates of an axis first.
     pub(super) fn goes_down(&self, axis: usize) -> bool {
         self.octant >> axis & 1 == 1
     }
@@ -162,13 +164,13 @@ impl Setup {
     }
 }
 
-/// Lanes that a test found, and what it found there.
+/// The boxes that a ray meets, as a set of lanes, and where it enters them.
 pub(super) struct BoxHits {
     pub(super) mask: u32,
     pub(super) t: [f32; 8],
 }
 
-/// Lanes of the triangles that a test found.
+/// The triangles that a ray meets, as a set of lanes, with t and barycentric weights.
 pub(super) struct TriangleHits {
     pub(super) mask: u32,
     pub(super) t: [f32; LANES],
@@ -176,8 +178,9 @@ pub(super) struct TriangleHits {
     pub(super) v: [f32; LANES],
 }
 
-/// The walk, both levels. `open` puts the children that a ray meets before `t_max` on the stack, the
-/// one to visit first on top: by the node's order for its octant, or with `ANY` the last lane.
+/// The walk through both levels. `open` pushes the children of a node that a ray meets before
+/// `t_max`, the one to visit first on top. The first is chosen by the node's order for the ray's
+/// octant; with `ANY` it is the last lane.
 #[inline(always)]
 pub(super) fn trace_with<const ANY: bool, T: Copy>(
     accel: &Accel,
@@ -210,21 +213,21 @@ pub(super) fn trace_with<const ANY: bool, T: Copy>(
     }
 }
 
-/// A ray on its way.
+/// A ray in flight.
 struct Flight<'a, T> {
     with: T,
     ray: Ray,
     world: Setup,
-    /// In the space of `nodes`.
+    /// The ray in the space of `nodes`.
     local: Setup,
-    /// Those of the instance that it is in, or of the top level, which has no blocks.
+    /// Nodes of the instance that it is in, or of the top level, which has no blocks.
     nodes: &'a [Node],
     blocks: &'a [Block],
     instance: Option<u32>,
     t_max: f32,
     best: Option<Hit>,
     stack: &'a mut Stack,
-    /// Length of the stack at which the instance is done.
+    /// Length of the stack at which the walk through the instance is done.
     floor: usize,
 }
 
@@ -248,7 +251,7 @@ impl<'a, T: Copy> Flight<'a, T> {
         flight
     }
 
-    /// Begins anew with another ray.
+    /// Restarts with another ray.
     #[inline(always)]
     fn start(&mut self, accel: &'a Accel, ray: Ray, with: T) {
         self.with = with;
@@ -259,8 +262,8 @@ impl<'a, T: Copy> Flight<'a, T> {
         self.begin(accel);
     }
 
-    /// A scene of one instance has no top level to speak of: rays begin in the instance. On Sponza, of
-    /// which every ray visits 27 nodes and leaves, that saves three steps and their branches.
+    /// With a single instance, rays begin in it and skip the top level. On Sponza, where each ray
+    /// visits 27 nodes and leaves, that saves three steps and their branches.
     #[inline(always)]
     fn begin(&mut self, accel: &'a Accel) {
         self.stack.len = 0;
@@ -271,7 +274,8 @@ impl<'a, T: Copy> Flight<'a, T> {
         self.stack.push(0);
     }
 
-    /// Visits what is on top of the stack and not out of reach by now; whether the ray is done.
+    /// Visits the top of the stack that is not beyond the nearest hit. Returns whether the ray is
+    /// done.
     #[inline(always)]
     fn step<const ANY: bool>(
         &mut self,
@@ -333,7 +337,7 @@ impl<'a, T: Copy> Flight<'a, T> {
         self.floor = 0;
     }
 
-    /// Asks for what the next step reads: most comes from the third level of cache.
+    /// Prefetches what the next step reads; most of it comes from the third-level cache.
     #[inline(always)]
     fn fetch_next(&self) {
         let child = self.stack.next();
@@ -347,7 +351,7 @@ impl<'a, T: Copy> Flight<'a, T> {
     }
 }
 
-/// Puts the children that a ray meets on the stack.
+/// Pushes the children that a ray meets.
 #[inline(always)]
 pub(super) fn put<const ANY: bool>(node: &Node, ray: &Setup, hits: &BoxHits, stack: &mut Stack) {
     let (children, distances) = stack.room();
@@ -364,7 +368,7 @@ pub(super) fn put<const ANY: bool>(node: &Node, ray: &Setup, hits: &BoxHits, sta
     stack.keep(count as u32);
 }
 
-/// Asks for what will be read soon.
+/// Prefetches a value.
 #[inline(always)]
 pub(crate) fn fetch_ahead<T>(value: &T) {
     for line in (0..size_of::<T>()).step_by(64) {
@@ -383,7 +387,7 @@ pub(super) fn fetch_line(at: *const i8) {
     }
 }
 
-/// `std` has no stable prefetch here.
+/// Prefetches a cache line; `std` has no stable function for it on this processor.
 #[cfg(target_arch = "aarch64")]
 #[inline(always)]
 pub(super) fn fetch_line(at: *const i8) {
@@ -401,7 +405,7 @@ pub(super) fn fetch_line(at: *const i8) {
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 pub(super) fn fetch_line(_: *const i8) {}
 
-/// The nearest of the triangles found that is accepted.
+/// The nearest accepted one of the triangles that a test found.
 #[inline(always)]
 pub(super) fn nearest(
     block: &Block,

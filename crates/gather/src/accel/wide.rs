@@ -4,19 +4,20 @@ use bytemuck::{Pod, Zeroable};
 
 use super::Aabb;
 
-/// Marks a child as a leaf; the other bits are its index.
+/// Marks a child as a leaf; the other bits are the leaf's index.
 pub(super) const LEAF: u32 = 1 << 31;
 
-/// Eight boxes and what they contain: four cache lines.
+/// Eight boxes and their children: four cache lines.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Node {
-    /// For each axis the least and the greatest coordinates of the children; (∞, −∞) where there is none.
+    /// For each axis, the least and the greatest coordinates of the children; (∞, −∞) for absent
+    /// ones.
     pub(super) planes: [[[f32; 8]; 2]; 3],
-    /// Index of a node, or [`LEAF`] and the index of a leaf.
+    /// Index of a node, or the index of a leaf with [`LEAF`].
     pub(super) child: [u32; 8],
-    /// For each octant of directions (see [`Setup::octant`]) the children's lanes, four bits each, the
-    /// farthest first.
+    /// For each octant of directions (see [`Setup::octant`]), the children's lanes, four bits each,
+    /// the farthest first.
     ///
     /// [`Setup::octant`]: super::walk::Setup::octant
     pub(super) far_first: [u32; 8],
@@ -36,9 +37,9 @@ impl Node {
         }
     }
 
-    /// Sorts the children by the corners at which rays of an octant leave their boxes. So large boxes
-    /// come after small ones in front of them: sorted by centres rays visit 5 % more leaves, by the
-    /// corners at which they enter 27 %.
+    /// Sorts the children by the corner at which rays of an octant leave their boxes. Large boxes
+    /// then come after small ones in front of them. Sorted by centres, rays would visit 5 % more
+    /// leaves; by the corners at which they enter, 27 % more.
     pub(super) fn set_order(&mut self) {
         for (octant, far_first) in self.far_first.iter_mut().enumerate() {
             let mut left_at = [0.0; 8];
@@ -73,9 +74,9 @@ impl Node {
     }
 }
 
-/// Lanes, four bits each, by their numbers, of which none may be missing whatever they are.
+/// Lane numbers, four bits each, ordered by `numbers`. Every lane occurs, whatever the numbers are.
 fn greatest_first(numbers: [f32; 8]) -> u32 {
-    // In the order of `f32::total_cmp`.
+    // The keys sort as `f32::total_cmp` does.
     let keys = numbers.map(|number| {
         let bits = number.to_bits() as i32;
         bits ^ ((bits >> 31) as u32 >> 1) as i32
@@ -115,7 +116,7 @@ mod tests {
     #[test]
     fn rays_take_boxes_in_front_first() {
         let mut node = Node::EMPTY;
-        // Along x, y and z, and one that reaches over all three.
+        // One box lies on each axis, and one reaches over all three.
         for axis in 0..3 {
             let at = 2.0 * glam::Vec3A::AXES[axis];
             node.set_bounds(axis, Aabb { min: at, max: at + 1.0 });
@@ -127,7 +128,7 @@ mod tests {
         };
         for octant in 0..8 {
             for axis in 0..3 {
-                // What lies farther along an axis is far for rays that go up it.
+                // Rays that go up an axis leave the box farther along it later.
                 let up = octant >> axis & 1 == 0;
                 let other = (0..3).find(|&o| o != axis && (octant >> o & 1 == 0) != up);
                 if let Some(other) = other {

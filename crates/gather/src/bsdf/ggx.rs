@@ -6,21 +6,22 @@ use glam::{Vec2, Vec3};
 
 use crate::sampling::turned;
 
-/// The smallest α: below it the lobe is narrower than f32 can integrate (perceptual roughness 0.032).
+/// The smallest α (perceptual roughness 0.032). Below it the lobe is narrower than f32 can
+/// integrate.
 pub(crate) const MIN_ALPHA: f32 = 1e-3;
 
-/// The lobe at a pair of directions, Fresnel left out.
+/// The specular lobe for a pair of directions, without Fresnel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lobe {
     /// D·G₂/(4 n·v n·l) · n·l.
     pub(crate) value: f32,
-    /// Density of [`visible_normal`] followed by a reflection.
+    /// Density per steradian of [`visible_normal`] followed by a reflection.
     pub(crate) pdf: f32,
     pub(crate) v_dot_h: f32,
 }
 
 impl Lobe {
-    /// Both directions have z > 0.
+    /// Evaluates the lobe; both directions must have z > 0.
     #[inline(always)]
     pub(crate) fn reflect(v: Vec3, l: Vec3, alpha: f32) -> Self {
         let h = (v + l).normalize_or(Vec3::Z);
@@ -34,7 +35,7 @@ impl Lobe {
     }
 }
 
-/// Normals' density D(h), written so that it keeps its digits near the peak.
+/// Density of normals D(h), in a form that stays exact near the peak.
 #[inline(always)]
 fn distribution(h: Vec3, alpha: f32) -> f32 {
     let a2 = alpha * alpha;
@@ -49,8 +50,8 @@ fn lambda(v: Vec3, alpha: f32) -> f32 {
     0.5 * ((1.0 + alpha * alpha * tan2).sqrt() - 1.0)
 }
 
-/// A normal as seen from `v`: density D·G₁·max(v·h, 0)/n·v (Dupuy and Benyoub 2023, "Sampling
-/// visible GGX normals with spherical caps").
+/// Samples a normal as seen from `v`, with density D·G₁·max(v·h, 0)/n·v (Dupuy and Benyoub 2023,
+/// "Sampling visible GGX normals with spherical caps").
 #[inline(always)]
 pub(crate) fn visible_normal(v: Vec3, alpha: f32, u: Vec2) -> Vec3 {
     let stretched = Vec3::new(alpha * v.x, alpha * v.y, v.z).normalize();

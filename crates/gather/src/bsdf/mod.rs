@@ -1,18 +1,19 @@
 //! How surfaces scatter light: glTF's metallic-roughness model with KHR_materials_{ior, specular,
 //! transmission} (glTF 2.0, appendix B).
 //!
-//! Three lobes, in a frame whose z is the shading normal on the viewer's side:
-//! - *diffuse*: Lambert times (1 − F(n·v))(1 − F(n·l))/(1 − F̄), where F̄ is the mean of F over the
-//!   hemisphere (Ashikhmin and Shirley 2000, section 2.2). glTF's own sample code mixes by
-//!   1 − F(v·h), which at grazing angles reflects up to 1.6 times what arrives; with this factor a
-//!   smooth white surface reflects exactly what arrives, a rough one at most 0.2 % more, and the
-//!   model stays reciprocal.
-//! - *specular*: GGX with height-correlated Smith shadowing, F after Schlick.
-//! - *transmission*: thin-walled, so light goes on without bending; roughness blurs it: the
-//!   specular lobe mirrored through the surface, times base colour and 1 − F.
+//! A BSDF has three lobes, in a frame whose z is the shading normal on the viewer's side:
+//! - *diffuse*: Lambert times (1 − F(n·v))(1 − F(n·l))/(1 − F̄). F̄ is the mean of F over the
+//!   hemisphere (Ashikhmin and Shirley 2000, section 2.2).
+//! - *specular*: GGX with height-correlated Smith shadowing; F is Schlick's.
+//! - *transmission*: thin-walled, so light continues without bending. It is the specular lobe
+//!   mirrored through the surface, times base colour and 1 − F; roughness blurs it.
 //!
-//! There is no compensation for light that bounces more than once between microfacets: rough metals
-//! are up to a third too dark, as in glTF's reference code.
+//! The sample code of glTF mixes diffuse and specular by 1 − F(v·h), which at grazing angles
+//! reflects up to 1.6 times what arrives. With the factor above the model is reciprocal. A smooth
+//! white surface then reflects exactly what arrives, a rough one at most 0.2 % more.
+//!
+//! Light that scatters more than once between microfacets is lost: rough metals are up to a third
+//! too dark, as in glTF's reference code.
 
 pub(crate) mod ggx;
 #[cfg(test)]
@@ -25,24 +26,25 @@ use glam::{Vec2, Vec3};
 use crate::numbers::numbers;
 use crate::sampling::{cosine_hemisphere, luminance};
 
-/// A surface's scattering at one point. Directions point away from it; the viewer's has z > 0.
+/// The BSDF of a surface at one point. Directions point away from it; the viewer's has z > 0.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bsdf {
     diffuse: Vec3,
     transmission: Vec3,
-    /// Of the specular lobe: dielectric and metal mixed.
+    /// Reflectance of the specular lobe at normal incidence, dielectric and metal mixed.
     f0: Vec3,
     f90: f32,
-    /// Of the dielectric alone, largest channel: what the lobes underneath lose.
+    /// Reflectance of the dielectric alone at normal incidence, largest channel: the lobes
+    /// underneath lose this share.
     dielectric_f0: f32,
     dielectric_f90: f32,
     alpha: f32,
 }
 
-/// What a surface is made of, textures looked up already.
+/// Material values at a point, with textures applied.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Substance {
-    /// Linear.
+    /// Linear colour.
     pub(crate) base_color: Vec3,
     /// 0 to 1.
     pub(crate) metallic: f32,
@@ -54,11 +56,11 @@ pub(crate) struct Substance {
     pub(crate) ior: f32,
     /// 0 to 1.
     pub(crate) specular: f32,
-    /// Linear.
+    /// Linear colour.
     pub(crate) specular_color: Vec3,
 }
 
-/// Scattered light of one pair of directions.
+/// The BSDF's value and sampling density for one pair of directions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Scatter {
     /// f(v, l)·|cos θ_l|.
@@ -67,7 +69,7 @@ pub(crate) struct Scatter {
     pub(crate) pdf: f32,
 }
 
-/// A direction chosen.
+/// A sampled direction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chosen {
     pub(crate) direction: Vec3,
@@ -77,7 +79,7 @@ pub(crate) struct Chosen {
 }
 
 impl Chosen {
-    /// No direction.
+    /// The value for a sample without a direction.
     pub(crate) const NONE: Self = Self { direction: Vec3::ZERO, weight: Vec3::ZERO, pdf: 0.0 };
 }
 
@@ -143,7 +145,8 @@ impl Bsdf {
         s
     }
 
-    /// Chooses a direction; `None` where no light comes from. `choice` picks the lobe.
+    /// Samples a direction; `choice` picks the lobe. `None` where the sampled direction carries no
+    /// light.
     #[inline(always)]
     pub(crate) fn sample(&self, v: Vec3, choice: f32, u: Vec2) -> Option<Chosen> {
         if self.is_lambert() {
@@ -174,13 +177,13 @@ impl Bsdf {
         (pdf > 0.0 && pdf.is_finite()).then(|| Chosen { direction, weight: value / pdf, pdf })
     }
 
-    /// Whether there is but the diffuse lobe, and nothing above it that reflects.
+    /// Whether the surface has only a diffuse lobe, without a reflecting layer above it.
     #[inline(always)]
     fn is_lambert(&self) -> bool {
         self.f90 == 0.0 && self.f0 == Vec3::ZERO && self.transmission == Vec3::ZERO
     }
 
-    /// Chance of each lobe to be sampled, by what it will about contribute.
+    /// Probability of sampling each lobe, by an estimate of its contribution.
     #[inline(always)]
     fn chances(&self, v: Vec3) -> [f32; 3] {
         let f = self.reflectance(v.z);
@@ -197,13 +200,13 @@ impl Bsdf {
         self.f0 + (Vec3::splat(self.f90) - self.f0) * schlick(cos)
     }
 
-    /// What the dielectric's surface takes from the lobes underneath.
+    /// The share of light that the dielectric's surface takes from the lobes underneath.
     #[inline(always)]
     fn reflectance(&self, cos: f32) -> f32 {
         self.dielectric_f0 + (self.dielectric_f90 - self.dielectric_f0) * schlick(cos)
     }
 
-    /// What is left for the diffuse lobe, relative to Lambert.
+    /// The diffuse lobe's factor relative to Lambert.
     #[inline(always)]
     fn coupling(&self, v: Vec3, l: Vec3) -> f32 {
         // ∫ F cos dω/π for Schlick's F.
@@ -221,7 +224,7 @@ fn schlick(cos: f32) -> f32 {
     m * m * m * m * m
 }
 
-/// Mirrors through the surface.
+/// Mirrors a direction through the surface.
 #[inline(always)]
 fn through(d: Vec3) -> Vec3 {
     Vec3::new(d.x, d.y, -d.z)

@@ -1,12 +1,13 @@
-//! How bright the texture of an emissive triangle is on average, by which such triangles are chosen.
+//! Mean luminance of the texture of each emissive triangle. Triangles are chosen by it.
 //!
-//! The texture is integrated over the triangle's footprint in it, line by line. What a line adds
-//! comes from running sums along the texture's rows, so that its cost does not depend on how many
-//! texels it crosses or how often the texture repeats; there are two lines a row of texels. Sums
-//! take 4 bytes a texel while new triangles are measured; what is found is kept with the mesh.
+//! The texture is integrated over the triangle's footprint in it, line by line, with two lines for
+//! each row of texels. Running sums along the texture's rows give the integral of a line. So a
+//! line's cost depends neither on how many texels it crosses nor on how often the texture repeats.
+//! The sums take 4 bytes a texel while new triangles are measured. The results are kept with the
+//! mesh.
 //!
-//! Textures count as grey, so that a change of the emitted colour changes nothing here. What comes
-//! out only guides the choice of triangles, and is 0 only where the texture is black.
+//! Only the texture's own luminance is measured, so a change of the emitted colour changes nothing
+//! here. The result only guides the choice of triangles. It is 0 only where the texture is black.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -17,20 +18,20 @@ use lumencast_scene::{Filter, Image, Mesh, TextureRef, Wrap};
 use crate::sampling::luminance;
 use crate::surface::texture::{Coding, color, interpolate_uv, sample, wrapped};
 
-/// Footprints of fewer texels are taken at points.
+/// Footprints of fewer texels are sampled at points.
 const FEW_TEXELS: f64 = 8.0;
-/// Steps along each side in which small footprints are cut.
+/// Steps along each side into which such small footprints are divided.
 const STEPS: u32 = 8;
-/// A footprint has at least and at most so many lines; a prime, so that they do not keep step with
-/// a texture that repeats very often.
+/// Least and greatest number of lines of a footprint. The greatest is prime, so that lines do not
+/// align with a texture that repeats very often.
 const LINES: [f64; 2] = [8.0, 16_381.0];
 
 /// Mean luminance of textures over triangles, kept from snapshot to snapshot.
 #[derive(Debug, Default)]
 pub(crate) struct EmissionCache {
-    /// By where the mesh lies and the number of the primitive.
+    /// Means by the mesh's address and the primitive's index.
     kept: HashMap<(usize, u32), Kept>,
-    /// By where the image lies; only while a snapshot is made ready.
+    /// Row sums by the image's address; only kept while a snapshot is prepared.
     sums: HashMap<usize, RowSums>,
 }
 
@@ -74,7 +75,8 @@ impl EmissionCache {
         means
     }
 
-    /// To be called after a snapshot's last question: drops what it did not ask for.
+    /// Drops what the current snapshot did not ask for; call it after the snapshot's last call of
+    /// `means`.
     pub(crate) fn finish(&mut self) {
         self.sums.clear();
         self.kept.retain(|_, kept| std::mem::take(&mut kept.used));
@@ -100,7 +102,7 @@ fn mean(texture: &TextureRef, sums: &RowSums, uv: [Vec2; 3]) -> f32 {
     }
 }
 
-/// At the middles of small triangles of equal size.
+/// The mean over the centres of small triangles of equal size.
 fn at_points(texture: &TextureRef, [a, b, c]: [Vec2; 3]) -> f32 {
     let at = |i: u32, j: u32, third: f32| {
         let [v, w] = [i, j].map(|k| (k as f32 + third / 3.0) / STEPS as f32);
@@ -112,7 +114,7 @@ fn at_points(texture: &TextureRef, [a, b, c]: [Vec2; 3]) -> f32 {
     sum / (STEPS * STEPS) as f32
 }
 
-/// Along lines of constant v; corners in texels.
+/// The mean along lines of constant v; corners are in texels.
 fn over_lines(texture: &TextureRef, sums: &RowSums, mut corners: [DVec2; 3]) -> f32 {
     corners.sort_by(|a, b| a.y.total_cmp(&b.y));
     let [top, middle, bottom] = corners;
@@ -154,7 +156,7 @@ impl RowSums {
         Self { width, sums }
     }
 
-    /// ∫ dx along the line at y from one x to another, as the texture is filtered.
+    /// ∫ dx of the filtered texture along the line at `y` between two x, in texels.
     fn along(&self, texture: &TextureRef, y: f64, from: f64, to: f64) -> f64 {
         let row = |y: f64| {
             let row = wrapped(y as i32, texture.image.height, texture.wrap[1]);
@@ -184,7 +186,7 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// Sum of the texels from 0 to before `k`, negative where `k` is.
+    /// Sum of the texels 0 to `k` − 1; negative where `k` is negative.
     fn before(&self, k: i64) -> f64 {
         let n = self.sums.len() as i64 - 1;
         let sum = |k: i64| f64::from(self.sums[k as usize]);
@@ -206,13 +208,13 @@ impl Row<'_> {
         self.before(k + 1) - self.before(k)
     }
 
-    /// ∫ from 0 to x of the row as steps.
+    /// ∫ from 0 to x of the row, with nearest filtering.
     fn nearest(&self, x: f64) -> f64 {
         let k = x.floor() as i64;
         self.before(k) + (x - x.floor()) * self.texel(k)
     }
 
-    /// ∫ to x of the straight lines through (k, texel k), but for a constant.
+    /// ∫ up to x of the row, with linear filtering; a constant is left out.
     fn linear(&self, x: f64) -> f64 {
         let (k, f) = (x.floor() as i64, x - x.floor());
         let (a, b) = (self.texel(k), self.texel(k + 1));
@@ -227,7 +229,7 @@ mod tests {
     use super::*;
     use crate::sampling::{Sampler, triangle};
 
-    /// Dark but for a few texels.
+    /// A texture that is dark except for a few texels.
     fn texture(wrap: Wrap, filter: Filter) -> TextureRef {
         let (width, height) = (37, 29);
         let mut texels = vec![[20, 0, 0, 255]; (width * height) as usize];
@@ -253,7 +255,7 @@ mod tests {
             [[-0.9, 0.2], [1.3, -0.7], [2.0, 2.4]],
             [[0.3, 0.4], [0.5, 0.4], [0.4, 0.35]],
             [[0.01, 0.02], [0.05, 0.02], [0.02, 0.04]],
-            // A line, and a point.
+            // These footprints are a line and a point.
             [[0.0, 0.0], [0.5, 0.5], [1.0, 1.0]],
             [[0.3, 0.3], [0.3, 0.3], [0.3, 0.3]],
         ];

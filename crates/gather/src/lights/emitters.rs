@@ -1,4 +1,4 @@
-//! Emissive triangles as sources.
+//! Emissive triangles as light sources.
 
 use glam::{Vec2, Vec3};
 use lumencast_scene::{Instance, Material};
@@ -6,21 +6,21 @@ use lumencast_scene::{Instance, Material};
 use crate::sampling::{Table, triangle};
 use crate::surface::{Frames, MaterialModel, Triangle, scaled_cross};
 
-/// A triangle that shines.
+/// An emissive triangle.
 #[derive(Clone, Copy, Debug)]
 struct Emitter {
     instance: u32,
     primitive: u32,
     triangle: u32,
-    /// World.
+    /// World positions, metres.
     corners: [Vec3; 3],
-    /// Unit, of the front.
+    /// Unit normal of the front.
     normal: Vec3,
     /// m².
     area: f32,
-    /// Both faces shine.
+    /// Whether both faces emit.
     double_sided: bool,
-    /// Bound of a point's error along the normal, metres.
+    /// Bound of the error of a point's position along the normal, metres.
     offset: f32,
 }
 
@@ -28,27 +28,27 @@ struct Emitter {
 #[derive(Debug, Default)]
 pub(crate) struct Emitters {
     emitters: Vec<Emitter>,
-    /// Luminous flux over π, of each.
+    /// Luminous flux over π of each emitter; emptied by `finish`.
     powers: Vec<f32>,
     by_power: Table,
 }
 
-/// A point of an emissive triangle.
+/// A sampled point of an emissive triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EmitterSample {
     pub(crate) instance: u32,
     pub(crate) primitive: u32,
     pub(crate) triangle: u32,
-    /// Weights of the triangle's vertices.
+    /// Barycentric weights of the triangle's vertices.
     pub(crate) weights: Vec3,
-    /// World, a little before the surface, so that it does not shade itself.
+    /// World position, moved a little off the surface so that the surface does not occlude it.
     pub(crate) position: Vec3,
-    /// Density per steradian as seen from where it was asked for.
+    /// Density per steradian as seen from the receiving point.
     pub(crate) pdf: f32,
 }
 
 impl Emitters {
-    /// Adds a primitive's triangles, each of some mean luminance (cd/m²); returns the number of its
+    /// Adds a primitive's triangles with their mean luminances (cd/m²). Returns the index of the
     /// first.
     pub(crate) fn add(
         &mut self,
@@ -87,17 +87,18 @@ impl Emitters {
         first
     }
 
-    /// To be called once all are there: weighs them by power.
+    /// Builds the table of powers; call it after the last `add`.
     pub(crate) fn finish(&mut self) {
         self.by_power = Table::new(std::mem::take(&mut self.powers));
     }
 
-    /// Whether nothing shines.
+    /// Whether there are no emitters.
     pub(crate) fn is_empty(&self) -> bool {
         self.by_power.is_empty()
     }
 
-    /// A point, uniform on a triangle chosen by power; `None` where `from` sees its dark side.
+    /// Samples a point, uniform on a triangle chosen by power. `None` where `from` is on its dark
+    /// side.
     pub(crate) fn sample(&self, from: Vec3, choice: f32, u: Vec2) -> Option<EmitterSample> {
         if self.is_empty() {
             return None;
@@ -120,7 +121,7 @@ impl Emitters {
         })
     }
 
-    /// Density per steradian with which a point would be chosen from `from`; 0 on the dark side.
+    /// Density per steradian of sampling a point as seen from `from`; 0 on the dark side.
     pub(crate) fn pdf(&self, index: u32, from: Vec3, position: Vec3) -> f32 {
         let e = &self.emitters[index as usize];
         let to = from - position;
@@ -133,7 +134,7 @@ impl Emitters {
     }
 }
 
-/// Whether a material makes its triangles emitters, and if so whether on both faces.
+/// Whether a material makes its triangles emitters (`Some`), and whether both faces emit.
 pub(crate) fn shines(material: &Material, model: MaterialModel) -> Option<bool> {
     let dark = material.unlit || material.emissive.max_element() <= 0.0;
     (!dark).then_some(material.double_sided && model == MaterialModel::Full)

@@ -1,4 +1,4 @@
-//! The environment: its radiance, and for pictures where to look for its light.
+//! The environment: its radiance, and for pictures a table to sample directions from.
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::Arc;
@@ -8,36 +8,36 @@ use lumencast_scene::{Environment, HdrImage};
 
 use crate::sampling::{Grid2, luminance};
 
-/// The table over a picture has at most so many columns.
+/// Upper limit of the number of columns of the table over a picture.
 const TABLE_WIDTH: usize = 1024;
 
-/// Tables of environment pictures, kept while the picture stays.
+/// The sampling table of the last environment picture, reused while the picture is the same.
 #[derive(Debug, Default)]
 pub(crate) struct SkyCache(Option<(Arc<HdrImage>, Arc<Grid2>)>);
 
-/// An environment, ready to be sampled.
+/// An environment, ready to be evaluated and sampled.
 #[derive(Clone, Debug)]
 pub(crate) enum Sky {
-    /// The same everywhere.
+    /// The same radiance from everywhere, cd/m².
     Constant(Vec3),
-    /// By elevation.
+    /// Radiance that depends on elevation only, cd/m².
     Gradient {
-        /// Straight up.
+        /// From straight above.
         zenith: Vec3,
-        /// Level.
+        /// From the horizon.
         horizon: Vec3,
-        /// Straight down.
+        /// From straight below.
         ground: Vec3,
     },
-    /// A picture.
+    /// A picture in latitude and longitude.
     Picture {
-        /// Texels.
+        /// The picture's texels.
         image: Arc<HdrImage>,
-        /// Multiplies them.
+        /// Factor that turns texels into cd/m².
         intensity: f32,
-        /// Turn about +Y as a fraction of a full one.
+        /// Rotation about +Y, as a fraction of a full turn.
         turn: f32,
-        /// Where its light is.
+        /// Density to sample directions from, over the picture.
         table: Arc<Grid2>,
     },
 }
@@ -62,8 +62,8 @@ impl Sky {
         }
     }
 
-    /// Radiance from a direction, cd/m². Pictures are taken texel by texel, without blending, so
-    /// that a sun of one texel is met as often as the table says.
+    /// Radiance from a direction, cd/m². Pictures are looked up without filtering, so that a sun of
+    /// one texel is met as often as the table says.
     pub(crate) fn radiance(&self, direction: Vec3) -> Vec3 {
         match self {
             Self::Constant(radiance) => *radiance,
@@ -80,12 +80,12 @@ impl Sky {
         }
     }
 
-    /// Whether it is looked for by [`Sky::sample`], beside being met by chance.
+    /// Whether [`Sky::sample`] finds its light; otherwise only rays that the BSDF chose do.
     pub(crate) fn is_sampled(&self) -> bool {
         matches!(self, Self::Picture { table, .. } if !table.is_empty())
     }
 
-    /// A direction with its radiance and density per steradian.
+    /// Samples a direction; returns it with its radiance and density per steradian.
     pub(crate) fn sample(&self, u: Vec2) -> Option<(Vec3, Vec3, f32)> {
         let Self::Picture { table, turn, .. } = self else { return None };
         let (at, density) = table.sample(u);
@@ -94,7 +94,7 @@ impl Sky {
         (pdf > 0.0).then(|| (direction, self.radiance(direction), pdf))
     }
 
-    /// The density of [`Sky::sample`].
+    /// The density per steradian of [`Sky::sample`].
     pub(crate) fn pdf(&self, direction: Vec3) -> f32 {
         let Self::Picture { table, turn, .. } = self else { return 0.0 };
         let at = picture_from_direction(direction, *turn);
@@ -115,7 +115,7 @@ impl SkyCache {
     }
 }
 
-/// Luminance times solid angle, averaged to at most [`TABLE_WIDTH`] columns.
+/// Luminance times solid angle of each texel, averaged to at most [`TABLE_WIDTH`] columns.
 fn table(image: &HdrImage) -> Grid2 {
     let (w, h) = (image.width as usize, image.height as usize);
     let (columns, rows) = (w.min(TABLE_WIDTH), h.min(TABLE_WIDTH / 2));
@@ -123,7 +123,7 @@ fn table(image: &HdrImage) -> Grid2 {
     for row in 0..rows {
         let sin = (PI * (row as f32 + 0.5) / rows as f32).sin();
         for column in 0..columns {
-            // All texels that reach into the cell, so that none is left out.
+            // A cell averages all texels that reach into it, so that none is left out.
             let (y0, y1) = (row * h / rows, ((row + 1) * h).div_ceil(rows));
             let (x0, x1) = (column * w / columns, ((column + 1) * w).div_ceil(columns));
             let sum: f32 = (y0..y1)
@@ -140,7 +140,7 @@ fn table(image: &HdrImage) -> Grid2 {
 fn picture_from_direction(d: Vec3, turn: f32) -> Vec2 {
     // A turn by +φ about +Y takes atan2(x, −z) to itself less φ.
     let u = 0.5 + d.x.atan2(-d.z) / TAU + turn;
-    // acos(y), but with all its digits near the poles too.
+    // This is acos(y), but exact near the poles too.
     Vec2::new(u - u.floor(), d.x.hypot(d.z).atan2(d.y) * FRAC_1_PI)
 }
 
@@ -150,7 +150,7 @@ fn direction_from_picture(at: Vec2, turn: f32) -> Vec3 {
     Vec3::new(polar.sin() * azimuth.sin(), polar.cos(), -polar.sin() * azimuth.cos())
 }
 
-/// From a density over the picture (unit square).
+/// Converts a density over the picture (unit square) to one per steradian.
 fn per_steradian(density: f32, v: f32) -> f32 {
     let sin = (PI * v).sin();
     if sin > 0.0 { density / (2.0 * PI * PI * sin) } else { 0.0 }

@@ -1,10 +1,10 @@
-//! Sources of light, and where on them to look for it (next-event estimation).
+//! Light sources, and how they are sampled (next-event estimation).
 //!
-//! Every vertex of a path asks two sources: one punctual light ([`punctual`]), and one point of an
-//! emissive triangle ([`emitters`]) or of an environment picture ([`environment`]). The latter two,
-//! and punctual lights with a size, are also met by rays that the BSDF chose, and weighed against
-//! that by the power heuristic.
-//! Constant and gradient environments are left to those rays, which suit them as well.
+//! Every vertex of a path samples two sources. One is a punctual light ([`punctual`]). The other is
+//! a point of an emissive triangle ([`emitters`]) or a direction of an environment picture
+//! ([`environment`]). Rays that the BSDF chose also meet these areas and punctual lights with a
+//! size. The power heuristic weighs the two ways of finding them. Constant and gradient
+//! environments are left to BSDF rays, which sample them as well.
 
 pub(crate) mod emission;
 pub(crate) mod emitters;
@@ -19,7 +19,7 @@ use emitters::Emitters;
 use environment::Sky;
 use punctual::Punctual;
 
-/// All sources of a snapshot.
+/// All light sources of a snapshot.
 #[derive(Debug)]
 pub(crate) struct Lights {
     pub(crate) punctual: Punctual,
@@ -27,7 +27,7 @@ pub(crate) struct Lights {
     pub(crate) sky: Sky,
 }
 
-/// A direction in which a source may be seen.
+/// A sampled direction towards an emissive triangle or the environment.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum AreaSample {
     /// A point of an emissive triangle.
@@ -37,20 +37,20 @@ pub(crate) enum AreaSample {
 }
 
 impl Lights {
-    /// Whether no ray can meet a source: nothing emits, the environment is black, and punctual lights
-    /// are points.
+    /// Whether no ray can meet a source: nothing emits, the environment is black, and no punctual
+    /// light has a size.
     pub(crate) fn are_points(&self) -> bool {
         self.emitters.is_empty()
             && !self.punctual.have_size()
             && matches!(self.sky, Sky::Constant(radiance) if radiance == Vec3::ZERO)
     }
 
-    /// Whether there are sources that [`Lights::sample_area`] finds.
+    /// Whether [`Lights::sample_area`] can find a source.
     pub(crate) fn are_sampled(&self) -> bool {
         self.sky.is_sampled() || !self.emitters.is_empty()
     }
 
-    /// Chance that an area sample is of the environment.
+    /// Probability that an area sample is of the environment.
     fn sky_chance(&self) -> f32 {
         match (self.sky.is_sampled(), self.emitters.is_empty()) {
             (true, true) => 1.0,
@@ -59,8 +59,8 @@ impl Lights {
         }
     }
 
-    /// A point of an emissive triangle or a direction of the environment; densities include the
-    /// choice between them.
+    /// Samples a point of an emissive triangle or a direction of the environment. Densities include
+    /// the choice between the two.
     pub(crate) fn sample_area(&self, from: Vec3, choice: f32, u: Vec2) -> Option<AreaSample> {
         let sky = self.sky_chance();
         if choice < sky {
@@ -73,12 +73,14 @@ impl Lights {
         Some(AreaSample::Emitter(sample))
     }
 
-    /// Density with which [`Lights::sample_area`] looks in a direction of the environment.
+    /// Density per steradian with which [`Lights::sample_area`] samples a direction of the
+    /// environment.
     pub(crate) fn sky_pdf(&self, direction: Vec3) -> f32 {
         self.sky.pdf(direction) * self.sky_chance()
     }
 
-    /// Density with which it looks at a point of an emissive triangle, seen from `from`.
+    /// Density per steradian with which it samples a point of an emissive triangle, as seen from
+    /// `from`.
     pub(crate) fn emitter_pdf(&self, emitter: u32, from: Vec3, position: Vec3) -> f32 {
         self.emitters.pdf(emitter, from, position) * (1.0 - self.sky_chance())
     }

@@ -1,21 +1,20 @@
-//! Point, spot and directional lights, exactly as KHR_lights_punctual states them, with a size where
-//! they have one.
+//! Point, spot and directional lights as KHR_lights_punctual defines them, some with a size.
 //!
-//! A light with a size is seen as a disc of half-angle a with the same radiance L all over: for a
-//! sphere of radius r at distance d, sin a = r/d. What a surface receives that faces it,
-//! E = π L sin² a, is what the light would send as a point. Directions are chosen uniformly in the
-//! cone, of solid angle Ω = 2π(1 − cos a) (Pharr, Jakob and Humphreys 2023, section 6.2.4), and
-//! contribute L Ω = 2E/(1 + cos a), which for a = 0 is the point light's E. No difference of nearly
-//! equal numbers occurs, so the sun's disc and smaller ones keep their digits.
+//! A light with a size is seen as a disc of half-angle a with constant radiance L. For a sphere of
+//! radius r at distance d, sin a = r/d. A surface that faces the disc receives E = π L sin² a, as
+//! it would from a point light. Directions are chosen uniformly in the cone. Its solid angle is Ω =
+//! 2π(1 − cos a) (Pharr, Jakob and Humphreys 2023, section 6.2.4). Each direction contributes L Ω =
+//! 2E/(1 + cos a), which for a = 0 is the point light's E. No nearly equal numbers are subtracted,
+//! so small discs such as the sun's keep their precision.
 //!
-//! Surfaces also meet such a disc by rays that the BSDF chose: a mirror could not show it otherwise.
-//! Which light is asked at a vertex depends on what the vertex makes of all of them, so the density
-//! of that choice cannot be stated; but it does not have to be. The two weights only have to sum to
-//! one at every direction (Veach 1997, section 9.2.1), and they do when both compare the density
-//! *within* the cone, 1/Ω, with the BSDF's: the weights are those of a scene with this light alone.
+//! Rays that the BSDF chose also meet such a disc; a mirror could not show it otherwise. A vertex
+//! chooses its light by what it scatters of all of them, so the density of that choice is unknown.
+//! The weights do not need it: they only have to sum to one at every direction (Veach 1997, section
+//! 9.2.1). They do, since both compare the density *within* the cone, 1/Ω, with the BSDF's. So the
+//! weights are those of a scene with this light alone.
 //!
-//! Lights with a size cost a ray at the end of every path, which points do without, and a test of
-//! every scattered ray against each of them.
+//! Lights with a size cost one more ray at the end of every path than points do. They also cost a
+//! test of every scattered ray against each of them.
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
@@ -27,30 +26,30 @@ use crate::bsdf::{Scatter, frame};
 use crate::numbers::numbers;
 use crate::sampling::{Table, luminance, power_heuristic, turned};
 
-/// Up to so many lights are all looked at before one is chosen.
+/// Up to this number of lights, a vertex evaluates all before it chooses one.
 pub(crate) const CANDIDATES: usize = 16;
 
-/// Light arriving from a punctual light, were nothing in between.
+/// Unoccluded light that arrives from a punctual light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Incident {
-    /// Towards the light's middle, or a point of it; unit.
+    /// Towards the light's centre, or a point of it; unit.
     pub(crate) direction: Vec3,
     /// Metres; infinite for directional lights.
     pub(crate) distance: f32,
     /// Illuminance on a surface that faces the light, lux.
     pub(crate) irradiance: Vec3,
-    /// Sine of the half-angle that the light spans; 0 for a point.
+    /// Sine of the half-angle of the light's disc; 0 for a point.
     sine: f32,
 }
 
 impl Incident {
-    /// cos a.
+    /// cos a, of the half-angle a.
     #[inline(always)]
     fn cosine(&self) -> f32 {
         ((1.0 - self.sine) * (1.0 + self.sine)).sqrt()
     }
 
-    /// 1 − cos a.
+    /// 1 − cos a: the height of the disc's spherical cap.
     #[inline(always)]
     pub(super) fn height(&self) -> f32 {
         self.sine * self.sine / (1.0 + self.cosine())
@@ -67,7 +66,8 @@ impl Incident {
         self.irradiance * FRAC_1_PI / self.sine / self.sine
     }
 
-    /// Metres to the nearest point of a sphere in a direction `sine` off its middle.
+    /// Distance in metres to the nearest point of the sphere, along a direction at an angle to its
+    /// centre whose sine is `sine`.
     #[inline(always)]
     fn distance_at(&self, sine: f32) -> f32 {
         if self.distance.is_infinite() {
@@ -78,7 +78,8 @@ impl Incident {
         self.distance * (middle - half_chord).max(0.0)
     }
 
-    /// A point of the disc, chosen uniformly by solid angle; its `irradiance` is what it stands for.
+    /// A point of the disc, chosen uniformly by solid angle. Its `irradiance` is the estimate of
+    /// the whole disc's.
     #[inline(always)]
     pub(super) fn toward(&self, u: Vec2) -> Self {
         let height = u.x * self.height();
@@ -92,28 +93,28 @@ impl Incident {
         }
     }
 
-    /// Metres to the disc in a direction; `None` where that misses it.
+    /// Distance in metres to the disc along a direction; `None` where the direction misses it.
     pub(super) fn met(&self, direction: Vec3) -> Option<f32> {
-        // By the sine, since the cosine of a small angle has lost its digits.
+        // The cosine of a small angle is imprecise, so this compares sines.
         let sine = self.direction.cross(direction).length();
         (sine < self.sine && self.direction.dot(direction) > 0.0).then(|| self.distance_at(sine))
     }
 }
 
-/// A light as points ask it: all that does not depend on the point worked out.
+/// A light with all values that do not depend on the receiving point precomputed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Source {
     position: Vec3,
-    /// Along which it shines; unit.
+    /// Direction along which it shines; unit.
     direction: Vec3,
-    /// Candela, or of a directional light lux.
+    /// Candela; lux for a directional light.
     intensity: Vec3,
-    /// Metres; infinite where there is none.
+    /// Metres; infinite for unlimited range.
     range: f32,
-    /// Scale and offset of the spot's falloff by the cosine of the angle from its axis: 0 and 1 of
-    /// others.
+    /// Scale and offset of the spot's falloff by the cosine of the angle from its axis; 0 and 1 for
+    /// other lights.
     cone: [f32; 2],
-    /// Metres; of a directional light the sine of the half-angle that it spans.
+    /// Radius in metres; for a directional light, the sine of its disc's half-angle.
     size: f32,
     is_directional: bool,
 }
@@ -142,12 +143,12 @@ impl Source {
         }
     }
 
-    /// Along which it shines; unit.
+    /// Direction along which it shines; unit.
     pub(crate) fn direction(&self) -> Vec3 {
         self.direction
     }
 
-    /// What a point receives.
+    /// Light that arrives at a point; `None` where there is none.
     #[inline(always)]
     pub(crate) fn incident(&self, at: Vec3) -> Option<Incident> {
         if self.is_directional {
@@ -162,9 +163,9 @@ impl Source {
         let distance = to_light.length();
         let direction = to_light.try_normalize()?;
         let falloff = self.window(distance) * self.cone(direction.dot(-self.direction));
-        // Within the sphere it is as bright as on it.
+        // Inside the sphere the light is as bright as on its surface.
         let outside = distance.max(self.size);
-        // In two steps, since the square of a small distance may vanish.
+        // It divides twice, since the square of a small distance may underflow.
         let irradiance = self.intensity * falloff / outside / outside;
         (falloff > 0.0 && irradiance.is_finite()).then_some(Incident {
             direction,
@@ -189,8 +190,8 @@ impl Source {
         t * t
     }
 
-    /// The light as a point may reach for it, standing for `copies` of its kind. Of a light with a
-    /// size one point counts, which `on_disc` chooses.
+    /// The light as seen from a point, where it stands for `copies` lights. For a light with a
+    /// size, `on_disc` chooses one point of it.
     #[inline(always)]
     pub(crate) fn point_for(&self, at: Vec3, copies: f32, on_disc: Vec2) -> LightPoint {
         let Some(incident) = self.incident(at) else { return LightPoint::NONE };
@@ -204,14 +205,14 @@ impl Source {
     }
 }
 
-/// A light, or a point of it, that a point may reach for.
+/// A light, or a point of it, as seen from a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightPoint {
     /// Unit.
     pub(crate) direction: Vec3,
     distance: f32,
     irradiance: Vec3,
-    /// Density per steradian of the direction; infinite for a point.
+    /// Density per steradian of the direction; infinite for a point light.
     pdf: f32,
 }
 
@@ -219,7 +220,7 @@ impl LightPoint {
     const NONE: Self =
         Self { direction: Vec3::Z, distance: 0.0, irradiance: Vec3::ZERO, pdf: f32::INFINITY };
 
-    /// With what is scattered of light from there.
+    /// The candidate for a surface whose scattering towards this light is `scatter`.
     #[inline(always)]
     pub(crate) fn scattered(self, scatter: Scatter) -> Candidate {
         let share = power_heuristic(self.pdf, scatter.pdf);
@@ -228,14 +229,14 @@ impl LightPoint {
     }
 }
 
-/// A light that a vertex may reach for.
+/// A light that a vertex may cast a shadow ray to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Candidate {
     /// Towards the light; unit.
     pub(crate) direction: Vec3,
     /// Metres; infinite for directional lights.
     pub(crate) distance: f32,
-    /// What the vertex scatters of it, cd/m².
+    /// Scattered light of it, cd/m², if nothing is in between.
     pub(crate) light: Vec3,
 }
 
@@ -246,19 +247,20 @@ numbers!(Candidate of f32 { direction: Vec3, distance: f32, light: Vec3 });
 pub(crate) struct Punctual {
     sources: Vec<Source>,
     by_power: Table,
-    /// Those with a size, and their numbers.
+    /// Indices and copies of the lights with a size.
     sized: Vec<(usize, Source)>,
 }
 
 impl Punctual {
-    /// Directions towards the directional lights without a size, unit: rays that reach for them all go
-    /// the same way.
+    /// Unit directions towards the directional lights without a size: all shadow rays to one of
+    /// them are parallel.
     pub(crate) fn directions(&self) -> impl Iterator<Item = Vec3> + '_ {
         let far = self.sources.iter().filter(|source| source.is_directional && source.size == 0.0);
         far.map(|source| -source.direction)
     }
 
-    /// `scene_radius` (metres) turns directional lights' lux into a power.
+    /// Prepares the lights. `scene_radius` (metres) turns the lux of directional lights into a
+    /// power.
     pub(crate) fn new(lights: &[PlacedLight], scene_radius: f32) -> Self {
         let by_power = Table::new(lights.iter().map(|placed| {
             let reach = match placed.light.kind {
@@ -273,14 +275,14 @@ impl Punctual {
         Self { sources, by_power, sized }
     }
 
-    /// Whether rays can meet a light.
+    /// Whether any light has a size, so that rays can meet it.
     pub(crate) fn have_size(&self) -> bool {
         !self.sized.is_empty()
     }
 
-    /// Radiance of the discs that a ray meets before `end`, weighed against [`Punctual::choose`];
-    /// `pdf` is the density with which the BSDF chose the ray, `weight` what a light's disc is
-    /// multiplied by beside that, given its number.
+    /// Radiance of the discs that a ray meets before `end` metres, weighed against
+    /// [`Punctual::choose`]. `pdf` is the density with which the BSDF chose the ray. `weight` gives
+    /// a further factor for a light, by its index.
     pub(crate) fn met(
         &self,
         at: Vec3,
@@ -299,20 +301,21 @@ impl Punctual {
         self.sized.iter().filter_map(light).filter(|light| light.is_finite()).sum()
     }
 
-    /// How many lights a vertex looks at before it chooses one: all, or where they are many, some.
+    /// Number of lights that a vertex evaluates before it chooses one: all, or [`CANDIDATES`] where
+    /// there are more.
     #[inline]
     pub(crate) fn candidates(&self) -> usize {
         if self.by_power.is_empty() { 0 } else { self.sources.len().min(CANDIDATES) }
     }
 
-    /// The light that all vertices look at as their candidate number `k`; `None` where they are so
-    /// many that each vertex looks at others.
+    /// The light that is candidate `k` of every vertex. `None` where there are more than
+    /// [`CANDIDATES`] lights, so that each vertex has other candidates.
     #[inline]
     pub(crate) fn shared_candidate(&self, k: usize) -> Option<&Source> {
         if self.sources.len() <= CANDIDATES { self.sources.get(k) } else { None }
     }
 
-    /// The light that a vertex looks at as its candidate number `k`, and how many lights it stands for.
+    /// The light that is a vertex's candidate `k`, and how many lights it stands for.
     pub(crate) fn candidate(&self, k: usize, u: f32) -> (&Source, f32) {
         if let Some(source) = self.shared_candidate(k) {
             return (source, 1.0);
@@ -321,8 +324,9 @@ impl Punctual {
         (&self.sources[index], 1.0 / (p * CANDIDATES as f32))
     }
 
-    /// Which of the candidates to reach for, in proportion to the luminance of their light, and that
-    /// luminance over the probability of the choice. `u` is what the candidates were chosen with.
+    /// Chooses one of the candidates with probability in proportion to its luminance. Returns its
+    /// index and the inverse of that probability. `u` is the number that the candidates were chosen
+    /// with.
     #[inline]
     pub(crate) fn pick(
         &self,
@@ -338,7 +342,7 @@ impl Punctual {
         }
         let shining = luminances.enumerate().filter(|(_, luminance)| *luminance > 0.0);
         let total: f32 = shining.clone().map(|(_, luminance)| luminance).sum();
-        // The digits of u that stratified the candidates are used up.
+        // Choosing the candidates has used up the digits of u, so it is hashed.
         let u = if self.sources.len() <= CANDIDATES {
             u
         } else {
@@ -356,13 +360,13 @@ impl Punctual {
         last
     }
 
-    /// Chooses a light in proportion to what `scatter` makes of it at this point, were nothing in
-    /// between, and returns where it is and its scattered light over the probability of the choice.
-    /// Where lights are many, the choice is among a few chosen by power (resampled importance
-    /// sampling, Talbot et al. 2005), still unbiased. Of lights with a size one point counts, which
-    /// `on_disc` chooses.
+    /// Chooses a light in proportion to what `scatter` makes of its unoccluded light at this point.
+    /// Returns its place and its scattered light over the probability of the choice. Where there
+    /// are many lights, it chooses among a few that were drawn by power (resampled importance
+    /// sampling, Talbot et al. 2005), which is still unbiased. For a light with a size, `on_disc`
+    /// chooses one point of it.
     ///
-    /// Many vertices at once do the same step by step.
+    /// [`crate::path_trace`] does the same for many vertices at once, step by step.
     pub(crate) fn choose(
         &self,
         at: Vec3,

@@ -13,7 +13,7 @@ fn placed(light: PunctualLight, position: Vec3, direction: Vec3) -> PlacedLight 
     PlacedLight { node: NodeId(0), light, position, direction: direction.normalize() }
 }
 
-/// What a point receives.
+/// The light that a point receives.
 fn incident(placed: &PlacedLight, at: Vec3) -> Option<Incident> {
     Source::new(placed).incident(at)
 }
@@ -51,7 +51,7 @@ fn spot_falls_off_as_khr_lights_punctual_says() {
     assert!((at(0.35) - expected).abs() < 1e-5, "{} {expected}", at(0.35));
 }
 
-/// Whatever the number of lights, the mean over choices is the sum over lights.
+/// The mean over choices is the sum over lights, whatever their number.
 #[test]
 fn choosing_among_lights_is_unbiased() {
     for count in [1, 3, 16, 40] {
@@ -99,7 +99,7 @@ fn choosing_among_lights_is_unbiased() {
     }
 }
 
-/// A dim picture with a small bright patch.
+/// A dim environment picture with a small bright patch.
 fn picture() -> Arc<HdrImage> {
     let (width, height) = (32, 16);
     let mut texels = vec![Vec3::splat(0.2); width * height];
@@ -147,13 +147,13 @@ fn picture_samples_estimate_its_integral() {
     }
     assert!((uniform[1] - 1.0).abs() < 0.02, "density integrates to {}", uniform[1]);
     assert!((uniform[0] / chosen[0] - 1.0).abs() < 0.02, "{} {}", uniform[0], chosen[0]);
-    // Important directions are chosen so well that the ratio varies by less than its own size,
-    // where uniform directions vary by about twenty times.
+    // The table follows the light so well that the ratio's standard deviation is below its mean.
+    // With uniform directions it would be about twenty times the mean.
     let spread = (chosen[1] / chosen[0].powi(2) - 1.0).sqrt();
     assert!(spread < 1.0, "{spread}");
 }
 
-/// From a tenth of a second of arc to the whole half space.
+/// Discs from a tenth of a second of arc to the whole half space.
 #[test]
 fn discs_keep_their_digits() {
     for half in [5e-7f32, 1e-4, 4.64e-3, 0.1, 1.0, PI / 2.0] {
@@ -168,14 +168,14 @@ fn discs_keep_their_digits() {
         let n = 4096;
         for i in 0..n {
             let toward = disc.toward(Sampler::new(1, 0, i).square());
-            // Of the solid angle, half is within the cone of half its height.
+            // The cone of half the disc's height holds half of its solid angle.
             let off = disc.direction.cross(toward.direction).length();
             let height = disc.height();
             inner += u32::from(off * off < 0.5 * height * (2.0 - 0.5 * height));
             met += u32::from(disc.met(toward.direction) == Some(f32::INFINITY));
             mean += toward.irradiance * toward.direction.dot(disc.direction) / n as f32;
         }
-        // A float's rounding is a tenth of the smallest of the discs.
+        // One rounding of an f32 is a tenth of the smallest disc.
         let slack = if half < 1e-6 { n / 4 } else { n / 1000 };
         assert!(inner.abs_diff(n / 2) <= slack, "{half}: {inner}");
         assert!(met >= n - slack, "{half}: {met}");
@@ -199,8 +199,8 @@ fn a_ray_meets_a_sphere_where_it_is() {
     assert_eq!(met(Vec3::new(0.0, 2.9, 0.0), 4.0 * Vec3::Y), Some(0.0));
 }
 
-/// The three ways of estimating a disc's reflection off a glossy surface: looking for the light,
-/// chance, and both together.
+/// Three estimates of a disc's reflection off a glossy surface agree: next-event estimation, BSDF
+/// sampling, and both together.
 #[test]
 fn both_ways_of_finding_a_disc_count_once() {
     let lights = [

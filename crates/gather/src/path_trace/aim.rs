@@ -1,9 +1,8 @@
-//! A receiver's samples: where each looks, what its light is multiplied by, and which source it reaches
-//! for.
+//! Samples of a receiver: their directions, their terms, and the sources that they reach for.
 //!
-//! A small lamp is met by few directions, and fills a receiver's light with noise. So each sample also
-//! reaches for a point of an emissive triangle, or of an environment picture, as a path's vertices do;
-//! both ways of finding a source are weighed by the power heuristic.
+//! Few directions meet a small lamp, which makes a receiver's light noisy. So each sample also
+//! reaches for a point of an emissive triangle or of an environment picture, as vertices of paths
+//! do. The power heuristic weighs the two ways of finding a source.
 
 use std::f32::consts::PI;
 
@@ -18,10 +17,10 @@ use crate::surface::gamma;
 use crate::world::{Passing, World};
 use crate::{Budget, Job, Receiver};
 
-/// Samples start so far off the surface, as a share of the lumel's size.
+/// Distance of samples' origins from the surface, as a share of the lumel's size.
 const LIFT: f32 = 1e-3;
 
-/// What all samples of a receiver share.
+/// Values that all samples of a receiver share.
 pub(super) struct Aim {
     place: Prepared,
     samples: u32,
@@ -33,10 +32,10 @@ pub(super) struct Aim {
 
 /// A source that a sample reaches for.
 pub(super) struct Reach {
-    /// Towards it, as far as nothing may lie on the way.
+    /// The shadow ray to the source.
     pub(super) ray: Ray,
     pub(super) passing: Passing,
-    /// Its radiance over the density with which it was chosen, weighed.
+    /// Weighed radiance over the density of its choice.
     pub(super) light: Vec3,
 }
 
@@ -47,7 +46,7 @@ enum Prepared {
         turn: Quat,
     },
     Lumel {
-        /// The middle, off the surface.
+        /// The centre, lifted off the surface.
         position: Vec3,
         footprint: [Vec3; 2],
         /// World from the frame whose z is the normal.
@@ -56,8 +55,9 @@ enum Prepared {
 }
 
 impl Aim {
-    /// Of a receiver of a job in its world. Where surfaces are is known to some ulps of its largest
-    /// coordinate only, from its origin; where receivers are, to one of theirs in the world.
+    /// Prepares a receiver of a job. Lumels are lifted off their surface by the bound of rounding.
+    /// Surfaces are known to some ulps of their largest coordinate, receivers to an ulp of their
+    /// world position.
     pub(super) fn new(job: &Job, budget: Budget, world: &World) -> Self {
         let Budget { receiver, samples } = budget;
         let (seed, extent, origin) = (job.seed, world.extent(), world.origin());
@@ -97,9 +97,10 @@ impl Aim {
         Look { origin, direction, pdf, sampler }
     }
 
-    /// The source that a sample reaches for; none where there are none, or that one cannot be seen.
+    /// The source that a sample reaches for. `None` where there are none, or the chosen one sends
+    /// no light here.
     pub(super) fn reach(&self, sample: u32, world: &World) -> Option<Reach> {
-        /// Sets the numbers apart from those of the sample's path.
+        /// Separates these random numbers from those of the sample's path.
         const APART: u64 = 0x5ea7_1ab5;
         if !self.reaches {
             return None;
@@ -114,7 +115,7 @@ impl Aim {
         is_seen.then_some(Reach { ray: source.ray, passing, light })
     }
 
-    /// Density per steradian with which samples look in a direction.
+    /// Density per steradian with which samples choose a direction.
     fn density(&self, direction: Vec3) -> f32 {
         match &self.place {
             Prepared::Probe { .. } => 0.25 / PI,
@@ -122,8 +123,8 @@ impl Aim {
         }
     }
 
-    /// What radiance from a direction is multiplied by where it is integrated, the first
-    /// [`Receiver::terms`] numbers.
+    /// Factors of radiance from a direction in the receiver's integral; the first
+    /// [`Receiver::terms`] numbers count.
     pub(super) fn integrand(&self, direction: Vec3) -> [f32; sh::MAX_COEFFICIENTS] {
         match &self.place {
             Prepared::Probe { order, .. } => sh::basis(*order, direction),
@@ -133,8 +134,8 @@ impl Aim {
         }
     }
 
-    /// What the light of a sample is multiplied by, the first [`Receiver::terms`] numbers: the inverse
-    /// of its density times what is integrated.
+    /// Factors of a sample's light: the integral's factors over the sample's density. The first
+    /// [`Receiver::terms`] numbers count.
     pub(super) fn terms(&self, sample: u32) -> [f32; sh::MAX_COEFFICIENTS] {
         match &self.place {
             Prepared::Probe { order, turn, .. } => {

@@ -1,17 +1,20 @@
-//! A directional light followed to what it lights, for paths to connect to.
+//! Rays of a directional light, traced to the points that they light. Paths connect to these
+//! points.
 //!
-//! Where the sun comes in by a window, paths find its patches by chance only, and what they scatter
-//! once more is most of the room's light: most paths find none, few find much. So each path is given
-//! a point that a ray of the light has met, and every vertex of the path is connected to it: a
-//! bidirectional path tracer's strategy with two vertices on the light's side (Veach 1997, chapter 10).
-//! Such a point may also be found by the BSDF and then lit by next-event estimation; both are weighed
-//! by the power heuristic, at the density per area with which they choose the point. That of the
-//! light's rays is known everywhere: the density across the beam times the cosine there. Light that
-//! goes through a surface is left to the other way.
+//! Where the sun comes in by a window, paths find its patches by chance only. Light that these
+//! patches scatter is most of the room's light: most paths find none of it and a few find much. So
+//! each path is given a point that a ray of the light has met, and connects every vertex to it.
+//! This is the strategy of a bidirectional path tracer with two vertices on the light's side (Veach
+//! 1997, chapter 10).
 //!
-//! A light's rays are spread by a grid of densities, learned from where the first paths of a picture
-//! were lit. Where it is wrong, results are noisier but not biased: what rays do not reach, paths still
-//! find by themselves.
+//! The BSDF may also find such a point, which next-event estimation then lights. The power
+//! heuristic weighs the two by the densities per area with which they choose the point. The density
+//! of the light's rays is known everywhere: the density across the beam times the cosine at the
+//! surface. Light that goes through a surface is left to the BSDF.
+//!
+//! A grid of densities spreads the light's rays. It is learned from the points that the first paths
+//! of a picture found lit. A wrong grid causes noise but no bias: paths still find by themselves
+//! what the rays do not reach.
 
 use glam::{Mat3, Vec2, Vec3};
 use lumencast_scene::{Aabb, LightKind};
@@ -24,16 +27,16 @@ use crate::sampling::{Grid2, Sampler, luminance, power_heuristic};
 use crate::surface::{HitPoint, MaterialModel};
 use crate::world::{Itself, World, itself};
 
-/// Most cells along each side of the grid of densities.
+/// Greatest number of cells along each side of the grid of densities.
 const CELLS: f32 = 64.0;
-/// Places that are to be known in a cell of it, if they lay evenly.
+/// Number of found points for each cell of the grid, on average.
 const KNOWN: f32 = 4.0;
-/// Share of the rays that is spread evenly, over what the grid covers.
+/// Share of the rays that is spread evenly over the grid.
 const EVENLY: f32 = 0.05;
-/// How much wider than the places learned the grid is, of its width on each side.
+/// Margin of the grid around the found points on each side, as a share of its width.
 const MARGIN: f32 = 0.02;
 
-/// A place that a light has been seen to light, and how much of that was seen: luminance.
+/// A point that a light has been seen to light, and the luminance that was seen there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Found {
     pub(crate) at: Vec3,
@@ -43,19 +46,19 @@ pub(crate) struct Found {
 /// The rays of a directional light.
 #[derive(Clone, Debug)]
 pub(crate) struct Beam {
-    /// The light, and its number.
+    /// The light, and its index.
     source: Source,
     light: usize,
-    /// World from the frame whose z is the direction along which the light shines.
+    /// Transform to the world from the frame whose z is the light's direction.
     frame: Mat3,
-    /// That frame from the world.
+    /// Transform to that frame from the world.
     to_frame: Mat3,
-    /// Where rays start, along z.
+    /// The z at which rays start, in that frame.
     start: f32,
-    /// The rectangle that they cross: its lower corner and its size, along x and y.
+    /// The rectangle that the rays cross: its lower corner and its size along x and y.
     low: Vec3,
     size: Vec2,
-    /// Density over the rectangle as a unit square.
+    /// Density of the rays over the rectangle, as a unit square.
     guide: Grid2,
 }
 
@@ -64,17 +67,17 @@ pub(crate) struct Beam {
 pub(crate) struct Lit {
     /// The triangle that it lies on.
     pub(super) itself: Itself,
-    /// On the light's side.
+    /// The surface, on the light's side.
     surface: Scatterer,
-    /// What arrives along the ray.
+    /// The light that arrives along the ray.
     source: LightPoint,
-    /// Density of the point per square metre of its surface.
+    /// Density with which the point was chosen, per square metre of its surface.
     density: f32,
 }
 
 impl Beam {
-    /// The number of the light worth following: the brightest directional one, among lights few
-    /// enough for vertices to look at all.
+    /// Index of the light to follow: the brightest directional one. `None` where lights are so many
+    /// that vertices do not evaluate all.
     pub(crate) fn light(world: &World) -> Option<usize> {
         let lights = world.placed_lights().iter().enumerate();
         let suns = lights.filter(|(_, l)| matches!(l.light.kind, LightKind::Directional { .. }));
@@ -86,7 +89,8 @@ impl Beam {
         world.lights.punctual.shared_candidate(light).map(|_| light)
     }
 
-    /// Follows a light to where it was found to count. `None` where it was found nowhere.
+    /// Prepares the rays of a light, directed to the points that it was found to light. `None`
+    /// without such points.
     pub(crate) fn new(world: &World, light: usize, found: &[Found]) -> Option<Self> {
         let source = *world.lights.punctual.shared_candidate(light)?;
         let frame = frame(source.direction());
@@ -99,7 +103,7 @@ impl Beam {
         }
         let (low, extent) = (places.min, (places.max - places.min).truncate());
         let margin = MARGIN * extent + 1e-4 * world.extent();
-        // Among the places, so that it matters little how wide the light is.
+        // The rectangle lies amid the points, so the light's angular width matters little.
         let low = (low.truncate() - margin).extend(0.5 * (low.z + places.max.z));
         let size = extent + 2.0 * margin;
         let cells = (found.len() as f32 / KNOWN).sqrt().clamp(4.0, CELLS) as usize;
@@ -125,12 +129,12 @@ impl Beam {
         })
     }
 
-    /// Whether it is of this light.
+    /// Whether it is the beam of this light.
     pub(super) fn is_of(&self, light: usize) -> bool {
         self.light == light
     }
 
-    /// A ray of it, and what arrives along that.
+    /// Samples a ray of the beam, and the light that arrives along it.
     pub(super) fn ray(&self, mut sampler: Sampler) -> (Ray, LightPoint) {
         let (at, _) = self.guide.sample(sampler.square());
         let source = self.source.point_for(Vec3::ZERO, 1.0, sampler.square());
@@ -140,7 +144,7 @@ impl Beam {
         (Ray { origin: crossed + back * direction, direction, t_max: f32::INFINITY }, source)
     }
 
-    /// What a ray of it has met; `None` where that scatters nothing.
+    /// The point that a ray of the beam has met; `None` where it scatters nothing.
     pub(super) fn lit(&self, world: &World, hit: &Hit, source: LightPoint) -> Option<Lit> {
         let surface = Scatterer::at(&world.point(hit, -source.direction)?, world.model)?;
         let HitPoint { position, normal, .. } = surface.place;
@@ -148,8 +152,8 @@ impl Beam {
         (density > 0.0).then_some(Lit { itself: itself(hit), surface, source, density })
     }
 
-    /// Density per square metre, on a surface with this unit normal, of its rays that come from
-    /// `to_light`: 0 for those on the other side.
+    /// Density per square metre of the beam's rays that come from `to_light`, on a surface with
+    /// this unit normal; 0 on its other side.
     #[inline]
     fn density(&self, at: Vec3, normal: Vec3, to_light: Vec3) -> f32 {
         let direction = -to_light;
@@ -166,24 +170,24 @@ impl Beam {
         self.guide.density(place) / (self.size.x * self.size.y) * (facing / cosine)
     }
 
-    /// Weight of light that a path has found by itself, on a surface with this unit normal on the path's
-    /// side at `at`, coming from `to_light`: beside what connections bring of the same. `chosen` is the
-    /// density per square metre with which the path chose the point.
+    /// Weight of light that a path has found by itself, beside what connections to the beam bring.
+    /// The point `at` has this unit normal on the path's side, and the light comes from `to_light`.
+    /// `chosen` is the density per square metre with which the path chose the point.
     pub(super) fn weight(&self, at: Vec3, normal: Vec3, to_light: Vec3, chosen: f32) -> f32 {
         power_heuristic(chosen, self.density(at, normal, to_light))
     }
 }
 
 impl Lit {
-    /// World.
+    /// World position, relative to the snapshot's origin.
     #[inline]
     pub(super) fn position(&self) -> Vec3 {
         self.surface.place.position
     }
 
-    /// What it scatters towards a point `from` which it lies in a unit `direction`, weighed beside what
-    /// the BSDF would find of it, which chooses that direction with density `pdf`: times the square of
-    /// the distance, over the density with which it was chosen.
+    /// Light that the point scatters to `from`, from where it lies in the unit `direction`, over
+    /// the density of its choice. It is weighed against BSDF sampling, which chooses the direction
+    /// with density `pdf`. `None` where there is none.
     #[inline]
     pub(super) fn toward(
         &self,
@@ -198,7 +202,7 @@ impl Lit {
         }
         let per_area = solid_angle(direction, normal, from.distance_squared(position));
         let vertex = self.surface.seen_from(-direction);
-        // Beside the disc that its own rays might meet, it is weighed already.
+        // `pdf` is 0 here since the weight below already covers BSDF sampling.
         let scatter = Scatter { pdf: 0.0, ..vertex.eval(self.source.direction, model) };
         let sent = self.source.scattered(scatter).light;
         let weight = power_heuristic(self.density, pdf * per_area);
@@ -212,7 +216,7 @@ pub(super) fn solid_angle(direction: Vec3, normal: Vec3, distance_squared: f32) 
     direction.dot(normal).abs() / distance_squared
 }
 
-/// Weights of a grid so wide, blurred over neighbours, and a share of them spread evenly.
+/// Blurs the weights of a grid of this width over neighbours and adds an even share.
 fn spread(weights: &[f32], width: usize) -> Vec<f32> {
     let even = EVENLY / (1.0 - EVENLY) * weights.iter().sum::<f32>() / weights.len() as f32;
     let near = |cell: usize| {
@@ -237,7 +241,7 @@ mod tests {
     use lumencast_scene::PunctualLight;
     use lumencast_testkit::scenes::{Stage, lambert};
 
-    /// A slanted square under a sun of some width.
+    /// A slanted square under a sun of this angular diameter.
     fn world(angle: f32) -> World {
         let mut stage = Stage::default();
         let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
@@ -249,15 +253,15 @@ mod tests {
         World::new(stage.snapshot(), MaterialModel::Full, kernel, cache)
     }
 
-    /// The inverse of the densities that points state has the lit surface's area as its mean, whatever
-    /// the beam was taught: parts that it knows nothing of left out.
+    /// The mean inverse of the points' stated densities is the area of the lit surface, less the
+    /// parts that the beam does not know. That holds whatever the beam has learned.
     #[test]
     fn points_have_the_density_they_state() {
         for angle in [0.0, 0.4] {
             let world = world(angle);
             let area = 2.0 * 5.0_f32.sqrt();
             let places = (0..4000).map(|n| Sampler::new(3, 0, n).square() * 2.0 - 1.0);
-            // More of it in a corner.
+            // More points are found in one corner.
             let found: Vec<_> = places
                 .map(|p| Found { at: Vec3::new(p.x, -0.5 * p.y, p.y), luminance: 2.1 + p.x + p.y })
                 .collect();
@@ -275,7 +279,7 @@ mod tests {
                 met += 1;
             });
             let found = sum / count as f32;
-            // Rays of a wide sun find less where the beam ends.
+            // At the edge of the beam, rays of a wide sun find less area.
             let least = if angle == 0.0 { 0.99 * area } else { 0.9 * area };
             assert!(found > least && found < 1.01 * area, "{angle}: {found} of {area} m²");
             assert!(met > count / 2, "{met}");

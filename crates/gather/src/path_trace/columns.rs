@@ -1,15 +1,15 @@
-//! Numbers of many vertices, laid out so that loops over vertices become vector instructions.
+//! Values of many vertices, laid out so that loops over vertices are vectorised.
 //!
-//! What is computed at a vertex is written for one vertex, and called in a loop over a group of
-//! them. All such functions are inlined, without calls, panics or stores that depend on a branch, so
-//! the compiler computes eight vertices at a time where the processor can; results do not depend
-//! on whether it does.
+//! A computation is written for one vertex and called in a loop over a group. All such functions
+//! are inlined, without calls, panics or stores that depend on a branch. So the compiler computes
+//! eight vertices at a time where the processor can. Results do not depend on whether it does.
 
-/// Vertices that are shaded together: vertices and texels of all of them are asked for before the
-/// first is needed, and stay in the first level of cache with all that is computed of them.
+/// Number of vertices that are shaded together. Data of all of them is prefetched before the first
+/// is needed. It stays in the first-level cache with all intermediate values.
 pub(super) const GROUP: usize = 16;
 
-/// N numbers of each vertex of a group: the first of all vertices, then the second of all, and so on.
+/// N numbers of each vertex of a group: the first of all vertices, then the second of all, and so
+/// on.
 #[derive(Clone, Debug)]
 pub(super) struct Columns<const N: usize, T = f32>([[T; GROUP]; N]);
 
@@ -27,7 +27,7 @@ impl<const N: usize, T: Copy> Columns<N, T> {
         }
     }
 
-    /// The same for all vertices.
+    /// Sets the same numbers for all vertices.
     #[inline(always)]
     pub(super) fn fill(&mut self, numbers: [T; N]) {
         self.0 = numbers.map(|number| [number; GROUP]);

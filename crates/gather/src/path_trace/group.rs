@@ -1,7 +1,7 @@
-//! Shading: what happens where the rays of paths have arrived.
+//! Shading: the steps at the hits of paths.
 //!
-//! Each step is taken for a group of vertices before the next: what it needs is looked up vertex by
-//! vertex, and then a loop over all of them computes it in vectors.
+//! Each step is taken for a group of vertices before the next. First its inputs are looked up
+//! vertex by vertex. Then a vectorised loop over the group computes it.
 
 use glam::Vec3;
 use lumencast_light::{Light, OnTriangle, Place};
@@ -21,21 +21,21 @@ use crate::world::{Passing, World, itself};
 /// A surface that a path has met.
 #[derive(Clone, Copy)]
 struct Met<'a> {
-    /// The path.
+    /// Index of the path.
     index: u32,
     hit: Hit,
     triangle: Triangle<'a>,
 }
 
-/// Vertices that are shaded together. Its columns also hold vertices that are not there: what is
-/// computed of them is not looked at.
+/// Vertices that are shaded together. Columns also hold values for absent vertices; results for
+/// those are ignored.
 #[derive(Default)]
 pub(super) struct Group<'a> {
     met: Vec<Met<'a>>,
     spots: Vec<Spot<'a>>,
-    /// Whether the path goes on.
+    /// Whether each path continues.
     going: [bool; GROUP],
-    /// Which instance's frames are in the columns; they stay from group to group.
+    /// The instances whose frames are in the columns. They stay from group to group.
     instances: [Option<u32>; GROUP],
     vertices: Vertices,
     /// The corners of each triangle, object space.
@@ -55,25 +55,25 @@ pub(super) struct Group<'a> {
     directions: Columns<3>,
 }
 
-/// What happens where paths' rays have arrived.
+/// Shades the hits of paths at one depth.
 pub(super) struct Shader<'s, 'a> {
     pub(super) world: &'a World,
     pub(super) limits: &'s Paths<'a>,
-    /// Scattering events so far.
+    /// Number of scattering events so far.
     pub(super) depth: u32,
     pub(super) paths: &'s mut [Path],
-    /// A point that a beam lights for each path.
+    /// A point that the beam lights for each path.
     pub(super) lit: &'s [Option<Lit>],
-    /// Lights to reach for.
+    /// Shadow rays to trace, with their light.
     pub(super) connections: &'s mut Vec<Connection>,
-    /// Those to the light to learn of, and where from.
+    /// Connections to the light to learn of, with their origins.
     pub(super) noted: &'s mut Vec<(u32, Found)>,
     pub(super) group: &'s mut Group<'a>,
 }
 
 impl Shader<'_, '_> {
-    /// Adds what a path sees of sources that are no surfaces, and puts the surface that it has met into
-    /// the group.
+    /// Adds the light that a path sees from discs and the environment, and puts the hit surface
+    /// into the group.
     #[inline(always)]
     pub(super) fn arrive(&mut self, index: u32, hit: Option<Hit>) {
         let (world, depth) = (self.world, self.depth);
@@ -100,8 +100,8 @@ impl Shader<'_, '_> {
         self.group.met.len() == GROUP
     }
 
-    /// Shades the group and empties it: adds what shines, notes which lights to reach for, and turns
-    /// the rays of the paths that go on, which it tells.
+    /// Shades the group and empties it. It adds emission, notes shadow rays and turns the rays of
+    /// continuing paths, for which it calls `goes_on`.
     #[inline(always)]
     pub(super) fn shade(&mut self, mut goes_on: impl FnMut(u32)) {
         self.find_places();
@@ -124,7 +124,7 @@ impl Shader<'_, '_> {
         self.group.met.clear();
     }
 
-    /// Light reached for by chance: an emissive triangle or the environment, and the next ray.
+    /// Reaches for area lights and lit points, and chooses the next ray.
     #[inline(always)]
     fn go_on(&mut self) {
         let are_points = self.world.lights.are_points();
@@ -142,7 +142,7 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// Where the group's rays have arrived.
+    /// Computes positions and normals of the group's hits.
     #[inline(always)]
     fn find_places(&mut self) {
         let Self { world, group, paths, .. } = self;
@@ -185,11 +185,11 @@ impl Shader<'_, '_> {
             );
             vertices.places.set(vertex, place.to_array());
         }
-        // Triangles so thin that they have no normal end paths.
+        // Triangles so thin that they have no normal end the path.
         *going = std::array::from_fn(|vertex| vertices.place(vertex).normal != Vec3::ZERO);
     }
 
-    /// What the surfaces send out by themselves, and for the first of a path what they are.
+    /// Adds the surfaces' emission, and records the first surface of a path.
     #[inline(always)]
     fn add_emission(&mut self) {
         let (world, depth) = (self.world, self.depth);
@@ -222,7 +222,7 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// How the surfaces scatter; ends paths where they do not.
+    /// Computes the BSDFs; ends paths at surfaces without one.
     #[inline(always)]
     fn find_scattering(&mut self) {
         let model = self.world.model;
@@ -247,8 +247,8 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// Reaches from each vertex for one punctual light; from the last vertex of a path no scattered
-    /// ray will meet it by chance.
+    /// Samples one punctual light for each vertex. No BSDF ray follows the last vertex of a path,
+    /// so there the light's weight is one.
     #[inline(always)]
     fn reach_for_punctual(&mut self, is_last: bool) {
         let count = self.world.lights.punctual.candidates();
@@ -262,7 +262,7 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// Draws a number for each vertex and, where lights have a size, a point on their discs.
+    /// Draws a number for each vertex and, where lights have a size, a point on the disc.
     #[inline(always)]
     fn draw_for_punctual(&mut self) {
         let sized = self.world.lights.punctual.have_size();
@@ -280,7 +280,7 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// Chooses the light of each vertex that is its candidate of this number.
+    /// Looks up each vertex's candidate light `k`.
     #[inline(always)]
     fn choose_source(&mut self, k: usize) {
         let lights = &self.world.lights.punctual;
@@ -298,7 +298,7 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// Computes what each vertex scatters of its candidate.
+    /// Computes the light that each vertex scatters of candidate `k`.
     #[inline(always)]
     fn weigh_candidate(&mut self, k: usize, is_last: bool) {
         let model = self.world.model;
@@ -316,7 +316,8 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// Picks one of a vertex's candidates, by how much it scatters of each, and connects to it.
+    /// Chooses one of a vertex's candidates by the light that it scatters of each, and connects to
+    /// it.
     #[inline(always)]
     fn connect_to_punctual(&mut self, vertex: usize, count: usize) {
         let depth = self.depth;
@@ -350,7 +351,7 @@ impl Shader<'_, '_> {
         });
     }
 
-    /// Reaches from each vertex for one point of an emissive triangle or of the environment.
+    /// Samples one point of an emissive triangle or of the environment for each vertex.
     #[inline(always)]
     fn reach_for_area(&mut self) {
         let (world, depth) = (self.world, self.depth);
@@ -434,7 +435,7 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// Draws what the next rays are chosen by, and chooses them.
+    /// Draws the numbers for the next rays and samples the rays.
     #[inline(always)]
     fn choose_rays(&mut self) -> Columns<{ Scattered::NUMBERS }> {
         self.draw(0, Sampler::draw);
@@ -449,7 +450,7 @@ impl Shader<'_, '_> {
         rays
     }
 
-    /// Turns the rays.
+    /// Turns the paths' rays to their next directions.
     #[inline(always)]
     fn scatter(&mut self) {
         let rays = self.choose_rays();
@@ -476,8 +477,8 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// Adds what the last surfaces scatter of light that is known, and ends the paths. Negative lobes
-    /// of fields are kept: cut off here, light would be added at every bounce.
+    /// Adds what the last surfaces scatter of the previous light, and ends the paths. Negative
+    /// lobes of fields are kept: clipping them would add light at every bounce.
     #[inline(always)]
     fn add_known(&mut self, light: &Light) {
         let rays = self.choose_rays();
@@ -500,7 +501,7 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// Draws something of each path's numbers.
+    /// Draws from each path's sampler into one column of draws.
     #[inline(always)]
     fn draw(&mut self, to: usize, of: impl Fn(&mut Sampler) -> Draw) {
         let Group { met, draws, .. } = &mut *self.group;
@@ -509,7 +510,7 @@ impl Shader<'_, '_> {
         }
     }
 
-    /// Punctual lights with a size that a scattered ray meets before `end` metres.
+    /// Radiance of the discs of punctual lights that a scattered ray meets before `end` metres.
     fn discs(&self, segment: &Segment, end: f32) -> Vec3 {
         let Ray { origin, direction, .. } = segment.ray;
         let Start { normal, density } = segment.start;
@@ -520,7 +521,7 @@ impl Shader<'_, '_> {
         self.world.lights.punctual.met(origin, direction, end, segment.pdf, weight)
     }
 
-    /// Environment seen along a ray that left the scene.
+    /// Radiance of the environment along a ray that left the scene.
     fn sky(&self, segment: &Segment) -> Vec3 {
         let direction = segment.ray.direction;
         let lights = &self.world.lights;
@@ -528,8 +529,8 @@ impl Shader<'_, '_> {
         weight * lights.sky.radiance(direction)
     }
 
-    /// Light that was scattered so often, held to the limit. A value that is not a number would spoil a
-    /// whole field, so it counts as nothing.
+    /// Clamps light that was scattered `scattered` times. A value that is not finite would spoil a
+    /// whole field, so it counts as zero.
     #[inline]
     fn limited(&self, scattered: u32, light: Vec3) -> Vec3 {
         if !light.is_finite() {
@@ -546,7 +547,7 @@ impl Shader<'_, '_> {
     }
 }
 
-/// Where on the scene a hit is.
+/// The place of a hit on the scene's triangles.
 fn on_triangle(hit: &Hit) -> OnTriangle {
     let Hit { instance, primitive, triangle, .. } = *hit;
     OnTriangle { instance, primitive, triangle, weights: hit.weights() }
@@ -554,11 +555,11 @@ fn on_triangle(hit: &Hit) -> OnTriangle {
 
 #[cfg(test)]
 thread_local! {
-    /// How much light was none that a number tells, on this thread.
+    /// Number of values on this thread that were dropped because they were not finite.
     pub(super) static LOST: std::cell::Cell<u32> = const { std::cell::Cell::new(0) };
 }
 
-/// Where a point of an emissive triangle or of the environment is.
+/// A sampled point of an emissive triangle or direction of the environment.
 #[derive(Clone, Copy)]
 struct AreaLight {
     /// Unit.
@@ -567,7 +568,7 @@ struct AreaLight {
     distance: f32,
     /// Density per steradian.
     pdf: f32,
-    /// The triangle.
+    /// The triangle; `None` for the environment.
     target: Option<(u32, u32, u32)>,
 }
 

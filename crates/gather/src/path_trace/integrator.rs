@@ -1,9 +1,9 @@
-//! The path integrator: light arriving at a point from a direction.
+//! The path integrator: light that arrives at a point from a direction.
 //!
-//! Unidirectional, with next-event estimation at every vertex and multiple importance sampling
-//! (Veach 1997) where a source can also be met by chance. Russian roulette is for pictures with many
-//! bounces only: paths of probes all have the same length, so that every sample counts alike. What
-//! happens at the vertices is in [`super::group`].
+//! Paths are unidirectional, with next-event estimation at every vertex. Multiple importance
+//! sampling (Veach 1997) weighs sources that BSDF rays can also meet. Russian roulette serves
+//! pictures with many bounces. Paths of probes do without it, so that every sample counts alike.
+//! [`super::group`] shades the vertices.
 
 use glam::Vec3;
 
@@ -13,31 +13,31 @@ use super::paths::{Connection, Look, Path, Paths, Seen, Segment, Start};
 use crate::accel::{Hit, Ray, Stacks};
 use crate::world::{Passing, World};
 
-/// Follows paths through a world, many at a time: all their rays are traced, then all that they met
-/// is shaded, then all shadow rays are traced. What a path finds does not depend on the others.
+/// Follows many paths through a world together. For each scattering event it traces all rays,
+/// shades all hits and then traces all shadow rays. A path's result does not depend on the others.
 ///
-/// Followed one by one to their ends, paths on Sponza take 1.25 times as long: half of shading is
-/// waiting for vertices and texels, which this way are asked for before they are needed.
+/// Paths followed one by one take 1.25 times as long on Sponza. Half of shading is waiting for
+/// vertices and texels, which this order allows to prefetch.
 pub(crate) struct Integrator<'a> {
     world: &'a World,
     limits: Paths<'a>,
     stacks: Stacks,
-    /// Rays traced so far.
+    /// Number of rays traced so far.
     pub(crate) rays: u64,
     paths: Vec<Path>,
-    /// Where the paths' segments end.
+    /// Hits of the paths' current segments.
     hits: Vec<Option<Hit>>,
     /// Indices of the paths that go on.
     alive: Vec<u32>,
     group: Group<'a>,
     connections: Vec<Connection>,
-    /// Whether something lies on them.
+    /// Whether each connection is occluded.
     occluded: Vec<bool>,
-    /// The points that the beam lights, one for each path; none without a beam.
+    /// A point that the beam lights for each path; empty without a beam.
     lit: Vec<Option<Lit>>,
-    /// Connections to the light to learn of, and where from.
+    /// Connections to the light to learn of, with their origins.
     noted: Vec<(u32, Found)>,
-    /// Those that nothing lies on, since last taken.
+    /// Unoccluded ones of them, since the list was last taken.
     pub(crate) found: Vec<Found>,
 }
 
@@ -60,8 +60,9 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Light arriving at each origin from its direction, scattered at most `bounces` times, in order.
-    /// Punctual lights are seen only through the surfaces that they light.
+    /// Computes the light that arrives at each origin from its direction, scattered at most
+    /// `bounces` times. Results are in order. Punctual lights are seen only through the surfaces
+    /// that they light.
     pub(crate) fn radiance(
         &mut self,
         looks: impl IntoIterator<Item = Look>,
@@ -98,7 +99,7 @@ impl<'a> Integrator<'a> {
         self.alive.extend(0..self.paths.len() as u32);
     }
 
-    /// Which of these rays nothing lies on.
+    /// Whether each of these rays is unoccluded.
     pub(crate) fn arrive(&mut self, rays: &[(Ray, Passing)]) -> Vec<bool> {
         self.rays += rays.len() as u64;
         let mut free = vec![true; rays.len()];
@@ -130,7 +131,7 @@ impl<'a> Integrator<'a> {
         lit.extend(met.map(|(hit, (_, source))| beam.lit(world, hit.as_ref()?, source)));
     }
 
-    /// Traces the rays in hand.
+    /// Traces the current rays of all paths.
     fn find_surfaces(&mut self, depth: u32) {
         let Self { world, limits, alive, paths, hits, stacks, .. } = self;
         self.rays += alive.len() as u64;
@@ -149,7 +150,7 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Traces the shadow rays and adds the light of those that arrive.
+    /// Traces the shadow rays and adds the light of unoccluded ones.
     fn connect(&mut self) {
         let Self { world, connections, occluded, paths, stacks, noted, found, .. } = self;
         self.rays += connections.len() as u64;
@@ -158,7 +159,7 @@ impl<'a> Integrator<'a> {
         let passing = |n: u32| connections[n as usize].passing;
         world.occluded(rays, stacks, passing, |n, found| occluded[n as usize] = found);
         found.extend(noted.drain(..).filter(|(n, _)| !occluded[*n as usize]).map(|(_, f)| f));
-        // In order, so that sums do not depend on which ray was done first.
+        // Light is added in order, so that sums do not depend on which ray was done first.
         for (c, occluded) in connections.drain(..).zip(occluded) {
             if !*occluded {
                 paths[c.path as usize].seen.add(c.part, c.light);
@@ -166,7 +167,7 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Goes one scattering event further on every path.
+    /// Shades the hits of all paths and chooses their next rays.
     fn shade(&mut self, depth: u32) {
         self.world.kernel().run(
             #[inline(always)]
@@ -194,7 +195,7 @@ impl<'a> Integrator<'a> {
 }
 
 impl Path {
-    /// Four keys for each segment, for decisions about surfaces that cover in part.
+    /// The first of four keys of a segment, for decisions about partly transparent surfaces.
     pub(super) fn key(&self, depth: u32) -> u64 {
         self.key.wrapping_add(u64::from(depth) * 4)
     }
@@ -213,7 +214,7 @@ mod tests {
     use crate::surface::MaterialModel;
     use crate::world::WorldCache;
 
-    /// A room of several materials with so many lights, every other of them with a size.
+    /// A room of several materials with `lights` lights, every other one with a size.
     fn room(lights: u32) -> Stage {
         let mut stage = Stage::default();
         let grey = Material { roughness: 0.8, ..lambert(Vec3::splat(0.6), Vec3::ZERO) };
@@ -246,7 +247,7 @@ mod tests {
         })
     }
 
-    /// Vector instructions find what single numbers find, bit for bit.
+    /// The vector kernel finds what the portable one finds, bit for bit.
     #[test]
     fn vectors_change_nothing() {
         if Kernel::detect() == Kernel::Portable {

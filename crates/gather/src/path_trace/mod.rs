@@ -1,4 +1,4 @@
-//! Gathering by path tracing.
+//! Gathers light by path tracing.
 
 mod aim;
 pub(crate) mod beam;
@@ -25,18 +25,18 @@ pub use crate::surface::MaterialModel;
 /// Settings of a [`CpuPathTracer`].
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Which materials to believe.
+    /// The material model.
     pub materials: MaterialModel,
-    /// Threads to trace with; as many as there are cores when absent.
+    /// Number of threads; `None` for the number of cores.
     pub threads: Option<NonZeroUsize>,
-    /// How rays find surfaces: two levels for scenes that move, one where jobs share a moment.
+    /// Levels of hierarchies: two for scenes that move, one for many jobs of the same moment.
     pub levels: Levels,
 }
 
 /// A path tracer on the CPU.
 ///
-/// Jobs are worked on in the order in which they were submitted, each by all threads. Acceleration
-/// structures are kept from job to job. Dropping it gives its jobs up and waits for its threads.
+/// It works on jobs in the order of submission, each with all threads. It keeps acceleration
+/// structures from job to job. Dropping it cancels its jobs and waits for its threads.
 #[derive(Debug)]
 pub struct CpuPathTracer {
     queue: Queue,
@@ -70,7 +70,7 @@ impl Gather for CpuPathTracer {
     }
 }
 
-/// Runs jobs in a pool of threads that ends with them.
+/// Runs jobs in a thread pool that lives as long as the queue.
 fn work(options: &Options, jobs: &Jobs) {
     let threads = options.threads.map_or(0, NonZeroUsize::get);
     let pool =
@@ -84,7 +84,7 @@ fn work(options: &Options, jobs: &Jobs) {
     }
 }
 
-/// One job: acceleration structure, then paths.
+/// Runs one job: updates the acceleration structure, then traces paths.
 fn run(model: MaterialModel, job: &Job, cache: &mut WorldCache, watch: &Watch) -> Option<Gathered> {
     let start = Instant::now();
     let world = World::new(job.scene.clone(), model, Kernel::detect(), cache);

@@ -1,4 +1,4 @@
-//! What paths are: where they begin, how they stand, and what they have seen.
+//! Paths: their limits, their origins, their state and their results.
 
 use glam::Vec3;
 use lumencast_light::Light;
@@ -8,38 +8,39 @@ use crate::accel::{ItemBuffer, Ray};
 use crate::sampling::Sampler;
 use crate::world::{Itself, Passing};
 
-/// Which paths to follow.
+/// Limits and shortcuts of the paths to follow.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Paths<'a> {
-    /// Scattering events on a path.
+    /// Largest number of scattering events on a path.
     pub(crate) bounces: u32,
     /// Upper limit of the luminance that a vertex adds to scattered light, cd/m².
     pub(crate) clamp: f32,
-    /// Scattering events from which on that holds. Light that is scattered once is direct light to a
-    /// camera and indirect light to a probe: so both are held to the limit alike.
+    /// Number of scattering events from which on the limit holds. Light that is scattered once is
+    /// direct to a camera and indirect to a probe. With a number for each, both limit the same
+    /// light.
     pub(crate) clamp_from: u32,
-    /// Scattering events from which on paths may end by chance.
+    /// Number of scattering events from which on paths may end by Russian roulette.
     pub(crate) roulette_from: u32,
-    /// The light that the last surface of a path scatters, beside that of punctual lights; without
-    /// it, that surface only shines itself.
+    /// Light that the last surface of a path scatters, besides that of punctual lights. Without it
+    /// that surface only emits.
     pub(crate) previous: Option<&'a Light>,
-    /// What finds the same light sooner.
+    /// Ways to find the same light sooner.
     pub(crate) shortcuts: Shortcuts<'a>,
 }
 
 /// Ways on which paths find the same light sooner.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Shortcuts<'a> {
-    /// The rays of a light that paths are connected to.
+    /// The beam that paths connect to.
     pub(crate) beam: Option<&'a Beam>,
-    /// What most paths' first rays meet.
+    /// First hits of most paths' first rays.
     pub(crate) items: Option<&'a ItemBuffer>,
-    /// The punctual light of which to note where paths found it, by its number.
+    /// Index of a punctual light: the points where paths found its light are recorded.
     pub(crate) learn: Option<usize>,
 }
 
 impl Paths<'_> {
-    /// Paths of so many scattering events, nothing else to be seen to.
+    /// Paths of up to `bounces` scattering events, without other limits or shortcuts.
     pub(crate) fn new(bounces: u32) -> Self {
         Self {
             bounces,
@@ -52,35 +53,35 @@ impl Paths<'_> {
     }
 }
 
-/// Where to look from, and where to.
+/// Origin and direction of a path's first ray.
 #[derive(Clone, Debug)]
 pub(crate) struct Look {
     /// Metres.
     pub(crate) origin: Vec3,
     /// Unit.
     pub(crate) direction: Vec3,
-    /// Density per steradian with which that was chosen, where sources are reached for from the origin
-    /// too ([`super::aim::Aim::reach`]); infinite where they are not.
+    /// Density per steradian of the direction, where sources are also sampled from the origin
+    /// ([`super::aim::Aim::reach`]). Infinite where they are not.
     pub(crate) pdf: f32,
-    /// The numbers of the path that begins here.
+    /// The random numbers of the path.
     pub(crate) sampler: Sampler,
 }
 
-/// What a path found.
+/// The result of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Seen {
-    /// Radiance, cd/m², of what a client that holds punctual lights draws by itself, had it a camera
-    /// here: sources seen, and punctual lights scattered once.
+    /// Radiance, cd/m², that a client with punctual lights would compute itself for a camera here:
+    /// visible sources, and punctual light scattered once.
     pub(crate) direct: Vec3,
-    /// The rest: all light that fields would have to bring.
+    /// All other radiance, cd/m², which fields would have to provide.
     pub(crate) indirect: Vec3,
     /// Metres to the first surface; infinite where there is none.
     pub(crate) distance: f32,
-    /// Unit normal of the first surface on the side that is seen; zero where there is none.
+    /// Unit normal of the first surface on the seen side; zero where there is none.
     pub(crate) normal: Vec3,
-    /// The first surface is seen from its front.
+    /// Whether the first surface is seen from its front.
     pub(crate) front: bool,
-    /// The first surface shows a back that nobody is meant to see.
+    /// Whether the first surface is seen from the back of a single-sided material.
     pub(crate) culled: bool,
 }
 
@@ -115,27 +116,27 @@ pub(super) enum Part {
 }
 
 impl Part {
-    /// Of a source that is met after so many scattering events, or of a punctual light that is
-    /// scattered once more.
+    /// The part for a source that is met after `scattered` scattering events, or for a punctual
+    /// light that is scattered once more.
     pub(super) fn after(scattered: u32) -> Self {
         if scattered == 0 { Self::Direct } else { Self::Indirect }
     }
 }
 
-/// The ray in hand, and what is known of how it was chosen.
+/// The current ray of a path, and how it was chosen.
 #[derive(Debug)]
 pub(super) struct Segment {
     pub(super) ray: Ray,
     /// The triangle that it starts at.
     pub(super) from: Option<Itself>,
-    /// Density per steradian with which the BSDF chose it; infinite where nothing else could have
-    /// found the same light.
+    /// Density per steradian with which the BSDF chose it. Infinite where no other strategy finds
+    /// the same light.
     pub(super) pdf: f32,
-    /// Where it starts; of use only beside a [`Beam`].
+    /// The start of the segment; only used with a [`Beam`].
     pub(super) start: Start,
 }
 
-/// Where a segment starts.
+/// The start of a segment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
     /// Unit normal of the triangle; zero at a path's beginning.
@@ -145,20 +146,20 @@ pub(super) struct Start {
 }
 
 impl Start {
-    /// A path's beginning.
+    /// The start of a path.
     pub(super) const OF_PATH: Self = Self { normal: Vec3::ZERO, density: f32::INFINITY };
 }
 
 impl Segment {
-    /// Density per square metre with which it arrives at a point so many metres away, on a surface
-    /// with this unit normal.
+    /// Density per square metre with which the segment arrives at a point at `distance` metres, on
+    /// a surface with this unit normal.
     #[inline]
     pub(super) fn density_on(&self, distance: f32, normal: Vec3) -> f32 {
         self.pdf * solid_angle(self.ray.direction, normal, distance * distance)
     }
 }
 
-/// A path on its way.
+/// The state of a path.
 #[derive(Debug)]
 pub(super) struct Path {
     pub(super) sampler: Sampler,
@@ -168,7 +169,7 @@ pub(super) struct Path {
     pub(super) seen: Seen,
 }
 
-/// Light that a path receives if nothing is in between.
+/// Light that a path receives if nothing occludes it.
 #[derive(Debug)]
 pub(super) struct Connection {
     pub(super) path: u32,

@@ -18,7 +18,7 @@ use crate::{Budget, Receiver};
 
 const BLACK: Vec3 = Vec3::ZERO;
 
-/// Mean radiance seen along one ray, and its standard error, over independent groups of samples.
+/// Mean radiance along one ray and its standard error, over independent groups of samples.
 fn look(scene: &Arc<Snapshot>, origin: Vec3, direction: Vec3, paths: Paths<'_>) -> (Vec3, Vec3) {
     let world = World::new(
         scene.clone(),
@@ -63,7 +63,8 @@ fn down() -> Vec3 {
     Vec3::new(0.3, -1.0, 0.2).normalize()
 }
 
-/// A plane at y = 0 under the ray from (0, 1, 0) along `down`, and where the ray meets it.
+/// Adds a plane at y = 0 below the ray from (0, 1, 0) along `down`; returns the point where the ray
+/// meets it.
 fn floor(stage: &mut Stage, material: Material) -> Vec3 {
     let material = stage.material(material);
     stage.quad(Vec3::new(-50.0, 0.0, 50.0), Vec3::X * 100.0, Vec3::NEG_Z * 100.0, material);
@@ -85,7 +86,7 @@ fn corner_form_factor(x: f32, y: f32) -> f32 {
 fn rectangle_over_a_lambert_plane() {
     let (albedo, emission) = (Vec3::new(0.8, 0.5, 0.2), Vec3::new(3.0, 2.0, 1.0));
     let (a, b, height) = (0.4, 0.7, 0.5);
-    // Above the ray's start, so that the ray does not meet it.
+    // The lamp is above the ray's start, so the ray does not meet it.
     let mut stage = Stage::default();
     let at = floor(&mut stage, lambert(albedo, BLACK)) + (1.0 + height) * Vec3::Y;
     let lamp = stage.material(lambert(BLACK, emission));
@@ -96,8 +97,8 @@ fn rectangle_over_a_lambert_plane() {
     check(look_down(&stage, 1), expected, albedo * emission * solid);
 }
 
-/// A black panel of many triangles with one bright texel, L cos θ cos θ' A/πd². It lies where the
-/// middle of its triangle and places near the corners miss it.
+/// A black panel of many triangles with one bright texel: L cos θ cos θ' A/πd². The texel lies
+/// where samples at the centre and near the corners of its triangle miss it.
 #[test]
 fn bright_texel_of_a_panel() {
     use lumencast_scene::{Filter, Image, Primitive, TextureRef, Vertices};
@@ -158,9 +159,9 @@ fn point_light_falls_by_cosine_and_square() {
     check(look_down(&stage, 1), without_cosine * d.normalize().y, without_cosine);
 }
 
-/// Rough and smooth metals and dielectrics in a closed emitting room, direct light only: chance,
-/// next-event estimation and both together must agree. A room is the hardest case for the weights,
-/// since every direction can be found both ways.
+/// Rough and smooth metals and dielectrics in a closed emitting room, direct light only. BSDF
+/// sampling, next-event estimation and both together must agree. A room is the hardest case for the
+/// weights, since both ways find every direction.
 #[test]
 fn both_ways_of_finding_light_together_count_once() {
     for (metallic, roughness) in [(1.0, 0.1), (1.0, 0.6), (0.0, 0.4)] {
@@ -170,7 +171,7 @@ fn both_ways_of_finding_light_together_count_once() {
         floor(&mut room, glossy.clone());
         let walls = room.material(lambert(BLACK, emission));
         room.room(Vec3::new(0.0, 45.0, 0.0), Vec3::splat(98.0), walls);
-        // The same light from a constant environment, which only chance finds.
+        // A constant environment gives the same light, and only BSDF sampling finds it.
         let mut open = Stage::default();
         floor(&mut open, glossy.clone());
         open.environment(Environment::Constant { radiance: emission });
@@ -185,7 +186,7 @@ fn both_ways_of_finding_light_together_count_once() {
     }
 }
 
-/// A picture of a sun in a dim sky, over Lambert: ∫ L cos dω/π by quadrature.
+/// An environment picture of a sun in a dim sky over a Lambert surface: ∫ L cos dω/π by quadrature.
 #[test]
 fn picture_of_a_sun_over_a_lambert_plane() {
     let (width, height) = (64u32, 32u32);
@@ -211,8 +212,8 @@ fn picture_of_a_sun_over_a_lambert_plane() {
     check(look_down(&stage, 1), expected, 1.02 * expected);
 }
 
-/// What shines is left alone, and so is, seen by a camera, what punctual lights send by one surface:
-/// that is direct light.
+/// The clamp leaves direct light alone: emission, and for a camera also punctual light scattered
+/// once.
 #[test]
 fn clamp_holds_scattered_light_and_leaves_the_rest() {
     let mut stage = Stage::default();
@@ -232,7 +233,7 @@ fn clamp_holds_scattered_light_and_leaves_the_rest() {
     }
 }
 
-/// Thin glass: what it lets through is behind it, undeviated.
+/// Thin glass shows what is behind it, without refraction.
 #[test]
 fn thin_glass_shows_what_is_behind() {
     let mut stage = Stage::default();
@@ -243,12 +244,12 @@ fn thin_glass_shows_what_is_behind() {
     stage.environment(Environment::Sky { zenith: sky, horizon: ground, ground });
     let cos = -down().y;
     let fresnel = 0.04 + 0.96 * (1.0 - cos).powi(5);
-    // Mirrored upwards it sees the gradient at sin(elevation) = cos.
+    // The mirrored ray sees the gradient at sin(elevation) = cos.
     let expected = (1.0 - fresnel) * ground + fresnel * ground.lerp(sky, cos);
     check(look_down(&stage, 1), expected, ground);
 }
 
-/// Directions that the normal map's normal allows and the triangle does not carry no light.
+/// Directions above the shading normal's horizon but below the triangle's carry no light.
 #[test]
 fn shading_normals_make_no_light() {
     use lumencast_scene::{Image, TextureRef};
@@ -320,8 +321,7 @@ fn paths_do_not_depend_on_each_other() {
     assert_eq!(integrator.rays, rays, "nothing asked for, nothing done");
 }
 
-/// Light that is no number counts as nothing, so that no field is spoilt: where scenes are sound, none is
-/// lost this way.
+/// Light that is not finite counts as zero, to protect fields. Sound scenes lose no light this way.
 #[test]
 fn sound_scenes_lose_no_light() {
     let lost = |scene: Arc<Snapshot>, origin: Vec3| {
@@ -351,7 +351,7 @@ fn sound_scenes_lose_no_light() {
     assert!(lost(stage.snapshot(), BLACK) > 0, "nothing is counted");
 }
 
-/// A closed room with a ball of every kind of surface, under every kind of light.
+/// A closed room with a ball of every material under every kind of light.
 fn every_material() -> Arc<Snapshot> {
     let mut stage = Stage::default();
     let wall = stage.material(lambert(Vec3::splat(0.7), Vec3::ZERO));
@@ -395,7 +395,7 @@ fn results_do_not_depend_on_threads() {
     assert!(one.iter().zip(0..).all(|(s, k)| s.count == 1 + 40 * k && s.sum.len() == 16));
 }
 
-/// A receiver draws the same samples whichever others are gathered at, in whatever order.
+/// A receiver draws the same samples, whichever others a job has and in whatever order.
 #[test]
 fn a_subset_draws_the_samples_of_the_whole() {
     let whole = job(&lit_room(), 5);
@@ -430,7 +430,7 @@ fn jobs_run_beside_each_other_and_can_be_given_up() {
     assert!(matches!(tracer.poll(wanted), Progress::Unknown), "a result is given once");
     assert!(matches!(tracer.poll(endless), Progress::Unknown));
     assert!(tracer.wait(queued).is_none());
-    // Dropping must not wait for the rest of this one.
+    // Dropping the tracer must not wait for the rest of this job.
     tracer.submit(huge);
     drop(tracer);
 }

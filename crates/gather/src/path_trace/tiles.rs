@@ -1,4 +1,4 @@
-//! One job: many paths a receiver, spread over all cores, summed in a fixed order.
+//! Runs a job: many paths for each receiver, spread over all cores and summed in a fixed order.
 
 use std::sync::atomic::Ordering;
 
@@ -14,8 +14,8 @@ use crate::sampling::luminance;
 use crate::world::World;
 use crate::{Job, Sums, SumsAt, SurfacePoint};
 
-/// Samples of one receiver that a thread takes at a time, or of several that have fewer. Sums are
-/// grouped by it, so results do not depend on how many threads there are.
+/// Number of samples that a thread takes at a time, of one receiver or of several with fewer
+/// samples. Sums are grouped by it, so results do not depend on the number of threads.
 const TILE: u32 = 64;
 
 /// The samples `first..end` of a receiver.
@@ -33,21 +33,22 @@ impl Tile {
     }
 }
 
-/// What the tiles of a batch found, in columns.
+/// Sums of the tiles of a batch, in columns.
 #[derive(Debug, Default)]
 struct BatchSums {
     sum: Vec<Vec3>,
     squares: Vec<f32>,
-    /// Sums of distances and of their squares; empty where nobody asked.
+    /// Sums of distances and of their squares; empty unless the job asks for them.
     distances: Vec<Vec2>,
-    /// Empty where nobody asked.
+    /// Empty unless the job asks for them.
     surfaces: Vec<Option<SurfacePoint>>,
-    /// A tile: how many samples met backs first, and backs that nobody is meant to see.
+    /// For each tile, the number of samples that first met a back, and the number that first met
+    /// the back of a single-sided material.
     backs: Vec<[u32; 2]>,
     rays: u64,
 }
 
-/// Gathers; `None` when cancelled. Returns the sums and the number of rays.
+/// Gathers a job's light. Returns the sums and the number of rays; `None` when cancelled.
 pub(super) fn gather(job: &Job, world: &World, watch: &Watch) -> Option<(Sums, u64)> {
     let tiles = tiles(job);
     let paths =
@@ -85,8 +86,8 @@ fn tiles(job: &Job) -> Vec<Tile> {
     tiles
 }
 
-/// Tiles that are traced together: as many as have no more samples than a whole one, since rays are
-/// the quicker the more of them are under way.
+/// Groups tiles to be traced together, up to the samples of a whole tile. Rays are faster when more
+/// are traced together.
 fn batches(tiles: &[Tile]) -> Vec<&[Tile]> {
     let mut batches = Vec::new();
     let (mut first, mut samples) = (0, 0);
@@ -121,7 +122,7 @@ fn trace(job: &Job, batch: &[Tile], integrator: &mut Integrator<'_>) -> BatchSum
     sums
 }
 
-/// The direction and the light of each sample's source, where it has one and nothing hides it.
+/// Direction and light of each sample's source, where it has one and nothing occludes it.
 fn reach(
     integrator: &mut Integrator<'_>,
     sources: Vec<Option<Reach>>,
@@ -136,7 +137,7 @@ fn reach(
 }
 
 impl BatchSums {
-    /// Sums up what a tile's samples have seen, which come next.
+    /// Adds up the next samples as one tile.
     fn add(
         &mut self,
         job: &Job,
@@ -187,12 +188,12 @@ impl BatchSums {
     }
 }
 
-/// Terms of the receiver of an entry.
+/// Number of terms of an entry's receiver.
 fn terms(job: &Job, entry: u32) -> usize {
     job.receivers[job.budgets[entry as usize].receiver as usize].terms(job.order)
 }
 
-/// What has been added up of an entry.
+/// Running totals of an entry.
 #[derive(Default)]
 struct Total {
     sum: [DVec3; sh::MAX_COEFFICIENTS],
@@ -204,7 +205,7 @@ struct Total {
 }
 
 impl Total {
-    /// Moves what there is into `sums`, as an entry of so many terms.
+    /// Moves the totals into `sums` as an entry of `terms` terms.
     fn finish(&mut self, job: &Job, terms: usize, sums: &mut Sums) {
         let mut sum = [Vec3::ZERO; sh::MAX_COEFFICIENTS];
         let mut squares = [0.0; sh::MAX_COEFFICIENTS];

@@ -1,4 +1,4 @@
-//! What is computed where a path's light is scattered.
+//! The vertices of paths, where light is scattered.
 
 use glam::{Mat3, Vec3};
 
@@ -12,30 +12,30 @@ use crate::surface::{HitPoint, MaterialModel, Point};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Vertex {
     pub(super) place: HitPoint,
-    /// Towards where the path came from, unit.
+    /// Unit direction towards the path's previous vertex.
     pub(super) view: Vec3,
-    /// Unit; of shading, on the side of `view`.
+    /// Unit shading normal, on the side of `view`.
     pub(super) normal: Vec3,
     pub(super) bsdf: Bsdf,
 }
 
-/// A point that scatters light, before it is known where to.
+/// A point that scatters light, whatever the direction it is seen from.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scatterer {
     pub(super) place: HitPoint,
-    /// Unit; of shading, before it is bent to face anything.
+    /// Unit shading normal, before it is bent to face anything.
     unbent: Vec3,
     bsdf: Bsdf,
 }
 
 impl Scatterer {
-    /// `None` where it scatters nothing.
+    /// The scatterer at a point; `None` where the surface scatters nothing.
     pub(super) fn at(point: &Point<'_>, model: MaterialModel) -> Option<Self> {
         let (bsdf, unbent) = point.scattering(model)?;
         Some(Self { place: point.place, unbent, bsdf })
     }
 
-    /// Seen from `view`, unit, on the side of its place.
+    /// The vertex as seen from the unit direction `view`, which must be on the side of its place.
     #[inline(always)]
     pub(super) fn seen_from(&self, view: Vec3) -> Vertex {
         let Self { place, unbent, bsdf } = *self;
@@ -49,16 +49,16 @@ pub(super) struct Scattered {
     pub(super) origin: Vec3,
     /// Unit.
     pub(super) direction: Vec3,
-    /// What light along it is multiplied by.
+    /// Factor of the light that arrives along the ray.
     pub(super) weight: Vec3,
-    /// Density per steradian with which it was chosen; 0 where there is none.
+    /// Density per steradian of the choice; 0 where there is no ray.
     pub(super) pdf: f32,
 }
 
 numbers!(Scattered of f32 { origin: Vec3, direction: Vec3, weight: Vec3, pdf: f32 });
 
 impl Vertex {
-    /// What is scattered of light from a direction.
+    /// The BSDF's value and density for light from a direction.
     #[inline(always)]
     pub(super) fn eval(&self, direction: Vec3, model: MaterialModel) -> Scatter {
         let frame = frame(self.normal);
@@ -67,7 +67,7 @@ impl Vertex {
         if self.on_side(local, direction, model) { found } else { Scatter::default() }
     }
 
-    /// Chooses the next ray.
+    /// Samples the next ray.
     #[inline(always)]
     pub(super) fn scatter(&self, [lobe, u]: [Draw; 2], model: MaterialModel) -> Scattered {
         let frame = frame(self.normal);
@@ -83,22 +83,22 @@ impl Vertex {
         }
     }
 
-    /// Whether shading normal and triangle agree on which side a direction is; where they do not,
-    /// light would shine through the surface. The renderer that [`MaterialModel::Lambert`] is to
-    /// be compared with does not ask.
+    /// Whether shading normal and triangle agree on the side that a direction is on. Where they do
+    /// not, light would shine through the surface. [`MaterialModel::Lambert`] skips this test, as
+    /// does the renderer that it is compared with.
     #[inline(always)]
     fn on_side(&self, local: Vec3, world: Vec3, model: MaterialModel) -> bool {
         model == MaterialModel::Lambert || (local.z > 0.0) == (world.dot(self.place.normal) > 0.0)
     }
 }
 
-/// From the world to the frame of shading.
+/// Transforms a direction from the world to the shading frame.
 #[inline(always)]
 fn local(frame: &Mat3, world: Vec3) -> Vec3 {
     Vec3::new(frame.x_axis.dot(world), frame.y_axis.dot(world), frame.z_axis.dot(world))
 }
 
-/// The vertices of a group.
+/// The vertices of a group, in columns.
 #[derive(Debug, Default)]
 pub(super) struct Vertices {
     pub(super) places: Columns<{ HitPoint::NUMBERS }>,
@@ -123,7 +123,7 @@ impl Vertices {
         HitPoint::from_array(self.places.get(vertex))
     }
 
-    /// Evaluates each vertex for a direction of its own, value and density.
+    /// Evaluates each vertex for its own direction; returns value and density.
     #[inline(always)]
     pub(super) fn eval(&self, directions: &Columns<3>, model: MaterialModel) -> Columns<4> {
         let mut found = Columns::default();

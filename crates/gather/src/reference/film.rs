@@ -1,13 +1,13 @@
-//! What a picture has gathered so far.
+//! The samples of a picture, accumulated.
 //!
-//! Samples go in turn to two halves, whose difference tells the noise of their mean. Each half is a
-//! well-spread part of the pixel's sequence, and both together are one that is spread better still:
-//! 64 samples err by a sixth less (squared) than two times 32 that know nothing of each other. So the
-//! halves are more unlike than two independent ones, and what they tell is an upper bound.
+//! Samples go in turn to two halves, whose difference estimates the noise of their mean. Each half
+//! is a well-spread part of the pixel's sequence. Both together are spread better still: the
+//! squared error of 64 samples is a sixth below that of two independent sets of 32. So the halves
+//! differ more than their mean errs, and the estimate is an upper bound.
 
 use glam::{DVec3, UVec2, Vec3};
 
-/// Sums of radiance, a pixel each, row by row from the upper left.
+/// Sums of radiance for each pixel, row by row from the upper left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     size: UVec2,
@@ -21,20 +21,20 @@ struct Half {
     samples: u32,
 }
 
-/// How far a picture is at most from the one that endless samples would give, as its halves tell:
-/// 1.0 to 1.2 times the distance that it has, on our scenes.
+/// The noise that a picture has left, estimated from its halves. On the project's scenes the
+/// estimate is 1.0 to 1.2 times the true error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Root of the mean squared error, as a share of the picture's mean radiance.
     pub relative_rms: f64,
-    /// PSNR (dB) that this noise alone would leave, gamma 2.2, peak 1, values clamped to 0..1, at the
-    /// exposure given.
+    /// PSNR (dB) that this noise alone would leave at the given exposure: gamma 2.2, peak 1, values
+    /// clamped to 0..1.
     pub psnr: f64,
 }
 
 impl Film {
-    /// Nothing seen yet. Samples are spread best when there are `planned` a pixel, or two, four, …
-    /// times as many; any number is sound.
+    /// An empty film. Samples are spread best at `planned` samples a pixel, and at 2, 4, … times as
+    /// many; any number is unbiased.
     #[must_use]
     pub fn new(size: UVec2, planned: u32) -> Self {
         let pixels = size.x as usize * size.y as usize;
@@ -42,7 +42,7 @@ impl Film {
         Self { size, planned, halves: [half.clone(), half] }
     }
 
-    /// A film as [`Film::parts`] gave it; `None` where lengths do not agree.
+    /// Restores a film from [`Film::parts`]. `None` where lengths do not agree with the size.
     #[must_use]
     pub fn from_parts(size: UVec2, planned: u32, halves: [(Vec<Vec3>, u32); 2]) -> Option<Self> {
         let pixels = size.x as usize * size.y as usize;
@@ -51,7 +51,7 @@ impl Film {
         sound.then_some(Self { size, planned, halves })
     }
 
-    /// Sums and numbers of samples of both halves, to be kept and gone on with later.
+    /// Sums and numbers of samples of both halves, to be saved and continued later.
     #[must_use]
     pub fn parts(&self) -> [(&[Vec3], u32); 2] {
         self.halves.each_ref().map(|half| (half.sums.as_slice(), half.samples))
@@ -63,28 +63,28 @@ impl Film {
         self.size
     }
 
-    /// Samples a pixel that it was made for.
+    /// Number of samples a pixel that the film was made for.
     #[must_use]
     pub fn planned(&self) -> u32 {
         self.planned
     }
 
-    /// Samples a pixel so far.
+    /// Number of samples a pixel so far.
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.halves[0].samples + self.halves[1].samples
     }
 
-    /// The half that is behind, and its samples so far.
+    /// Index of the half with fewer samples, and its number of samples.
     pub(super) fn next_half(&self) -> (usize, u32) {
         let behind = usize::from(self.halves[1].samples < self.halves[0].samples);
         (behind, self.halves[behind].samples)
     }
 
-    /// Where the `n`-th sample of a half stands in its pixel's sequence. The first half takes the lower
-    /// part of what is planned, rounded up to a power of two, and the second the upper part; then each
-    /// takes half of as much again, and so on: aligned parts of the sequence are well spread, each
-    /// by itself and together.
+    /// Index of a half's `n`-th sample in its pixel's sequence. The first half takes the lower part
+    /// of the planned samples, rounded up to a power of two; the second takes the upper part.
+    /// Beyond that, each takes half of as many again, and so on. Aligned parts of the sequence are
+    /// well spread, each by itself and together.
     pub(super) fn place(&self, half: usize, n: u32) -> u32 {
         let first = self.planned.div_ceil(2).next_power_of_two();
         let (stage, begin) = match n / first {
@@ -109,7 +109,7 @@ impl Film {
         a.sums.iter().zip(&b.sums).map(|(a, b)| (*a + *b) * scale).collect()
     }
 
-    /// The noise that is left, at a linear exposure; `None` before both halves have samples.
+    /// The estimated noise at a linear exposure; `None` while a half has no samples.
     #[must_use]
     pub fn noise(&self, exposure: f32) -> Option<Noise> {
         let [a, b] = &self.halves;
@@ -127,7 +127,8 @@ impl Film {
         }
         let pixels = a.sums.len().max(1) as f64;
         let per_channel = |sum: DVec3| sum.element_sum() / (3.0 * pixels);
-        // The mean of two independent halves errs by half of what they differ by; of ours, by less.
+        // The mean of two independent halves has half the error of their difference; here it has
+        // less.
         let rms = (0.25 * per_channel(linear)).sqrt();
         Some(Noise {
             relative_rms: if rms > 0.0 { rms / per_channel(mean) } else { 0.0 },

@@ -1,4 +1,4 @@
-//! The filter through which a picture is seen.
+//! The reconstruction filter of a picture's pixels.
 
 use std::f32::consts::TAU;
 
@@ -6,22 +6,22 @@ use glam::Vec2;
 
 use crate::sampling::ONE_MINUS_EPSILON;
 
-/// How a pixel weighs what it sees, by the distance from its centre in pixels. Samples are placed
-/// with the filter's density and all count alike (Ernst, Stamminger and Greiner 2006), so that
-/// neighbouring pixels share none and tiles none either.
+/// A pixel's reconstruction filter, by distance from the pixel's centre in pixels. Samples are
+/// placed with the filter's density and weigh alike (Ernst, Stamminger and Greiner 2006). So
+/// neighbouring pixels share no samples, and neither do tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Filter {
-    /// The pixel's own square: what multisampling resolves to.
+    /// The pixel's own square, as in multisampling.
     #[default]
     Box,
     /// Falls linearly to 0 at the neighbours' centres.
     Tent,
-    /// σ of half a pixel, cut off at 1.5.
+    /// A Gaussian with σ of half a pixel, cut off at 1.5 pixels.
     Gaussian,
 }
 
 impl Filter {
-    /// Where in the picture a sample goes, pixels from the pixel's centre.
+    /// Position of a sample, in pixels from the pixel's centre.
     #[inline]
     pub(crate) fn place(self, u: Vec2) -> Vec2 {
         match self {
@@ -38,7 +38,7 @@ impl Filter {
     }
 }
 
-/// Density 1 − |x|.
+/// Maps a uniform number to one with density 1 − |x|.
 fn tent(u: f32) -> f32 {
     if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).max(0.0).sqrt() }
 }
@@ -63,7 +63,8 @@ mod tests {
 
     #[test]
     fn filters_have_the_variance_of_their_shape() {
-        // Box 1/12, tent 1/6; Gaussian σ² less what the cut takes: 1 − (R²/2σ²) q/(1 − q), q = e^(−R²/2σ²).
+        // Variances: box 1/12, tent 1/6. The cut takes from the Gaussian's σ²: its factor is 1 −
+        // (R²/2σ²) q/(1 − q), with q = e^(−R²/2σ²).
         let q = (-4.5f32).exp();
         let gaussian = 0.25 * (1.0 - 4.5 * q / (1.0 - q));
         for (filter, variance, radius) in [

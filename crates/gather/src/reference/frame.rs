@@ -1,5 +1,5 @@
-//! One sample a pixel, and what its ray met first: what denoisers of real-time path tracing start
-//! from.
+//! Frames of one sample a pixel with the surfaces met first: the input of denoisers for real-time
+//! path tracing.
 
 use glam::{UVec2, Vec3};
 
@@ -15,37 +15,37 @@ use crate::world::{Passing, World};
 pub struct Frame {
     /// Pixels in width and height.
     pub size: UVec2,
-    /// A sample each; never fewer than there are pixels.
+    /// One sample for each pixel.
     pub samples: Vec<Sample>,
 }
 
 /// One path from the camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// Arriving radiance, cd/m², all parts of it.
+    /// Arriving radiance, direct and indirect, cd/m².
     pub radiance: Vec3,
-    /// The share of it that what is seen first sends out by itself, a lamp or the environment: it has
-    /// no noise.
+    /// The part of it that the first surface or the environment emits towards the camera; it has no
+    /// noise.
     pub emitted: Vec3,
-    /// What is seen first, where that scatters light.
+    /// The surface met first, where it scatters light.
     pub surface: Option<Surface>,
 }
 
 /// A surface at the point where a camera ray met it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Surface {
-    /// World, metres.
+    /// World position, metres.
     pub position: Vec3,
-    /// World unit normal that it is shaded by, on the camera's side.
+    /// World unit shading normal, on the camera's side.
     pub normal: Vec3,
     /// Linear base colour, 0 to 1.
     pub base_color: Vec3,
 }
 
 impl Renderer {
-    /// One sample a pixel: the `number`-th of each pixel's sequence, placed by the filter like any
-    /// other. Frames 0, 1, 2, … are together what a [`super::Film`] of as many samples holds; to
-    /// judge one by the other, give them different seeds.
+    /// Traces one sample a pixel: the `number`-th of each pixel's sequence, placed by the filter.
+    /// Frames 0, 1, 2, … together hold what a [`super::Film`] of as many samples holds. For
+    /// comparisons of the two, use different seeds.
     #[must_use]
     pub fn frame(&self, number: u32) -> Frame {
         let tiles = self.tiles(self.paths(Shortcuts::default()), |integrator, corner| {
@@ -65,7 +65,8 @@ impl Renderer {
     }
 }
 
-/// What rays meet first, radiance left out: the very surfaces that paths with the same numbers meet.
+/// The surfaces that rays meet first, without radiance; paths with the same numbers meet the same
+/// ones.
 fn first_met(world: &World, looks: &[Look]) -> Vec<Sample> {
     let mut samples = vec![Sample::default(); looks.len()];
     let ray =

@@ -1,7 +1,8 @@
-//! The reference: light with its uncertainty, at points ([`probe_sh`]) and in pictures
-//! ([`Renderer`]), and single samples with what they met first ([`Renderer::frame`]), which denoisers
-//! start from. What is compared with closed forms, with other renderers, and what our own light
-//! fields are compared with.
+//! The reference: accurate light for comparisons, with estimates of its error. [`probe_sh`]
+//! computes it at points, [`Renderer`] in pictures. [`Renderer::frame`] gives single samples with
+//! the surfaces that they met first, the input of denoisers.
+//!
+//! It is compared with closed forms and other renderers; light fields are compared with it.
 
 mod film;
 mod filter;

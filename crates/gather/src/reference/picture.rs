@@ -17,18 +17,19 @@ use crate::path_trace::{Levels, MaterialModel};
 use crate::sampling::Sampler;
 use crate::world::{World, WorldCache};
 
-/// Pixels along the side of what a thread takes at a time.
+/// Side in pixels of the tiles that threads take.
 const TILE: u32 = 16;
-/// Samples a pixel that are added to a film at once. Part of the result: sums are grouped by it.
+/// Number of samples a pixel that one pass adds to a film. Results depend on it, since sums are
+/// grouped by passes.
 pub const PASS: u32 = 4;
 
-/// Which light a picture shows. Direct and indirect add up to all.
+/// The part of the light that a picture shows. Direct and indirect add up to all.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Parts {
-    /// What clients draw by themselves: light of punctual lights scattered once, emission and
+    /// The light that clients compute themselves: punctual lights scattered once, and emission and
     /// environment where the camera sees them.
     Direct,
-    /// What fields hold: light of emissive surfaces and the environment, and all light
+    /// The light that fields hold: light of emissive surfaces and the environment, and all light
     /// scattered more than once.
     Indirect,
     /// Both.
@@ -36,31 +37,31 @@ pub enum Parts {
     All,
 }
 
-/// What to draw and how.
+/// Settings of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureSettings {
-    /// Pixels in width and height, at least 1.
+    /// Width and height in pixels, at least 1.
     pub size: UVec2,
-    /// Surface scattering events on a path: 1 is direct light.
+    /// Largest number of surface scattering events on a path; 1 is direct light.
     pub bounces: u32,
-    /// As in [`crate::Job::clamp`], of light that is scattered twice or more: what a probe sees scattered
-    /// once, a camera sees scattered twice.
+    /// As in [`crate::Job::clamp`], for light that is scattered twice or more. What a probe sees
+    /// scattered once, a camera sees scattered twice.
     pub clamp: f32,
-    /// Scattering events from which on paths may end by chance, in favour of others (Russian
-    /// roulette); none do before, and never where it is `u32::MAX`.
+    /// Number of scattering events from which on Russian roulette may end paths; `u32::MAX`
+    /// disables it.
     pub roulette_from: u32,
-    /// Whether paths may be connected to what a directional light has been followed to, where that
-    /// finds indirect light sooner.
+    /// Whether paths may connect to points that a directional light lights. They do so where a
+    /// trial shows that it reduces the noise of indirect light.
     pub follow_sun: bool,
-    /// Which light.
+    /// The part of the light to show.
     pub parts: Parts,
-    /// Which materials to believe.
+    /// The material model.
     pub materials: MaterialModel,
-    /// What a pixel sees.
+    /// The reconstruction filter of pixels.
     pub filter: Filter,
-    /// Other seeds give other, independent noise.
+    /// Seed of the noise; different seeds give independent noise.
     pub seed: u64,
-    /// Threads; as many as there are cores when absent. The result does not depend on it.
+    /// Number of threads; `None` for the number of cores. The result does not depend on it.
     pub threads: Option<NonZeroUsize>,
 }
 
@@ -81,12 +82,12 @@ impl Default for PictureSettings {
     }
 }
 
-/// What a pass has done.
+/// Numbers of paths and rays of a pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traced {
-    /// Paths from the camera.
+    /// Number of paths from the camera.
     pub paths: u64,
-    /// Rays: camera, bounce and shadow rays.
+    /// Number of rays: camera, bounce and shadow rays.
     pub rays: u64,
 }
 
@@ -111,18 +112,18 @@ pub struct Traced {
 #[derive(Debug)]
 pub struct Renderer {
     pub(super) world: World,
-    /// In the world's places, which are relative to the snapshot's origin.
+    /// The view, relative to the snapshot's origin.
     view: View,
     pub(super) settings: PictureSettings,
-    /// Found when the first paths are to be followed.
+    /// Computed when the first paths are followed.
     beam: OnceLock<Option<Beam>>,
-    /// Found when the first pass begins.
+    /// Computed when the first pass begins.
     items: OnceLock<Option<ItemBuffer>>,
     pool: rayon::ThreadPool,
 }
 
 impl Renderer {
-    /// Makes the scene ready for tracing.
+    /// Prepares the scene for tracing.
     ///
     /// # Errors
     /// Where the system gives no threads.
@@ -149,18 +150,18 @@ impl Renderer {
         Ok(Self { world, view, settings, beam: OnceLock::new(), items: OnceLock::new(), pool })
     }
 
-    /// Whether paths are connected to what a directional light has been followed to: as
-    /// [`PictureSettings::follow_sun`] allows, and a trial has shown to be worth it.
+    /// Whether paths connect to points that a directional light lights.
+    /// [`PictureSettings::follow_sun`] must allow it, and a trial must have shown that it pays.
     pub fn follows_sun(&self) -> bool {
         self.beam().is_some()
     }
 
-    /// Adds up to [`PASS`] samples a pixel to a film, but none beyond `until` a pixel. `going` is told, from
-    /// any thread, the share of the pass that is done, 0 to 1; when it answers no, the pass ends, the
-    /// film stays as it was and the result is `None`.
+    /// Adds up to [`PASS`] samples a pixel to a film, but none beyond `until` a pixel. Any thread
+    /// may call `going` with the share of the pass that is done, 0 to 1. Where `going` returns
+    /// false, the pass ends, the film stays unchanged and the result is `None`.
     ///
-    /// What a film holds after a number of samples depends on the scene and the settings, not on
-    /// threads nor on when it was saved and gone on with.
+    /// A film's content after a number of samples depends on the scene and the settings. It depends
+    /// neither on threads nor on whether the film was saved and continued.
     pub fn pass(
         &self,
         film: &mut Film,
@@ -168,7 +169,7 @@ impl Renderer {
         going: &(dyn Fn(f32) -> bool + Sync),
     ) -> Option<Traced> {
         let (half, first) = film.next_half();
-        // The end of each half is fixed by `until`, so that the last passes are whole as well.
+        // `until` sets the end of each half, so that the last passes are full too.
         let share = if half == 0 { until.div_ceil(2) } else { until / 2 };
         let samples = share.saturating_sub(first).min(PASS);
         let places: Vec<u32> = (first..first + samples).map(|n| film.place(half, n)).collect();
@@ -196,8 +197,8 @@ impl Renderer {
         Some(Traced { paths, rays: rays.into_inner() })
     }
 
-    /// Sums over the pixels of one tile, row by row, of the samples at some places of their sequences,
-    /// and the rays that it took.
+    /// Sums of radiance for each pixel of one tile, row by row, and the number of rays. `places`
+    /// are the samples' indices in each pixel's sequence.
     fn tile(
         &self,
         corner: UVec2,
@@ -216,7 +217,8 @@ impl Renderer {
         self.settings.size.x.div_ceil(TILE) * self.settings.size.y.div_ceil(TILE)
     }
 
-    /// What `of` makes of each tile, given its upper left pixel, on all threads.
+    /// Calls `of` for each tile, given by its upper left pixel, on all threads; returns the results
+    /// in order.
     pub(super) fn tiles<T: Send>(
         &self,
         paths: Paths<'_>,
@@ -242,7 +244,7 @@ impl Renderer {
         self.items.get_or_init(find).as_ref()
     }
 
-    /// The paths to follow, on these shortcuts.
+    /// The paths of this picture's settings with these shortcuts.
     pub(super) fn paths<'a>(&self, shortcuts: Shortcuts<'a>) -> Paths<'a> {
         let s = &self.settings;
         Paths {
@@ -254,7 +256,7 @@ impl Renderer {
         }
     }
 
-    /// Batches of camera rays on all threads, in order: what `of` makes of each.
+    /// Calls `of` for each batch of camera rays on all threads; returns the results in order.
     pub(super) fn batches<T: Send>(
         &self,
         paths: Paths<'_>,
@@ -266,7 +268,8 @@ impl Renderer {
         self.pool.install(|| batches.map_init(integrator, of).collect())
     }
 
-    /// The camera rays of a tile, row by row: for each pixel those at some places of its sequence.
+    /// The camera rays of a tile, row by row; `places` are the samples' indices in each pixel's
+    /// sequence.
     pub(super) fn looks(&self, corner: UVec2, places: &[u32]) -> impl Iterator<Item = Look> {
         let s = &self.settings;
         let end = (corner + TILE).min(s.size);
@@ -278,7 +281,7 @@ impl Renderer {
             .map(move |(pixel, sample)| look(pixel, sample))
     }
 
-    /// The camera ray of a pixel's sample.
+    /// Returns a function from a pixel and a sample's index to the camera ray.
     pub(super) fn look(&self, seed: u64) -> impl Fn(UVec2, u32) -> Look {
         let s = &self.settings;
         let rays = self.view.rays(s.size.x as f32 / s.size.y as f32);
@@ -291,7 +294,7 @@ impl Renderer {
     }
 }
 
-/// The camera rays of a perspective view.
+/// The camera rays of a perspective view; `None` for other views.
 fn pyramid(view: &View, size: UVec2) -> Option<Pyramid> {
     let rays = view.rays(size.x as f32 / size.y as f32);
     let half = [rays.right.length(), rays.up.length()];
@@ -299,7 +302,7 @@ fn pyramid(view: &View, size: UVec2) -> Option<Pyramid> {
     rays.is_perspective.then(|| Pyramid {
         eye: rays.eye,
         axes: [rays.right / half[0], rays.up / half[1], rays.forward],
-        // Filters reach beyond the picture.
+        // Filters reach beyond the picture's edge.
         half: half.map(|half| half + 2.0 * pixel),
         pixel,
     })
@@ -313,7 +316,7 @@ fn part(seen: &Seen, parts: Parts) -> Vec3 {
     }
 }
 
-/// Rows of pixels out of tiles.
+/// Puts tiles of pixels together into rows.
 pub(super) fn assemble<T: Copy>(size: UVec2, tiles: &[Vec<T>]) -> Vec<T> {
     let across = size.x.div_ceil(TILE);
     let mut pixels = Vec::with_capacity(size.x as usize * size.y as usize);

@@ -1,4 +1,4 @@
-//! Light at points with its uncertainty.
+//! Light at points with its standard error.
 
 use std::sync::Arc;
 
@@ -9,23 +9,23 @@ use lumencast_scene::Snapshot;
 use crate::path_trace::{CpuPathTracer, Levels, MaterialModel, Options};
 use crate::{Gather, Job, Receiver, SumsAt};
 
-/// What to compute at each point.
+/// Settings of an estimate at points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbeSettings {
     /// Order of the expansion.
     pub order: Order,
-    /// Directions of one lattice.
+    /// Number of directions in one lattice.
     pub samples: u32,
-    /// Independently turned lattices, at least 2; the standard error is known to one part in
-    /// √(2(n − 1)), so 16 or more are advised.
+    /// Number of independently rotated lattices, at least 2. The standard error has a relative
+    /// error of 1/√(2(n − 1)), so 16 or more are advised.
     pub lattices: u32,
-    /// Surface scattering events on a path, as in [`Job::bounces`].
+    /// Largest number of surface scattering events on a path, as in [`Job::bounces`].
     pub bounces: u32,
     /// As in [`Job::clamp`].
     pub clamp: f32,
-    /// Which materials to believe.
+    /// The material model.
     pub materials: MaterialModel,
-    /// Other seeds give other, independent estimates.
+    /// Seed of the noise; different seeds give independent estimates.
     pub seed: u64,
 }
 
@@ -48,7 +48,7 @@ impl Default for ProbeSettings {
 pub struct ProbeEstimate {
     /// Coefficients of arriving radiance, cd/m².
     pub sh: Vec<Vec3>,
-    /// Their standard errors, from how much the lattices differ.
+    /// Standard errors of the coefficients, from the differences between lattices.
     pub standard_error: Vec<Vec3>,
     /// As in [`SumsAt::back_face_fraction`].
     pub back_face_fraction: f32,

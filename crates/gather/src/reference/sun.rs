@@ -1,7 +1,9 @@
-//! Whether a picture's paths should be connected to what the sun was followed to, and where to follow it.
+//! Decides whether a picture's paths connect to points that the sun lights, and where the sun's
+//! rays go.
 //!
-//! A few paths without connections show where the sun's light counts; as many with them, whether they
-//! are worth their rays: where the squared error by the same number of rays is less.
+//! A few paths without connections show where the sun's light counts. As many paths with
+//! connections show whether these are worth their rays. They are if the squared error for a given
+//! number of rays is smaller.
 
 use glam::UVec2;
 
@@ -10,29 +12,30 @@ use crate::path_trace::beam::{Beam, Found};
 use crate::path_trace::paths::{Paths, Shortcuts};
 use crate::sampling::{Sampler, luminance, mix};
 
-/// Pixels that are looked at, each twice; some more often where a picture has fewer.
+/// Number of pixels in a trial, each with two paths. Small pictures use some pixels more often.
 const PIXELS: u32 = 1 << 14;
-/// Pixels of which a thread follows the paths together.
+/// Number of pixels whose paths a thread follows together.
 const BATCH: u32 = 128;
 
-/// What some paths have shown.
+/// Results of the paths of a trial.
 #[derive(Default)]
 struct Trial {
     found: Vec<Found>,
-    /// Of indirect light's luminance, summed over pixels; twice that of a single path.
+    /// Squared difference of the luminance of indirect light between a pixel's two paths, summed
+    /// over pixels. Its mean is twice the variance of one path.
     squared_error: f64,
     rays: u64,
 }
 
 impl Trial {
-    /// Squared error of as many paths as share a given number of rays.
+    /// The squared error that a given number of rays leaves, up to a factor.
     fn cost(&self) -> f64 {
         self.squared_error * self.rays as f64
     }
 }
 
 impl Renderer {
-    /// The rays of a light to connect paths to, where that is worth it.
+    /// The beam to connect paths to, where that is worth its rays.
     pub(super) fn find_beam(&self) -> Option<Beam> {
         let s = &self.settings;
         let is_seen = s.follow_sun && s.bounces > 1 && s.parts != super::Parts::Direct;
@@ -46,7 +49,7 @@ impl Renderer {
 
     fn trial(&self, paths: Paths<'_>) -> Trial {
         let size = self.settings.size;
-        // Other paths than the picture's own.
+        // Another seed makes the trial's paths independent of the picture's.
         let seed = mix(self.settings.seed);
         let look = self.look(seed);
         let batches = self.batches(paths, PIXELS / BATCH, |integrator, batch| {

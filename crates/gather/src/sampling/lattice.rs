@@ -1,8 +1,9 @@
-//! Directions of a probe's samples: a spherical Fibonacci lattice, turned at random.
+//! Directions of a probe's samples: a randomly rotated spherical Fibonacci lattice.
 //!
-//! n points at heights 1 − (2i+1)/n, each one golden angle further round (Keinert et al. 2015,
-//! "Spherical Fibonacci mapping"). All weigh the same. A random turn a receiver and a seed makes
-//! the estimate unbiased; another seed at every tick lets successive estimates average.
+//! n points lie at heights 1 − (2i+1)/n, each one golden angle further round (Keinert et al. 2015,
+//! "Spherical Fibonacci mapping"). All have the same weight. A random rotation for each receiver
+//! and seed makes the estimate unbiased. Each tick takes another seed, so that successive estimates
+//! average out.
 
 use std::f32::consts::TAU;
 
@@ -13,17 +14,17 @@ use super::{mix2, rotation, unit};
 /// The golden ratio's fractional part, as a fraction of 2³².
 const GOLDEN: u32 = 2_654_435_769;
 
-/// Direction `i` of `n`, before the turn.
+/// Direction `i` of `n`, before the rotation.
 #[inline]
 pub(crate) fn direction(i: u32, n: u32) -> Vec3 {
     let z = 1.0 - (2.0 * i as f32 + 1.0) / n as f32;
     let r = (1.0 - z * z).max(0.0).sqrt();
-    // In integers, so that the fraction keeps its digits for large i.
+    // The product is computed in integers, so that the fraction stays exact for large i.
     let turns = i.wrapping_mul(GOLDEN) as f32 / 4_294_967_296.0;
     (r * Vec2::from_angle(TAU * turns)).extend(z)
 }
 
-/// The turn of a receiver's lattice.
+/// The rotation of a receiver's lattice.
 #[inline]
 pub(crate) fn turn(seed: u64, receiver: u32) -> Quat {
     let a = mix2(seed ^ 0x1a77_1ce5_eed0_0001, u64::from(receiver));
@@ -37,8 +38,8 @@ mod tests {
 
     use super::*;
 
-    /// The mean of Y_lm over the lattice is its integral (0 but for l = 0) to a few hundredths
-    /// already with 16 directions, and far better with more.
+    /// The mean of Y_lm over the lattice is close to its integral, which is 0 except for l = 0. It
+    /// is within a few hundredths for 16 directions, and closer for more.
     #[test]
     fn integrates_low_bands() {
         for (n, tolerance) in [(16, 0.08), (256, 0.008), (4096, 0.001)] {

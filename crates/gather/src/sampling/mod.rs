@@ -1,5 +1,5 @@
-//! Where samples go: the sampler's numbers, the lattice of directions, maps from the unit square,
-//! and tables to choose from by weight.
+//! Sampling: the sampler's numbers, the lattice of directions, maps from the unit square, and
+//! tables to choose from by weight.
 
 pub(crate) mod lattice;
 mod sobol;
@@ -16,7 +16,7 @@ pub(crate) use table::{Grid2, Table};
 /// The largest f32 below 1.
 pub(crate) const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
-/// A well-mixed function of its input (the finaliser of splitmix64).
+/// A hash of one number (the finaliser of splitmix64).
 #[inline]
 pub(crate) fn mix(x: u64) -> u64 {
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -30,7 +30,7 @@ pub(crate) fn mix2(a: u64, b: u64) -> u64 {
     mix(mix(a.wrapping_add(0x9e37_79b9_7f4a_7c15)) ^ b.wrapping_mul(0xd6e8_feb8_6659_fd93))
 }
 
-/// The upper bits as a number in [0, 1).
+/// The upper 24 bits as a number in [0, 1).
 #[inline]
 pub(crate) fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / (1 << 24) as f32)
@@ -45,8 +45,8 @@ fn cos_sin(angle: f32) -> Vec2 {
     Vec2::new(cos, sin)
 }
 
-/// The point of the unit circle at 0 to 1 turns from +x, within 1.5·10⁻⁷. Unlike the library's functions
-/// it is no call, so that loops over it become vector instructions.
+/// The point of the unit circle at 0 to 1 turns from +x, within 1.5·10⁻⁷. It makes no library call,
+/// so loops over it are vectorised.
 #[inline(always)]
 pub(crate) fn turned(turns: f32) -> Vec2 {
     let quarters = 4.0 * turns;
@@ -57,7 +57,8 @@ pub(crate) fn turned(turns: f32) -> Vec2 {
     if low { Vec2::new(-x, -y) } else { Vec2::new(x, y) }
 }
 
-/// The unit disc, equal areas, without tearing neighbours apart (Shirley and Chiu 1997).
+/// Maps the unit square to the unit disc with equal areas; neighbours stay neighbours (Shirley and
+/// Chiu 1997).
 #[inline(always)]
 pub(crate) fn disc(u: Vec2) -> Vec2 {
     let p = 2.0 * u - Vec2::ONE;
@@ -68,14 +69,14 @@ pub(crate) fn disc(u: Vec2) -> Vec2 {
     if flat { Vec2::new(c, s) } else { Vec2::new(s, c) }
 }
 
-/// The upper hemisphere with density cos θ/π.
+/// Maps the unit square to the upper hemisphere with density cos θ/π.
 #[inline(always)]
 pub(crate) fn cosine_hemisphere(u: Vec2) -> Vec3 {
     let d = disc(u);
     d.extend((1.0 - d.length_squared()).max(0.0).sqrt())
 }
 
-/// The sphere, uniform (density 1/4π).
+/// Maps the unit square to the sphere with density 1/4π.
 #[inline]
 #[cfg(test)]
 pub(crate) fn sphere(u: Vec2) -> Vec3 {
@@ -84,28 +85,28 @@ pub(crate) fn sphere(u: Vec2) -> Vec3 {
     (r * turned(u.y)).extend(z)
 }
 
-/// Barycentric weights of the second and third vertex, uniform in area.
+/// Barycentric weights of the second and third vertex, uniform over the triangle's area.
 #[inline]
 pub(crate) fn triangle(u: Vec2) -> Vec2 {
     let root = u.x.sqrt();
     Vec2::new(root * (1.0 - u.y), root * u.y)
 }
 
-/// A rotation, uniform (Shoemake 1992).
+/// A uniformly distributed rotation (Shoemake 1992).
 pub(crate) fn rotation(u: Vec3) -> glam::Quat {
     let (a, b) = ((1.0 - u.x).sqrt(), u.x.sqrt());
     let (p, q) = (Vec2::from_angle(TAU * u.y), Vec2::from_angle(TAU * u.z));
     glam::Quat::from_xyzw(a * p.y, a * p.x, b * q.y, b * q.x).normalize()
 }
 
-/// The weight of a strategy with density `a` beside one with density `b`: the power heuristic
-/// (Veach 1997, equation 9.13, β = 2).
+/// The power heuristic's weight of a strategy with density `a` beside one with density `b` (Veach
+/// 1997, equation 9.13, β = 2).
 #[inline(always)]
 pub(crate) fn power_heuristic(a: f32, b: f32) -> f32 {
     if a.is_infinite() {
         return 1.0;
     }
-    // By their ratio, since the square of a density may overflow.
+    // It uses the ratio, since the square of a density may overflow.
     if a >= b {
         let r = b / a;
         if a > 0.0 { 1.0 / (1.0 + r * r) } else { 0.0 }
@@ -125,7 +126,8 @@ mod tests {
         let grid =
             || (0..n * n).map(|i| (Vec2::new((i % n) as f32, (i / n) as f32) + 0.5) / n as f32);
         let mean = |f: &dyn Fn(Vec2) -> f32| grid().map(f).sum::<f32>() / (n * n) as f32;
-        // Moments: E[z] of the cosine hemisphere 2/3, E[z²] of the sphere 1/3, E[r²] of the disc 1/2.
+        // Moments: E[z] of the cosine hemisphere is 2/3, E[z²] of the sphere 1/3, E[r²] of the disc
+        // 1/2.
         assert!((mean(&|u| cosine_hemisphere(u).z) - 2.0 / 3.0).abs() < 1e-3);
         assert!((mean(&|u| sphere(u).z.powi(2)) - 1.0 / 3.0).abs() < 1e-3);
         assert!((mean(&|u| disc(u).length_squared()) - 0.5).abs() < 1e-3);

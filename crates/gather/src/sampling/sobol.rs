@@ -1,8 +1,9 @@
-//! Numbers for paths: Owen-scrambled Sobol points, padded two dimensions at a time with the sample
-//! index shuffled anew for each pair (Burley 2020, "Practical hash-based Owen scrambling").
+//! Random numbers for paths: Owen-scrambled Sobol points, padded two dimensions at a time. The
+//! sample index is shuffled anew for each pair (Burley 2020, "Practical hash-based Owen
+//! scrambling").
 //!
-//! Every number is a function of (seed, receiver, sample, how many were drawn before), so that
-//! results do not depend on which thread computes what.
+//! Every number is a function of seed, receiver, sample and the number of draws so far. So results
+//! do not depend on which thread computes what.
 
 use glam::Vec2;
 
@@ -10,12 +11,12 @@ use super::{ONE_MINUS_EPSILON, mix, mix2};
 
 use crate::numbers::numbers;
 
-/// The numbers of one path.
+/// The random numbers of one path.
 #[derive(Clone, Debug)]
 pub(crate) struct Sampler {
-    /// Of the sequence: seed and receiver.
+    /// Hash of seed and receiver, which selects the sequence.
     sequence: u64,
-    /// Index of the sample, bits reversed.
+    /// Index of the sample, with its bits reversed.
     reversed: u32,
     drawn: u64,
 }
@@ -27,19 +28,20 @@ impl Sampler {
         Self { sequence: mix2(seed, u64::from(receiver)), reversed, drawn: 0 }
     }
 
-    /// A point of the unit square; over the samples of a receiver these are well spread.
+    /// A point of the unit square. The points of a receiver's samples are well spread.
     #[inline]
     pub(crate) fn square(&mut self) -> Vec2 {
         self.draw().square()
     }
 
-    /// A number in [0, 1), likewise.
+    /// A number in [0, 1). The numbers of a receiver's samples are well spread.
     #[inline]
     pub(crate) fn number(&mut self) -> f32 {
         self.draw().number()
     }
 
-    /// Other numbers of the same path and the same kind, so that its own stay what they are.
+    /// A sampler of another sequence for the same path; drawing from it does not change this one's
+    /// numbers.
     #[inline]
     pub(crate) fn aside(&self) -> Self {
         Self { sequence: mix(!self.sequence), reversed: self.reversed, drawn: 0 }
@@ -51,7 +53,7 @@ impl Sampler {
         mix2(self.sequence, u64::from(self.reversed))
     }
 
-    /// What the next number or square is computed from.
+    /// Advances the sampler; the result computes the next number or point.
     #[inline(always)]
     pub(crate) fn draw(&mut self) -> Draw {
         self.drawn += 1;
@@ -63,7 +65,7 @@ impl Sampler {
     }
 }
 
-/// A number or a point of the unit square, not yet computed.
+/// A number or a point of the unit square that is computed on demand.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Draw {
     reversed: u32,
@@ -94,16 +96,16 @@ fn unit(bits: u32) -> f32 {
     (bits as f32 * (1.0 / 4_294_967_296.0)).min(ONE_MINUS_EPSILON)
 }
 
-/// The sample's place in the shuffled order: an Owen scramble of the index, which keeps every
-/// prefix of a power of two well spread.
+/// The sample's index in the shuffled order. The Owen scramble of the index keeps every prefix of a
+/// power of two well spread.
 #[inline(always)]
 fn shuffled(reversed: u32, key: u32) -> u32 {
     owen_reversed(reversed, key).reverse_bits()
 }
 
-/// Owen scrambling of a fraction given in reversed bits would need each bit to depend on the bits
-/// above it; in reversed order these are the bits below, which is what carries do (Laine and
-/// Karras 2011; constants by Vegdahl). Input: bits reversed, so bit 0 is the fraction's first.
+/// Owen scrambling of a fraction: each bit changes depending on the bits above it. In reversed
+/// order those are the bits below, and carries propagate upwards from them (Laine and Karras 2011;
+/// constants by Vegdahl). Bit 0 of the input is the fraction's first bit.
 #[inline(always)]
 fn owen_reversed(reversed: u32, key: u32) -> u32 {
     let mut x = reversed;
@@ -115,8 +117,8 @@ fn owen_reversed(reversed: u32, key: u32) -> u32 {
     x
 }
 
-/// The second Sobol dimension in reversed bits: the index times Pascal's triangle mod 2, which is
-/// its own square root of structure and takes five steps (Ahmed 2024).
+/// The second Sobol dimension in reversed bits: the index times Pascal's triangle mod 2. That
+/// product takes five steps (Ahmed 2024).
 #[inline(always)]
 fn sobol_reversed(index: u32) -> u32 {
     let mut x = index;
@@ -152,7 +154,7 @@ mod tests {
         }
     }
 
-    /// 256 points: every elementary interval of area 1/256 holds exactly one.
+    /// Of 256 points, every elementary interval of area 1/256 holds exactly one.
     #[test]
     fn pairs_are_a_0_2_net() {
         for draw in 0..3 {

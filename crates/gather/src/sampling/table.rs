@@ -1,10 +1,10 @@
-//! Choosing by weight: cumulative tables of one and two dimensions.
+//! Cumulative tables of one and two dimensions, to choose by weight.
 
 use glam::Vec2;
 
 use super::ONE_MINUS_EPSILON;
 
-/// Chooses an index with probability in proportion to its weight.
+/// A table that chooses an index with probability in proportion to its weight.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Table {
     /// Probability that the index is at most i; the last is 1. Empty when all weights are 0.
@@ -13,7 +13,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Weights that are not finite and positive count as 0.
+    /// Builds the table; weights that are not finite and positive count as 0.
     pub(crate) fn new(weights: impl IntoIterator<Item = f32>) -> Self {
         let mut total = 0.0;
         let sums: Vec<f64> = weights
@@ -29,7 +29,7 @@ impl Table {
         Self { cumulative: sums.iter().map(|s| (s / total) as f32).collect(), total }
     }
 
-    /// Whether there is nothing to choose.
+    /// Whether all weights are 0.
     pub(crate) fn is_empty(&self) -> bool {
         self.cumulative.is_empty()
     }
@@ -39,8 +39,8 @@ impl Table {
         self.total
     }
 
-    /// The index whose share of [0, 1) holds `u`, its probability, and where in its share `u` lies.
-    /// Not to be called on an empty table.
+    /// Returns the index whose share of [0, 1) holds `u`, its probability, and the position of `u`
+    /// in that share, 0 to 1. The table must not be empty.
     #[inline]
     pub(crate) fn choose(&self, u: f32) -> (usize, f32, f32) {
         let index = self.cumulative.partition_point(|&c| c <= u).min(self.cumulative.len() - 1);
@@ -66,12 +66,13 @@ pub(crate) struct Grid2 {
     rows: Table,
     columns: Vec<Table>,
     width: usize,
-    /// Row by row; in one place each, since they are asked for far more often than points.
+    /// Densities row by row. They are stored apart from the tables, since they are read far more
+    /// often than points are sampled.
     densities: Vec<f32>,
 }
 
 impl Grid2 {
-    /// From `width * height` weights, row by row.
+    /// Builds the grid from `width * height` weights, row by row.
     pub(crate) fn new(weights: &[f32], width: usize) -> Self {
         let columns: Vec<_> =
             weights.chunks_exact(width).map(|row| Table::new(row.iter().copied())).collect();
@@ -92,7 +93,7 @@ impl Grid2 {
         self.rows.is_empty()
     }
 
-    /// A point and its density. Not to be called on an empty grid.
+    /// A point and its density. The grid must not be empty.
     pub(crate) fn sample(&self, u: Vec2) -> (Vec2, f32) {
         let (row, p_row, v) = self.rows.choose(u.y);
         let (column, p_column, w) = self.columns[row].choose(u.x);

@@ -1,30 +1,31 @@
-//! Instances: from object space to the world.
+//! Transforms of instances from object space to the world, with bounds of rounding errors.
 
 use glam::{Affine3A, Mat3, Vec3, Vec3A};
 
 use crate::accel::abs;
 use crate::numbers::numbers;
 
-/// γ(n) of Higham: bound of the relative error of n roundings.
+/// γ(n) after Higham: the bound of the relative error of n roundings.
 pub(crate) const fn gamma(n: f32) -> f32 {
     let e = n * f32::EPSILON * 0.5;
     e / (1.0 - e)
 }
 
-/// Relative errors of a point between three corners, and of one that is transformed, each twice.
+/// Relative errors, twice each: of a point interpolated between three corners, and of a transformed
+/// point.
 const OF_CORNERS: f32 = 2.0 * (gamma(16.0) + gamma(4.0));
 const OF_TRANSFORMS: f32 = 2.0 * gamma(4.0);
 
-/// What tracing needs to know of an instance beside its triangles.
+/// An instance's transforms and error bounds.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frames {
     world_from_object: Mat3,
     translation: Vec3,
-    /// Inverse transpose, for normals.
+    /// Inverse transpose of `world_from_object`, for normals.
     normal_from_object: Mat3,
-    /// Bound of the rounding that a point gets from a metre of its largest world coordinate, metres.
+    /// Bound of the rounding error for each metre of the point's largest world coordinate, by axis.
     rounding_by_place: Vec3,
-    /// And from where the instance is.
+    /// Bound of the rounding error due to the instance's translation, metres, by axis.
     rounding: Vec3,
 }
 
@@ -45,7 +46,7 @@ impl Frames {
         }
     }
 
-    /// World normal of an object-space normal: unit length, or zero where that has no direction.
+    /// World normal of an object-space normal: unit length, or zero where its length is zero.
     #[inline(always)]
     pub(crate) fn normal(&self, object: Vec3) -> Vec3 {
         (self.normal_from_object * object).normalize_or_zero()
@@ -56,16 +57,16 @@ impl Frames {
         self.world_from_object * object + self.translation
     }
 
-    /// Bound of [`Self::error`] wherever no coordinate is beyond `extent`, metres.
+    /// Upper limit of [`Self::error`] for points whose coordinates are within ±`extent`, metres.
     pub(crate) fn error_within(&self, extent: f32) -> f32 {
-        // What bounds the transform's errors bounds the size of corners as well.
+        // The bound of the transform's errors also bounds the size of corners.
         let of_transforms = extent * self.rounding_by_place + self.rounding;
         (1.0 + OF_CORNERS / OF_TRANSFORMS) * of_transforms.max_element()
     }
 
-    /// How far from the true surface a computed point of a triangle may lie, a component each:
-    /// errors of interpolating, of transforming to the world, and of transforming the next ray's
-    /// origin back (Pharr, Jakob and Humphreys 2023, section 6.8).
+    /// Bound of the distance between a computed point of a triangle and the true surface, by axis,
+    /// metres. It covers interpolation, the transform to the world, and the transform of the next
+    /// ray's origin back (Pharr, Jakob and Humphreys 2023, section 6.8).
     #[inline(always)]
     pub(crate) fn error(&self, corners: [Vec3; 3], world: Vec3) -> Vec3 {
         let [a, b, c] = corners.map(Vec3::abs);

@@ -1,4 +1,4 @@
-//! Where a ray has arrived: position and normals.
+//! Position and normals of a hit.
 
 use glam::Vec3;
 
@@ -6,13 +6,13 @@ use super::Frames;
 use crate::accel::Ray;
 use crate::numbers::numbers;
 
-/// Where on a surface a ray has arrived.
+/// The place on a surface where a ray has arrived.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HitPoint {
-    /// World.
+    /// World position, relative to the snapshot's origin, metres.
     pub(crate) position: Vec3,
-    /// Unit normal of the triangle on the side that the ray came from; zero for triangles so thin that
-    /// they have none.
+    /// Unit normal of the triangle, on the side that the ray came from. Zero for triangles so thin
+    /// that they have none.
     pub(crate) normal: Vec3,
     /// Bound of the position's error along the normal, metres.
     offset: f32,
@@ -23,8 +23,8 @@ pub(crate) struct HitPoint {
 numbers!(HitPoint of f32 { position: Vec3, normal: Vec3, offset: f32, side: f32 });
 
 impl HitPoint {
-    /// The place on a triangle with these corners (object space) and weights; `direction` is the unit
-    /// direction of the ray.
+    /// The place on a triangle with these corners (object space) and weights. `direction` is the
+    /// unit direction of the ray.
     #[inline(always)]
     pub(crate) fn new(frames: &Frames, corners: [Vec3; 3], weights: Vec3, direction: Vec3) -> Self {
         let [a, b, c] = corners;
@@ -41,17 +41,17 @@ impl HitPoint {
         self.side > 0.0
     }
 
-    /// Where a ray along `direction` starts: off the surface by as much as rounding may have put
-    /// the position on its other side.
+    /// Origin of a ray that leaves along `direction`. It lies off the surface by the bound of the
+    /// position's rounding error, so the ray does not meet its own surface.
     #[inline(always)]
     pub(crate) fn leave(&self, direction: Vec3) -> Vec3 {
         let side = 1.0f32.copysign(direction.dot(self.normal));
         self.position + side * self.offset * self.normal
     }
 
-    /// The ray that reaches from here for what lies so many metres away in a unit direction; infinitely
-    /// many for what has no place. It leads from where it starts, off the surface, to the same point, and
-    /// ends before that by as much as rounding may have moved a surface that the point lies in.
+    /// A shadow ray to a point at `distance` metres in a unit direction, or to infinity. It starts
+    /// off the surface and leads to the same point. It ends before the point by the bound of
+    /// rounding, so it does not meet a surface that holds the point.
     #[inline(always)]
     pub(crate) fn reach(&self, direction: Vec3, distance: f32) -> Ray {
         let origin = self.leave(direction);
@@ -62,7 +62,8 @@ impl HitPoint {
         Ray { t_max: (ray.t_max - self.offset).max(0.0), ..ray }
     }
 
-    /// The shading normal (unit, world) on the ray's side, which came from `view` (unit).
+    /// The unit world-space shading normal, bent to face `view`: the unit direction that the ray
+    /// came from.
     #[inline(always)]
     pub(crate) fn shading_normal(
         &self,
@@ -74,7 +75,7 @@ impl HitPoint {
         self.facing(self.unbent_normal(frames, vertex_normal, bump), view)
     }
 
-    /// The shading normal before it is bent to face a ray.
+    /// The unit world-space shading normal on the ray's side, before it is bent to face a ray.
     #[inline(always)]
     pub(crate) fn unbent_normal(&self, frames: &Frames, vertex: Vec3, bump: &Bump) -> Vec3 {
         let shading = frames.normal(bump.bend(vertex));
@@ -82,8 +83,8 @@ impl HitPoint {
         if n == Vec3::ZERO { self.normal } else { n }
     }
 
-    /// A shading normal bent as little as makes it face `view`: normal maps and coarse meshes would
-    /// else show their back.
+    /// Bends a shading normal as little as possible so that it faces `view`. Otherwise normal maps
+    /// and coarse meshes would show their backs.
     #[inline(always)]
     pub(crate) fn facing(&self, unbent: Vec3, view: Vec3) -> Vec3 {
         const LEAST: f32 = 1e-3;
@@ -95,21 +96,21 @@ impl HitPoint {
     }
 }
 
-/// A normal map's normal, and the frame that it is in.
+/// A normal map's normal and its tangent frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bump {
-    /// Object space.
+    /// Tangent in object space.
     pub(super) tangent: Vec3,
-    /// Of the bitangent, ±1.
+    /// Sign of the bitangent, ±1.
     pub(super) sign: f32,
-    /// In the frame of tangent, bitangent and vertex normal.
+    /// Normal in the frame of tangent, bitangent and vertex normal.
     pub(super) normal: Vec3,
 }
 
 numbers!(Bump of f32 { tangent: Vec3, sign: f32, normal: Vec3 });
 
 impl Bump {
-    /// Leaves normals as they are.
+    /// A flat normal map, which keeps normals as they are.
     pub(crate) const FLAT: Self = Self { tangent: Vec3::ZERO, sign: 1.0, normal: Vec3::Z };
 
     /// The shading normal in object space, of any length.
@@ -121,14 +122,14 @@ impl Bump {
     }
 }
 
-/// At weights of a triangle's vertices.
+/// A vertex attribute at these weights.
 #[inline(always)]
 pub(crate) fn interpolate([a, b, c]: [Vec3; 3], weights: Vec3) -> Vec3 {
     weights.x * a + weights.y * b + weights.z * c
 }
 
-/// A cross product that neither overflows nor vanishes for very large or small triangles; only its
-/// direction counts.
+/// A cross product scaled so that it neither overflows nor underflows for very large or small
+/// triangles. Only its direction has a meaning.
 #[inline(always)]
 pub(crate) fn scaled_cross(a: Vec3, b: Vec3) -> Vec3 {
     let largest = a.abs().max(b.abs()).max_element();

@@ -1,4 +1,4 @@
-//! What a ray has met: position, normals and material at a hit.
+//! Position, normals and material at a ray's hit.
 
 mod frames;
 mod hit_point;
@@ -15,25 +15,26 @@ pub(crate) use frames::{Frames, gamma};
 pub(crate) use hit_point::{Bump, HitPoint, interpolate, scaled_cross};
 pub(crate) use triangle::{Spot, Triangle};
 
-/// Which materials to believe.
+/// The material model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MaterialModel {
-    /// The materials as glTF describes them.
+    /// Materials as glTF describes them.
     #[default]
     Full,
-    /// Every surface an opaque two-sided Lambert one with its base colour, shaded by vertex normals
-    /// without normal maps, emitting from its front only: for comparisons with other renderers.
+    /// Every surface is opaque, two-sided and Lambert with its base colour. It is shaded by vertex
+    /// normals without normal maps and emits from its front only. For comparisons with other
+    /// renderers.
     Lambert,
 }
 
-/// A point on a surface that a ray has met, looked at alone.
+/// A point on a surface that a ray has met.
 pub(crate) struct Point<'a> {
     pub(crate) place: HitPoint,
     pub(crate) spot: Spot<'a>,
     /// The vertex normal there, object space.
     vertex_normal: Vec3,
     frames: &'a Frames,
-    /// Towards where the ray came from, unit.
+    /// Unit direction towards the ray's origin.
     view: Vec3,
 }
 
@@ -60,15 +61,15 @@ impl<'a> Point<'a> {
         self.spot.emission_seen(self.place.is_front(), model)
     }
 
-    /// How it scatters, and the normal that it is shaded by, on the ray's side but not yet bent to face
-    /// it; `None` where it scatters nothing.
+    /// The BSDF, and the shading normal on the ray's side, not yet bent to face the ray. `None`
+    /// where the surface scatters nothing.
     pub(crate) fn scattering(&self, model: MaterialModel) -> Option<(Bsdf, Vec3)> {
         let bsdf = self.spot.bsdf(self.place.is_front(), model)?;
         let bump = self.spot.bump(model);
         Some((bsdf, self.place.unbent_normal(self.frames, self.vertex_normal, &bump)))
     }
 
-    /// The normal that it is shaded by, on the ray's side; `None` where it scatters nothing.
+    /// The shading normal, bent to face the ray; `None` where the surface scatters nothing.
     pub(crate) fn shading_normal(&self, model: MaterialModel) -> Option<Vec3> {
         self.scattering(model).map(|(_, normal)| self.place.facing(normal, self.view))
     }

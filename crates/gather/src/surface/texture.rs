@@ -1,5 +1,5 @@
-//! Looking up textures. Level 0 only: a probe's samples average over the texture as well as a
-//! smaller level would.
+//! Texture lookups. Only mip level 0 is used: a probe's samples average over the texture as well as
+//! a smaller level would.
 
 use std::sync::LazyLock;
 
@@ -8,10 +8,10 @@ use lumencast_scene::{Filter, Image, TextureRef, Wrap};
 
 use crate::accel::fetch_ahead;
 
-/// What each code of eight bits stands for.
+/// The value of each 8-bit code.
 type Decoded = [f32; 256];
 
-/// sRGB codes to linear, IEC 61966-2-1.
+/// Linear values of sRGB codes (IEC 61966-2-1).
 static LINEAR_FROM_SRGB: LazyLock<Decoded> = LazyLock::new(|| {
     std::array::from_fn(|code| {
         let c = code as f32 / 255.0;
@@ -19,7 +19,7 @@ static LINEAR_FROM_SRGB: LazyLock<Decoded> = LazyLock::new(|| {
     })
 });
 
-/// Codes as fractions of the greatest.
+/// Codes divided by 255.
 static FRACTIONS: Decoded = {
     let mut fractions = [0.0; 256];
     let mut code = 0;
@@ -30,12 +30,12 @@ static FRACTIONS: Decoded = {
     fractions
 };
 
-/// How the RGB of a texture is coded; alpha is always linear.
+/// The coding of a texture's RGB; alpha is always linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Coding {
-    /// Colours.
+    /// sRGB, for colours.
     Srgb,
-    /// Everything else.
+    /// Linear, for everything else.
     Linear,
 }
 
@@ -48,7 +48,7 @@ impl Coding {
     }
 }
 
-/// The texture at mesh coordinates `uv` (before KHR_texture_transform).
+/// Samples a texture at mesh coordinates `uv`, before KHR_texture_transform.
 #[inline]
 pub(crate) fn sample(texture: &TextureRef, uv: Vec2, coding: Coding) -> Vec4 {
     let image = &*texture.image;
@@ -67,7 +67,7 @@ pub(crate) fn sample(texture: &TextureRef, uv: Vec2, coding: Coding) -> Vec4 {
         Filter::Linear => {
             let at = at - 0.5;
             let (x, y) = (below(at.x), below(at.y));
-            // Beyond ±2³¹ texels there is nothing to blend.
+            // Beyond ±2³¹ texels the index saturates, so the fractions are clamped.
             let f = Vec2::new(at.x - x as f32, at.y - y as f32).clamp(Vec2::ZERO, Vec2::ONE);
             let [left, right] = [column(x), column(x.wrapping_add(1))];
             let along = |y| texel(image, left, y, rgb).lerp(texel(image, right, y, rgb), f.x);
@@ -76,21 +76,23 @@ pub(crate) fn sample(texture: &TextureRef, uv: Vec2, coding: Coding) -> Vec4 {
     }
 }
 
-/// Where mesh coordinates lie in the texture, in texels from its corner.
+/// Converts mesh coordinates to texels from the texture's corner.
 #[inline]
 fn in_texels(texture: &TextureRef, uv: Vec2) -> Vec2 {
     let size = Vec2::new(texture.image.width as f32, texture.image.height as f32);
     texture.texture_from_mesh.transform_point2(uv) * size
 }
 
-/// The whole number at or below, without a call of the library where the processor may not round.
+/// The largest integer at or below `x`. Unlike `f32::floor` it needs no library call on processors
+/// without a rounding instruction.
 #[inline]
 fn below(x: f32) -> i32 {
     let toward_zero = x as i32;
     toward_zero.saturating_sub(i32::from(toward_zero as f32 > x))
 }
 
-/// Asks for the texels that [`sample`] reads; the next in a row is mostly in the same line.
+/// Prefetches the texels that [`sample`] reads. The next texel in a row is mostly in the same cache
+/// line.
 #[inline]
 pub(crate) fn fetch_texels(texture: &TextureRef, uv: Vec2) {
     let image = &*texture.image;
@@ -103,7 +105,7 @@ pub(crate) fn fetch_texels(texture: &TextureRef, uv: Vec2) {
     }
 }
 
-/// White beyond the image's end.
+/// A texel's value; white beyond the image's end.
 #[inline]
 fn texel(image: &Image, column: usize, row: usize, rgb: &Decoded) -> Vec4 {
     let Some(&[r, g, b, a]) = image.texels.get(row * image.width as usize + column) else {
@@ -113,7 +115,7 @@ fn texel(image: &Image, column: usize, row: usize, rgb: &Decoded) -> Vec4 {
     Vec4::new(r, g, b, FRACTIONS[usize::from(a)])
 }
 
-/// A texel's colour as coded in sRGB, white beyond the image's end.
+/// A texel's sRGB colour in linear values; white beyond the image's end.
 pub(crate) fn color(image: &Image, column: usize, row: usize) -> Vec3 {
     texel(image, column, row, Coding::Srgb.rgb()).truncate()
 }
@@ -137,7 +139,7 @@ fn wrapped_around(i: i32, size: u32, wrap: Wrap) -> usize {
     j as usize
 }
 
-/// Texture coordinates at weights of a triangle's vertices.
+/// Texture coordinates at these weights of a triangle's vertices.
 pub(crate) fn interpolate_uv(uv: &[Vec2], corners: [u32; 3], weights: Vec3) -> Vec2 {
     if uv.is_empty() {
         return Vec2::ZERO;
@@ -172,7 +174,7 @@ mod tests {
         assert_eq!(sample(&t, Vec2::new(0.75, 0.25), Coding::Srgb), Vec4::new(1.0, 1.0, 1.0, 0.0));
         let middle = sample(&t, Vec2::new(0.5, 0.25), Coding::Srgb);
         assert!((middle - Vec4::splat(0.5)).abs().max_element() < 1e-6, "{middle}");
-        // sRGB 188 is half of the light.
+        // The sRGB code 188 is half of the light.
         let half = sample(&t, Vec2::new(0.25, 0.75), Coding::Srgb);
         assert!((half.x - 0.503).abs() < 1e-3, "{half}");
     }

@@ -8,7 +8,7 @@ use super::{Bump, MaterialModel};
 use crate::accel::fetch_ahead;
 use crate::bsdf::{Bsdf, Substance};
 
-/// A triangle's vertices and attributes, wherever they come from.
+/// A triangle's vertices and attributes, at rest or deformed.
 #[derive(Clone, Copy)]
 pub(crate) struct Triangle<'a> {
     primitive: &'a Primitive,
@@ -25,14 +25,14 @@ impl<'a> Triangle<'a> {
         Self { primitive, vertices: instance.vertices(p), corners }
     }
 
-    /// Asks for the indices that [`Self::new`] reads.
+    /// Prefetches the indices that [`Self::new`] reads.
     #[inline]
     pub(crate) fn fetch(instance: &Instance, primitive: u32, triangle: u32) {
         let primitive = &instance.mesh.primitives[primitive as usize];
         fetch_ahead(&primitive.triangles[triangle as usize]);
     }
 
-    /// Asks for the vertices.
+    /// Prefetches the vertices.
     #[inline]
     pub(crate) fn fetch_vertices(&self) {
         for corner in self.corners {
@@ -58,7 +58,7 @@ impl<'a> Triangle<'a> {
         self.corners.map(|i| self.vertices.normals[i as usize])
     }
 
-    /// Its point at weights of the vertices.
+    /// The triangle's point at these weights of its vertices.
     #[inline]
     pub(crate) fn at(self, material: &'a Material, weights: Vec3) -> Spot<'a> {
         let uv = self.primitive.uv.each_ref().map(|uv| interpolate_uv(uv, self.corners, weights));
@@ -87,7 +87,7 @@ impl Spot<'_> {
         texture.map_or(Vec4::ONE, |texture| sample(texture, self.uv(texture), coding))
     }
 
-    /// Asks for the texels.
+    /// Prefetches the texels.
     #[inline]
     pub(crate) fn fetch_texels(&self, model: MaterialModel) {
         let m = self.material;
@@ -125,7 +125,7 @@ impl Spot<'_> {
         self.base_color_and_opacity().truncate().clamp(Vec3::ZERO, Vec3::ONE)
     }
 
-    /// Share of light that does not pass through the holes of the surface, 0 to 1.
+    /// Share of light that the surface blocks, 0 to 1; the rest passes through.
     pub(crate) fn coverage(&self) -> f32 {
         match self.material.alpha_mode {
             AlphaMode::Opaque => 1.0,
@@ -134,7 +134,7 @@ impl Spot<'_> {
         }
     }
 
-    /// Emitted radiance of the front, cd/m².
+    /// Radiance that the front emits, cd/m².
     #[inline]
     pub(crate) fn emission(&self) -> Vec3 {
         let m = self.material;
@@ -144,7 +144,7 @@ impl Spot<'_> {
         m.emissive * self.texture(m.emissive_texture.as_ref(), Coding::Srgb).truncate()
     }
 
-    /// Emitted radiance of the side that is seen, cd/m².
+    /// Radiance that the seen side emits, cd/m².
     #[inline]
     pub(crate) fn emission_seen(&self, front: bool, model: MaterialModel) -> Vec3 {
         let both = self.material.double_sided && model == MaterialModel::Full;
@@ -168,7 +168,7 @@ impl Spot<'_> {
         }
     }
 
-    /// How the surface scatters light; `None` where it scatters nothing: unlit surfaces and backs of
+    /// The BSDF of the seen side. `None` where it scatters nothing: unlit surfaces, and backs of
     /// single-sided ones.
     #[inline]
     pub(crate) fn bsdf(&self, front: bool, model: MaterialModel) -> Option<Bsdf> {
@@ -181,7 +181,7 @@ impl Spot<'_> {
         }
     }
 
-    /// What the material's normal map makes of the normal.
+    /// The material's normal map at this point.
     #[inline]
     pub(crate) fn bump(&self, model: MaterialModel) -> Bump {
         let tangents = &self.triangle.vertices.tangents;

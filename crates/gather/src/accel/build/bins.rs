@@ -1,4 +1,4 @@
-//! The cheapest of a few planes across each axis.
+//! Binned splits: the cheapest of a few planes across each axis.
 
 use std::ops::Range;
 
@@ -8,24 +8,25 @@ use rayon::prelude::*;
 use super::super::Aabb;
 use super::{Extent, Item, LARGE, PARALLEL};
 
-/// Bins along each axis.
+/// Number of bins along each axis.
 const MANY: usize = 16;
-/// Those of ranges of fewer than [`SMALL`] items: most are, and sweeping over bins takes time.
+/// Number of bins for ranges of fewer than [`SMALL`] items. Most ranges are small, and sweeping
+/// over bins takes time.
 const FEW: usize = 8;
 const SMALL: usize = 48;
 
-/// A plane between bins.
+/// A splitting plane between two bins.
 pub(super) struct Plane {
     binning: Binning,
-    /// The first bin on its right, as [`Binning::place`] has it; below all across other axes.
+    /// The first bin on its right, as a number of [`Binning::place`]; −∞ for the other axes.
     first_right: Vec3A,
-    /// Around the items of each side, and how many things they stand for.
+    /// Box around the items of each side, and their number of things.
     pub(super) sides: [(Aabb, f32); 2],
 }
 
 impl Plane {
-    /// The cheapest, and its cost: of testing full leaves, times half the area of their box. Infinite where
-    /// all centres lie in one place.
+    /// The cheapest plane and its cost: the number of full leaves times half the area of their box,
+    /// summed over both sides. The cost is infinite where all centres coincide.
     pub(super) fn cheapest(items: &[Item], extent: &Extent, leaf: f32) -> (f32, Self) {
         if items.len() < SMALL {
             let binning = Binning::new(&extent.centers, FEW);
@@ -43,10 +44,10 @@ impl Plane {
     }
 }
 
-/// 2²³: numbers from here on to twice as much are integers.
+/// 2²³: from here to twice as much, all f32 are integers.
 const INTEGERS: f32 = 8_388_608.0;
 
-/// Which bin an item belongs to, by its centre.
+/// Maps items to bins by their centres.
 #[derive(Clone, Copy)]
 struct Binning {
     origin: Vec3A,
@@ -62,8 +63,8 @@ impl Binning {
         Self { origin: centers.min, scale, last: Vec3A::splat(bins as f32 - 1.0) }
     }
 
-    /// The bin along each axis, as numbers. Adding 2²³ rounds to the nearest integer, and leaves it in
-    /// the last bits: conversions that saturate take several times as long.
+    /// The bin along each axis, plus 2²³. The addition rounds to the nearest integer and leaves it
+    /// in the lowest bits. Conversions that saturate take several times as long.
     #[inline]
     fn place(&self, item: &Item) -> Vec3A {
         let place = (item.center_twice() - self.origin) * self.scale - 0.5;
@@ -71,7 +72,7 @@ impl Binning {
     }
 }
 
-/// Boxes and numbers of things by bin, along each axis.
+/// Boxes and numbers of things in each bin, along each axis.
 struct Bins<const N: usize> {
     bounds: [[Aabb; 3]; N],
     counts: [Vec3A; N],
@@ -108,9 +109,9 @@ impl<const N: usize> Bins<N> {
         self
     }
 
-    /// The cheapest plane along any axis, and its cost (times area); infinite where there is none.
+    /// The cheapest plane along any axis, and its cost times area; infinite where there is none.
     fn cheapest(&self, binning: Binning, leaf: f32) -> (f32, Plane) {
-        // All axes at once. Where a side is empty, its area comes out infinite.
+        // All axes are computed at once. The area of an empty side comes out infinite.
         let mut above = [Vec3A::ZERO; N];
         let mut side = Sides::EMPTY;
         for bin in (1..N).rev() {
@@ -142,7 +143,7 @@ impl<const N: usize> Bins<N> {
     }
 }
 
-/// What lies on one side of planes across the three axes.
+/// Contents of one side of three planes, one across each axis.
 struct Sides {
     bounds: [Aabb; 3],
     count: Vec3A,
@@ -158,7 +159,7 @@ impl Sides {
         self.count += count;
     }
 
-    /// As of [`Plane::cheapest`].
+    /// Cost of the side for each axis, as in [`Plane::cheapest`].
     fn cost(&self, leaf: f32) -> Vec3A {
         let faces = |bounds: &Aabb| {
             let size = bounds.max - bounds.min;

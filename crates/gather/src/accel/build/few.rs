@@ -1,20 +1,20 @@
-//! The best of all ways to part a few items.
+//! Optimal splits of a few items: all ways are tried.
 
 use super::super::Aabb;
 use super::{Item, leaf_cost};
 
-/// Most items that are parted so: up to here it takes less time than planes do.
+/// Greatest number of items that are split this way; up to here it is faster than planes are.
 pub(super) const FEW: usize = 4;
 
-/// Items on the left (those whose bits are set), and the cost of both sides: of testing full leaves,
-/// times half the area of their box.
+/// The items on the left, as a set of bits, and the cost of both sides. The cost is the number of
+/// full leaves times half the area of their box.
 pub(super) struct Parting {
     left: usize,
     pub(super) cost: f32,
 }
 
 impl Parting {
-    /// The cheapest. Two items at least, [`FEW`] at most.
+    /// The cheapest split of 2 to [`FEW`] items.
     pub(super) fn cheapest(items: &[Item], leaf: f32) -> Self {
         match items {
             [a, b] => Self::of::<2, 4>([a, b], leaf),
@@ -24,7 +24,7 @@ impl Parting {
         }
     }
 
-    /// `SETS`: 2 to the power of `N`.
+    /// The cheapest split; `SETS` must be 2 to the power of `N`.
     fn of<const N: usize, const SETS: usize>(items: [&Item; N], leaf: f32) -> Self {
         let mut bounds = [Aabb::EMPTY; SETS];
         let mut costs = [0.0; SETS];
@@ -35,14 +35,14 @@ impl Parting {
             counts[set] = counts[rest] + item.count() as f32;
             costs[set] = bounds[set].half_area() * leaf_cost(counts[set], leaf);
         }
-        // The last item stays on the right, so that none is looked at twice.
+        // The last item stays on the right, so that each split is tried once.
         let cost = |left: usize| costs[left] + costs[SETS - 1 - left];
         (2..SETS / 2).fold(Self { left: 1, cost: cost(1) }, |best, left| {
             if cost(left) < best.cost { Self { left, cost: cost(left) } } else { best }
         })
     }
 
-    /// Brings the left side to the front; how many they are.
+    /// Moves the left side to the front; returns its number of items.
     pub(super) fn bring_left(&self, items: &mut [Item]) -> usize {
         let mut middle = 0;
         for n in 0..items.len() {
@@ -60,7 +60,7 @@ mod tests {
     use super::super::tests::items;
     use super::*;
 
-    /// Every way is tried, box by box.
+    /// No split is cheaper: the test tries every one, box by box.
     #[test]
     fn no_way_to_part_is_cheaper() {
         let all = items(600);

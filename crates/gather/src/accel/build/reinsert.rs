@@ -1,24 +1,25 @@
-//! Better binary trees: subtrees are put where they add less surface (Bittner, Hapala and Havran 2013,
-//! "Fast insertion-based optimization of bounding volume hierarchies"), which is looked for from
-//! where they are upwards, many at once (Meister and Bittner 2018, "Parallel reinsertion for bounding
-//! volume hierarchy optimization").
+//! Improves binary trees: moves subtrees to where they add less surface (Bittner, Hapala and Havran
+//! 2013, "Fast insertion-based optimization of bounding volume hierarchies"). The search starts at
+//! a subtree's place and goes upwards, for many subtrees in parallel (Meister and Bittner 2018,
+//! "Parallel reinsertion for bounding volume hierarchy optimization").
 
 use rayon::prelude::*;
 
 use super::{Aabb, BinaryNode, BinaryTree, DEEPEST, INNER};
 use crate::accel::pages::Pages;
 
-/// In each round one of so many subtrees is looked at, those with most surface: the others bring little.
+/// A round examines one in this many subtrees, those with the largest surface; the others gain
+/// little.
 const SHARE: usize = 10;
-/// Most rounds.
+/// Greatest number of rounds.
 const ROUNDS: usize = 12;
-/// A round that takes less than this share of all surface away is the last.
+/// A round that removes less than this share of all surface is the last.
 const ENOUGH: f32 = 1e-3;
-/// Fewest things to be moved that a thread takes.
+/// Least number of subtrees that a thread examines.
 const FEW: usize = 64;
 
 impl BinaryTree {
-    /// The tree with its subtrees where they add less surface; takes about as long as building it.
+    /// Moves subtrees to where they add less surface; takes about as long as building the tree.
     pub(in crate::accel) fn improved(self) -> Self {
         let mut nodes = Vec::with_capacity(self.len());
         add(&mut nodes, &self.nodes, NONE);
@@ -40,17 +41,17 @@ impl BinaryTree {
     }
 }
 
-/// In place of a node.
+/// Index that stands for no node.
 const NONE: u32 = u32::MAX;
 const ROOT: u32 = 0;
 
-/// A tree whose nodes may lie anywhere, but for the root.
+/// A tree whose nodes may lie in any order; the root is the first.
 struct Loose(Vec<LooseNode>);
 
 #[derive(Clone, Copy)]
 struct LooseNode {
     bounds: Aabb,
-    /// Half of the surface.
+    /// Half of the surface area.
     area: f32,
     parent: u32,
     below: Below,
@@ -59,7 +60,7 @@ struct LooseNode {
 #[derive(Clone, Copy)]
 enum Below {
     Nodes([u32; 2]),
-    /// So many, from a first one on.
+    /// Items of the tree, `count` of them from `first` on.
     Items {
         first: u32,
         count: u32,
@@ -69,14 +70,14 @@ enum Below {
 /// A better place for a subtree.
 #[derive(Clone, Copy)]
 struct Move {
-    /// How much surface it takes away.
+    /// The half surface area that it removes.
     gain: f32,
     node: u32,
-    /// What it is to share a parent with.
+    /// The node that is to become its sibling.
     beside: u32,
 }
 
-/// Adds a subtree to the nodes; its index.
+/// Appends a subtree to the nodes; returns its index.
 fn add(nodes: &mut Vec<LooseNode>, tree: &[BinaryNode], parent: u32) -> u32 {
     let BinaryNode { min, max, first, rest } = tree[0];
     let bounds = Aabb { min: min.into(), max: max.into() };
@@ -100,7 +101,7 @@ impl Loose {
         self.at(node).parent
     }
 
-    /// The other one below its parent, which it must have.
+    /// The other child of its parent; the node must have a parent.
     fn sibling(&self, node: u32) -> u32 {
         match self.at(self.parent(node)).below {
             Below::Nodes([left, right]) if left == node => right,
@@ -109,7 +110,7 @@ impl Loose {
         }
     }
 
-    /// Whether a node is another one or lies below it.
+    /// Whether a node is `other` or lies below it.
     fn is_within(&self, mut node: u32, other: u32) -> bool {
         while node != NONE && node != other {
             node = self.parent(node);
@@ -117,8 +118,8 @@ impl Loose {
         node == other
     }
 
-    /// Moves subtrees, none of which another one's move has touched; how much surface that takes away, if
-    /// they do not get into each other's way.
+    /// Moves subtrees, best first. It skips moves that touch a node of an earlier move. Returns the
+    /// surface area that the moves remove if they do not influence each other.
     fn improve(&mut self) -> f32 {
         let has_grandparent = |&n: &u32| ![ROOT, NONE].contains(&self.parent(n));
         let mut largest: Vec<u32> = (0..self.0.len() as u32).filter(has_grandparent).collect();
@@ -148,14 +149,14 @@ impl Loose {
         gain
     }
 
-    /// The place where a node that has a grandparent takes most surface away, if any takes some.
+    /// The best new place for a node that has a grandparent; `None` where no place removes surface.
     fn better_place(&self, node: u32) -> Option<Move> {
         let LooseNode { bounds, area, parent, .. } = *self.at(node);
         let mut best = Move { gain: 0.0, node, beside: NONE };
-        // What is saved above the place that is looked at, once the node's parent is gone and all above
-        // it fits.
+        // Surface saved above the place that is examined, once the node's parent is gone and all
+        // boxes above fit.
         let mut saved = self.at(parent).area;
-        // What fits around what is left below the pivot.
+        // Box around what remains below the pivot.
         let mut left = self.at(self.sibling(node)).bounds;
         let (mut pivot, mut beside) = (parent, self.sibling(node));
         let mut open = Vec::with_capacity(64);
@@ -166,13 +167,13 @@ impl Loose {
                     continue;
                 }
                 let place = self.at(beside);
-                // The parent that both would have.
+                // The box of the node's new parent at this place.
                 let gain = saved - place.bounds.union(bounds).half_area();
                 if gain > best.gain {
                     best = Move { gain, beside, ..best };
                 }
                 if let Below::Nodes(sides) = place.below {
-                    // Farther below, this one would be as large as that parent.
+                    // Farther below, this place grows to the box of that parent.
                     open.extend(sides.map(|side| (gain + place.area, side)));
                 }
             }
@@ -190,7 +191,7 @@ impl Loose {
         is_elsewhere.then_some(best)
     }
 
-    /// Its parent goes along.
+    /// Moves a node, together with its parent, beside another node.
     fn reinsert(&mut self, Move { node, beside, .. }: Move) {
         let (parent, sibling) = (self.parent(node), self.sibling(node));
         let grandparent = self.parent(parent);
@@ -202,7 +203,7 @@ impl Loose {
         self.fit(parent);
     }
 
-    /// Puts a node where another one is.
+    /// Puts the node `to` in the place of `from`.
     fn replace(&mut self, from: u32, to: u32) {
         let parent = self.parent(from);
         self.0[to as usize].parent = parent;
@@ -211,7 +212,7 @@ impl Loose {
         }
     }
 
-    /// Fits a node, and all above it, around what is below.
+    /// Refits the boxes of a node and all nodes above it.
     fn fit(&mut self, mut node: u32) {
         while node != NONE {
             if let Below::Nodes(sides) = self.at(node).below {
@@ -224,7 +225,7 @@ impl Loose {
         }
     }
 
-    /// Levels of nodes.
+    /// Number of levels of nodes.
     fn depth(&self) -> u32 {
         let mut deepest = 0;
         let mut open = vec![(ROOT, 1)];
@@ -237,7 +238,7 @@ impl Loose {
         deepest
     }
 
-    /// Puts a subtree into places from one on; the one behind it.
+    /// Writes a subtree to places from `at` on; returns the index behind it.
     fn put(&self, node: u32, places: &mut [BinaryNode], at: usize) -> usize {
         let LooseNode { bounds, below, .. } = *self.at(node);
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
@@ -263,7 +264,7 @@ mod tests {
     use super::*;
     use crate::accel::tests::random;
 
-    /// Long and thin boxes every which way, as of houses.
+    /// Long and thin boxes along each axis, like parts of houses.
     fn beams(count: u32) -> Vec<Item> {
         let beam = |n: u32| {
             let min = Vec3A::from(random(60, n));
@@ -308,7 +309,7 @@ mod tests {
         }
     }
 
-    /// What a move is said to gain is what it gains.
+    /// A move's stated gain is the surface area that it removes.
     #[test]
     fn gains_are_what_they_are_said_to_be() {
         let tree = BinaryTree::new(beams(500).into(), 4);
@@ -334,7 +335,7 @@ mod tests {
         assert!(moved > 20, "{moved}");
     }
 
-    /// Boxes that are all the same, without a size, or in a row each twice as large as the one before.
+    /// Equal boxes, boxes without size, and boxes in a row, each twice as large as the one before.
     #[test]
     fn strange_boxes() {
         let cube = |at: f32, size: f32| Aabb {

@@ -1,4 +1,4 @@
-//! Which blocks lie over which cells, and what covers them.
+//! Fills the cells: which blocks lie over which cells, and what covers them.
 
 use std::ops::Range;
 
@@ -10,21 +10,23 @@ use crate::accel::Accel;
 use crate::accel::pages::Pages;
 use crate::accel::triangle_bvh::Block;
 
-/// Most cells along a side.
+/// Greatest number of cells along a side.
 const SIDE: usize = 4096;
-/// Most blocks that a cell lists: to walk the tree takes as long as to test some twenty.
+/// Greatest number of blocks that a cell lists. Walking the tree costs as much as testing about
+/// twenty.
 const LISTED: u8 = 32;
-/// Blocks over a place on average beyond which cells become fewer, so that filling them ends.
+/// Average number of blocks over a place beyond which there are fewer cells, to bound the time of
+/// filling.
 const DEEP: f64 = 64.0;
-/// Rows that are filled together.
+/// Number of rows that are filled together.
 const BAND: usize = 16;
 
 impl Cells {
-    /// Divides a rectangle into about so many cells, fewer where very much lies over each other, and
-    /// lists blocks over them. `shape` tells how the rays see the triangle of a block's lane, if they
-    /// can meet it; `is_opaque` tells of the primitives (instance, primitive) whose triangles stop all of
-    /// them that do not start at them. `None` where the structure is not a single hierarchy in the
-    /// world, or is empty.
+    /// Divides a rectangle into about `count` cells, fewer where many blocks overlap, and lists the
+    /// blocks over each. `shape` gives the triangle of a block's lane as the rays see it, `None` if
+    /// they cannot meet it. `is_opaque` tells whether the triangles of a primitive (instance,
+    /// primitive) stop all rays that do not start at them. `None` where the structure is not a
+    /// single hierarchy in the world, or is empty.
     pub(in crate::accel) fn over(
         accel: &Accel,
         rectangle: &Flat,
@@ -67,19 +69,20 @@ impl Cells {
     }
 }
 
-/// Where cells lie across the rays.
+/// The grid of cells across the rays.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     /// Least coordinates of the first cell.
     low: [f32; 2],
-    /// Along either side.
+    /// Number of cells in a unit of length, along both axes.
     cells_a_unit: f32,
     columns: usize,
     rows: usize,
 }
 
 impl Grid {
-    /// Of so many cells over a rectangle, or fewer; `None` where that is not finite.
+    /// A grid of at most about `count` cells over a rectangle; `None` where the rectangle is not
+    /// finite.
     fn new(over: &Flat, count: f64) -> Option<Self> {
         let low = over.low.map(|v| v as f32);
         let size: [f64; 2] = std::array::from_fn(|k| over.high[k] - f64::from(low[k]));
@@ -93,7 +96,7 @@ impl Grid {
         Some(Self { low, cells_a_unit, columns, rows })
     }
 
-    /// The cell at a place, row by row; `None` beyond them.
+    /// Index of the cell at a place, row by row; `None` outside the grid.
     #[inline(always)]
     pub(super) fn cell(&self, at: [f32; 2]) -> Option<usize> {
         let [x, y] = [0, 1].map(|k| (at[k] - self.low[k]) * self.cells_a_unit);
@@ -101,21 +104,21 @@ impl Grid {
         is_within.then(|| y as usize * self.columns + x as usize)
     }
 
-    /// Of a cell.
+    /// Side of a cell.
     fn side(&self) -> f64 {
         1.0 / f64::from(self.cells_a_unit)
     }
 
-    /// Where a row or column begins.
+    /// Coordinate at which a row or column begins.
     fn line(&self, axis: usize, n: usize) -> f64 {
         f64::from(self.low[axis]) + self.side() * n as f64
     }
 
-    /// Those rows or columns of so many that lie between two coordinates, in part or whole.
+    /// Indices below `count` of the rows or columns that meet an interval of coordinates.
     fn indices(&self, axis: usize, [from, to]: [f64; 2], count: usize) -> Range<usize> {
         let index = |at| (at - f64::from(self.low[axis])) * f64::from(self.cells_a_unit);
         let (first, last) = (index(from), index(to));
-        // What is negative becomes 0.
+        // The conversion turns negative numbers into 0.
         first as usize..if last < 0.0 { 0 } else { (last as usize).saturating_add(1).min(count) }
     }
 }
@@ -126,17 +129,17 @@ struct Band {
     rows: Range<usize>,
     margins: Margins,
     filled: Vec<Filling>,
-    /// With the cell that it is listed for.
+    /// Blocks in the order of listing, each with its cell.
     listed: Vec<(u32, Listed)>,
 }
 
-/// A cell while it is filled.
+/// A cell during filling.
 #[derive(Clone, Copy)]
 struct Filling {
     covered_below: f32,
-    /// Where its latest block is listed.
+    /// Index of its latest entry in `listed`.
     latest: u32,
-    /// How many are; no more than one too many.
+    /// Number of its entries; at most one more than [`LISTED`].
     count: u8,
 }
 
@@ -147,7 +150,7 @@ impl Band {
         Self { grid, rows, margins, filled, listed: Vec::new() }
     }
 
-    /// What matters to it.
+    /// The rectangle of its cells, grown by the margin.
     fn reach(&self) -> Flat {
         let line = |axis, n| self.grid.line(axis, n);
         let reach = Flat {
@@ -157,13 +160,13 @@ impl Band {
         reach.grown(self.margins.aside)
     }
 
-    /// The lines on both sides of a row or column, moved apart by the margin.
+    /// The two lines that bound a row or column, moved apart by the margin.
     fn lines(&self, axis: usize, n: usize) -> [f64; 2] {
         let aside = self.margins.aside;
         [self.grid.line(axis, n) - aside, self.grid.line(axis, n + 1) + aside]
     }
 
-    /// Those of its rows that a triangle may lie in.
+    /// The band's rows that a triangle may lie in.
     fn rows_of(&self, shape: &Shape) -> Range<usize> {
         let rows = self.grid.indices(1, self.grown(shape.rows()), self.rows.end);
         rows.start.max(self.rows.start)..rows.end
@@ -177,7 +180,7 @@ impl Band {
         [low - self.margins.aside, high + self.margins.aside]
     }
 
-    /// The middle of a cell, and how far a point for which it is looked up may be from there.
+    /// The centre of a cell, and the greatest distance along an axis of points that look it up.
     fn middle(&self, row: usize, column: usize) -> ([f64; 2], f64) {
         let half = 0.5 * self.grid.side();
         let at = [self.grid.line(0, column) + half, self.grid.line(1, row) + half];
@@ -188,7 +191,7 @@ impl Band {
         (row - self.rows.start) * self.grid.columns + column
     }
 
-    /// Covers what an opaque triangle fills.
+    /// Covers the cells that an opaque triangle fills.
     fn cover(&mut self, shape: &Shape) {
         if !shape.has_slope() {
             return;
@@ -215,8 +218,8 @@ impl Band {
         }
     }
 
-    /// Lists a block over the cells that one of its triangles touches, but for those covered above
-    /// it. All triangles of a block must follow each other.
+    /// Lists a block for the cells that one of its triangles touches, except where a cover lies
+    /// above it. All triangles of a block must be listed one after the other.
     fn list(&mut self, block: u32, shape: &Shape) {
         let highest = shape.highest();
         let Margins { above: margin, share, .. } = self.margins;
@@ -227,7 +230,7 @@ impl Band {
             }
             for column in self.columns(self.grown([left, right])) {
                 let ([x, y], reach) = self.middle(row, column);
-                // Passes over what is no number.
+                // `min` ignores a height that is NaN.
                 let here = highest.min(shape.height_at(x, y) + shape.rise_within(reach));
                 let height = above(here + margin + share * here.abs());
                 let n = self.cell(row, column);
@@ -247,7 +250,8 @@ impl Band {
         }
     }
 
-    /// Its cells, whose lists begin at 0, and what they list, each cell's highest first.
+    /// Its cells, with list starts relative to the band, and their entries, each cell's highest
+    /// first.
     fn finish(mut self) -> (Vec<Cell>, Vec<Listed>) {
         self.listed.sort_unstable_by(|(cell, a), (other, b)| {
             cell.cmp(other).then(b.height.total_cmp(&a.height)).then(a.block.cmp(&b.block))
@@ -269,18 +273,18 @@ impl Band {
     }
 }
 
-/// A number of 32 bits that is not greater.
+/// The greatest f32 that is not above the number.
 fn below(number: f64) -> f32 {
     let near = number as f32;
     if f64::from(near) > number { near.next_down() } else { near }
 }
 
-/// A number of 32 bits that is not less.
+/// The least f32 that is not below the number.
 fn above(number: f64) -> f32 {
     -below(-number)
 }
 
-/// All bands' cells and what they list, and the cell that ends the last one's list.
+/// The cells and entries of all bands, and the cell that ends the last list.
 fn joined(bands: &[(Vec<Cell>, Vec<Listed>)]) -> (Pages<Cell>, Pages<Listed>) {
     let sum = |of: fn(&(Vec<Cell>, Vec<Listed>)) -> usize| bands.iter().map(of).sum();
     let cell_count: usize = sum(|(cells, _)| cells.len());

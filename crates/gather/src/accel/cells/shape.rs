@@ -1,4 +1,4 @@
-//! A triangle as rays of one kind see it.
+//! A triangle as seen by rays of one kind.
 
 use crate::accel::triangle_bvh::{Block, LANES};
 
@@ -13,7 +13,7 @@ pub(in crate::accel) fn corners(block: &Block, lane: usize) -> [[f64; 3]; 3] {
     block.corners.map(|corner| corner.map(|lanes| f64::from(lanes[lane])))
 }
 
-/// A rectangle across the rays.
+/// A rectangle in the plane across the rays.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::accel) struct Flat {
     pub(in crate::accel) low: [f64; 2],
@@ -24,7 +24,7 @@ impl Flat {
     pub(in crate::accel) const NOTHING: Self =
         Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
 
-    /// Around points, whose last coordinate does not matter.
+    /// The rectangle around points, whose heights are ignored.
     pub(in crate::accel) fn around(points: impl Iterator<Item = [f64; 3]>) -> Self {
         points.fold(Self::NOTHING, |all, [x, y, _]| all.union(&Self { low: [x, y], high: [x, y] }))
     }
@@ -44,23 +44,24 @@ impl Flat {
         (0..2).all(|k| self.low[k] <= other.high[k] && other.low[k] <= self.high[k])
     }
 
-    /// Of what it shares with another.
+    /// Area of the intersection with another rectangle.
     pub(super) fn area_within(&self, other: &Self) -> f64 {
         let side = |k: usize| self.high[k].min(other.high[k]) - self.low[k].max(other.low[k]);
         side(0).max(0.0) * side(1).max(0.0)
     }
 }
 
-/// What the rays see of a triangle: three corners or, where a part was cut off, four.
+/// The visible part of a triangle: three corners or, where it was clipped, four.
 pub(in crate::accel) struct Shape {
-    /// Across, and the height; the last may be the third once more.
+    /// Corners: two coordinates across the rays and the height. Of three corners, the last is
+    /// repeated.
     pub(super) points: [[f64; 3]; 4],
-    /// How its height grows across it; not finite where it is seen from its edge.
+    /// Slopes of the height across the shape; not finite where it is seen edge-on.
     slope: [f64; 2],
 }
 
 impl Shape {
-    /// Given by its corners.
+    /// A whole triangle, given by its corners.
     pub(in crate::accel) fn new([a, b, c]: [[f64; 3]; 3]) -> Self {
         let from_first = |point: [f64; 3]| [0, 1, 2].map(|k| point[k] - a[k]);
         let ([bx, by, bh], [cx, cy, ch]) = (from_first(b), from_first(c));
@@ -69,12 +70,12 @@ impl Shape {
         Self { points: [a, b, c, c], slope }
     }
 
-    /// What is left of a triangle: three or four points in a row, and how height grows across it.
+    /// A clipped triangle: three or four points in order, and the slopes of its height.
     pub(in crate::accel) fn rest(points: [[f64; 3]; 4], slope: [f64; 2]) -> Self {
         Self { points, slope }
     }
 
-    /// Something that may be anywhere in a rectangle, at any height.
+    /// A shape that stands for anything in a rectangle, at any height.
     pub(in crate::accel) fn anywhere(within: &Flat) -> Self {
         let Flat { low: [left, low], high: [right, high] } = *within;
         let top = f64::INFINITY;
@@ -86,25 +87,25 @@ impl Shape {
         [[0, 1], [1, 2], [2, 3], [3, 0]].into_iter().map(|edge| edge.map(|n| self.points[n]))
     }
 
-    /// Where a row's line crosses its edges.
+    /// The x at which its edges cross a line of constant y.
     fn crossings(&self, y: f64) -> impl Iterator<Item = f64> + '_ {
         self.edges()
             .filter(move |[a, b]| (a[1] < y) != (b[1] < y))
             .map(move |[a, b]| a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]))
     }
 
-    /// What it takes up of the y axis.
+    /// Its extent along the y axis.
     pub(super) fn rows(&self) -> [f64; 2] {
         around(self.points.iter().map(|p| p[1]))
     }
 
-    /// What it takes up of the x axis between two rows' lines.
+    /// Its extent along the x axis between two lines of constant y.
     pub(super) fn between(&self, [low, high]: [f64; 2]) -> [f64; 2] {
         let inside = self.points.iter().filter(|p| low <= p[1] && p[1] <= high).map(|p| p[0]);
         around(inside.chain(self.crossings(low)).chain(self.crossings(high)))
     }
 
-    /// What of the x axis it fills between two rows' lines.
+    /// The interval of x that it fills entirely between two lines of constant y.
     pub(super) fn filled(&self, lines: [f64; 2]) -> [f64; 2] {
         let [a, b] = lines.map(|y| around(self.crossings(y)));
         [a[0].max(b[0]), a[1].min(b[1])]
@@ -120,7 +121,7 @@ impl Shape {
         h0 + self.slope[0] * (x - x0) + self.slope[1] * (y - y0)
     }
 
-    /// How much its height may differ within so much of a place.
+    /// Greatest difference of its height within `reach` along each axis.
     pub(super) fn rise_within(&self, reach: f64) -> f64 {
         reach * (self.slope[0].abs() + self.slope[1].abs())
     }
@@ -130,7 +131,7 @@ impl Shape {
     }
 }
 
-/// The least and the greatest; (∞, −∞) of none.
+/// The least and the greatest number; (∞, −∞) of none.
 fn around(numbers: impl Iterator<Item = f64>) -> [f64; 2] {
     let nothing = [f64::INFINITY, f64::NEG_INFINITY];
     numbers.fold(nothing, |[low, high], number| [low.min(number), high.max(number)])

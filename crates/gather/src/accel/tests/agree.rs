@@ -1,4 +1,4 @@
-//! All kernels say the same, but for rounding.
+//! All kernels agree up to rounding.
 
 use glam::Vec3A;
 
@@ -9,24 +9,26 @@ use crate::accel::walk::{BoxHits, Setup, TriangleHits};
 
 /// Half an ulp of 1, the most by which one operation rounds, relative to its result.
 const ETA: f64 = 0.5 * f32::EPSILON as f64;
-/// By so many ulps t may differ, and by so much u and v, where a triangle is seen well, which is where
-/// [`Seen`] allows no more (half of the hits here). Of the ulps up to 15 are the roundings of t's last
-/// steps, fused or not, the rest comes from fused and rounded shearing. Measured with AVX2: 6 ulps, and
-/// 9.2e-7; of all that [`Seen`] allows, however a triangle is seen, half for t and 0.3 for u and v.
+/// Tolerances of t (in ulps) and of u and v, for triangles that are seen well: those for which
+/// [`Seen`] allows no more, half of the hits here. Up to 15 of the ulps are the roundings of t's
+/// last steps, fused or not. The rest comes from fused and rounded shearing. With AVX2 the largest
+/// differences are 6 ulps and 9.2e-7. For all triangles they reach half of what [`Seen`] allows for
+/// t, and 0.3 of it for u and v.
 const ULPS: f64 = 24.0;
 const WEIGHTS: f64 = 4e-6;
 
-/// t, u and v.
+/// The numbers t, u and v of a hit.
 type Answer = [f32; 3];
 
-/// A triangle as a ray sees it, in f64, and how far apart two kernels may be there: a running error
-/// analysis (Higham 2002, "Accuracy and stability of numerical algorithms", section 3.3).
+/// A triangle as a ray sees it, in f64, with the greatest difference that two kernels may have
+/// there. It is a running error analysis (Higham 2002, "Accuracy and stability of numerical
+/// algorithms", section 3.3), to first order.
 ///
-/// Kernels compute alike what a corner's place relative to the origin is. Then they shear it, x − s z;
-/// one rounds the product, another fuses it, and both round the difference. An edge function is a
-/// difference of two products of those in all kernels, and of three such functions the sum is taken. A
-/// weight is one of them by the sum, divided or multiplied with the inverse; t is z weighted by them,
-/// summed with products rounded or fused. All of that to first order.
+/// Kernels compute a corner's place relative to the origin alike. They shear it, x − s z: one
+/// rounds the product, another fuses it, and both round the difference. In all kernels an edge
+/// function is a difference of two products of those. The sum is taken of three edge functions. A
+/// weight is an edge function divided by the sum, or multiplied with its inverse. The sum of z
+/// times the weights, with products rounded or fused, gives t.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     edges: DVec3,
@@ -38,7 +40,7 @@ struct Seen {
 
 impl Seen {
     fn new(corners: [Vec3; 3], ray: &Setup) -> Self {
-        // Sheared x and y, and z; and by how much kernels differ there.
+        // Sheared x and y, and z, with the difference that kernels may have there.
         let corners = corners.map(|corner| {
             let [x, y, z] = ray.axes.map(|axis| f64::from(corner[axis] - ray.origin[axis]));
             let by = DVec3::new(f64::from(ray.shear[0]) * z, f64::from(ray.shear[1]) * z, 0.0);
@@ -57,16 +59,16 @@ impl Seen {
         };
         let [(u, u_slack), (v, v_slack), (w, w_slack)] = [edge(2, 1), edge(0, 2), edge(1, 0)];
         let (edges, edge_slack) = (DVec3::new(u, v, w), DVec3::new(u_slack, v_slack, w_slack));
-        // Two sums of three.
+        // Both sums have three terms.
         let (sum, slack) = (edges.element_sum(), edge_slack.element_sum());
         let least = (sum.abs() - slack).max(0.0);
         let weights = (edges / sum).abs();
-        // And a division, or two operations in its place.
+        // One kernel divides; another takes two operations instead.
         let weight_slack = (edge_slack + weights * slack) / least + 7.0 * ETA * weights;
         let depths = DVec3::from(corners.map(|(place, _)| place.z));
         let z = edges.dot(depths) / sum;
         let inherited = edge_slack.dot((depths - z).abs()) / least;
-        // Eight roundings of one kernel and seven of the other.
+        // These are eight roundings of one kernel and seven of the other.
         let own = 15.0 * ETA * weights.dot(depths.abs());
         let scale = f64::from(ray.shear[2]);
         Self {
@@ -78,34 +80,34 @@ impl Seen {
         }
     }
 
-    /// Whether rounding may decide if it is met: the ray passes an edge, or begins or ends at the
-    /// triangle, as nearly as kernels may differ.
+    /// Whether rounding may decide if the triangle is met. It may where the ray passes an edge, or
+    /// begins or ends at the triangle, within the difference that kernels may have.
     fn is_tie(&self, t_max: f32) -> bool {
         let ends = [self.t, self.t - f64::from(t_max)];
         self.edges.abs().cmple(self.edge_slack).any()
             || ends.iter().any(|end| end.abs() <= self.t_slack)
     }
 
-    /// Whether the ray passes it on the inside of all edges, or outside as nearly as that.
+    /// Whether the ray passes inside all edges, within the difference that kernels may have.
     fn may_be_met(&self) -> bool {
         let (edges, slack) = (self.edges, self.edge_slack);
         edges.cmpge(-slack).all() || edges.cmple(slack).all()
     }
 
-    /// Whether rounding alone explains how two answers differ.
+    /// Whether rounding alone explains the difference of two answers.
     fn explains(&self, a: Option<Answer>, b: Option<Answer>, t_max: f32) -> bool {
         let (Some(a), Some(b)) = (a, b) else { return a == b || self.is_tie(t_max) };
         let slack = [self.t_slack, self.weight_slack, self.weight_slack];
         (0..3).all(|k| (f64::from(a[k]) - f64::from(b[k])).abs() <= slack[k])
     }
 
-    /// Whether [`ULPS`] and [`WEIGHTS`] hold.
+    /// Whether [`ULPS`] and [`WEIGHTS`] are the tolerance.
     fn is_seen_well(&self) -> bool {
         self.weight_slack <= WEIGHTS && self.t_slack <= ULPS * ulp(self.t)
     }
 }
 
-/// What an f32 of about that size is exact to.
+/// The distance to the next f32 above a number of this size.
 fn ulp(of: f64) -> f64 {
     let of = (of as f32).abs();
     f64::from(of.next_up()) - f64::from(of)
@@ -115,7 +117,8 @@ fn answer(hits: &TriangleHits, lane: usize) -> Option<Answer> {
     has(hits.mask, lane).then(|| [hits.t[lane], hits.u[lane], hits.v[lane]])
 }
 
-/// Of blocks of triangles, under rays at the inside of one and at an edge, that end there or behind.
+/// Blocks of triangles under rays at a triangle's interior and at an edge, which end there or
+/// behind.
 #[test]
 fn triangles_differ_by_rounding_only() {
     for kernel in kernels() {
@@ -146,7 +149,7 @@ fn triangles_differ_by_rounding_only() {
                     continue;
                 }
                 well += 1;
-                // Faults that would be seen.
+                // The comparison must see these faults.
                 let off = t + (4.0 * ULPS * ulp(seen.t)) as f32;
                 let by = 4.0 * WEIGHTS as f32;
                 for fault in [None, Some([off, u, v]), Some([t, u + by, v]), Some([t, u, v - by])] {
@@ -155,14 +158,14 @@ fn triangles_differ_by_rounding_only() {
             }
         }
         assert!(met > 10_000 && well > 5000, "{met} {well}");
-        // Of the 160,000 most are no ties: those excuse little.
+        // Most of the 160,000 cases are no ties, so ties excuse little.
         assert!(decided > 140_000, "{decided}");
         assert!(kernel == Kernel::Portable || ties > 1000, "{ties}");
     }
 }
 
-/// All kernels test boxes by the same operations: a difference, a product, minima and maxima, and one
-/// widening, none fused.
+/// All kernels test boxes by the same operations, none fused: a difference, a product, minima and
+/// maxima, and one widening.
 #[test]
 fn boxes_agree_to_the_bit() {
     let same = |a: &BoxHits, b: &BoxHits| a.mask == b.mask && a.t == b.t;
@@ -176,7 +179,8 @@ fn boxes_agree_to_the_bit() {
             let [a, b] = [Kernel::Portable, kernel].map(|k| boxes(k, &node, &ray, t_max));
             assert!(same(&a, &b), "{kernel:?} {i}: {:?} {:?}, {:?} {:?}", a.mask, a.t, b.mask, b.t);
             met += a.mask.count_ones();
-            // Faults that would be seen: one number off by an ulp, one lane more or less.
+            // The comparison must see these faults: one number off by an ulp, one lane more or
+            // less.
             let lane = i as usize % 8;
             let mut off = BoxHits { mask: b.mask, t: b.t };
             off.t[lane] = off.t[lane].next_up();
@@ -189,8 +193,8 @@ fn boxes_agree_to_the_bit() {
     }
 }
 
-/// Of whole scenes: strewn triangles that lie over each other, and a closed ball whose edges and corners
-/// the rays are aimed at.
+/// Whole scenes: overlapping scattered triangles, and a closed ball at whose edges and corners rays
+/// are aimed.
 #[test]
 fn kernels_agree() {
     let (turned, ball) = (Affine3A::from_rotation_y(0.4), ball(24, 0.1));
@@ -212,8 +216,8 @@ fn kernels_agree() {
     }
 }
 
-/// Of rays in scenes, how many meet something, how many of those another triangle with one kernel than
-/// with the other, and of how many faults were planted and seen.
+/// Traces rays in a scene with both kernels. Returns four counts: rays that meet something, those
+/// that meet another triangle with one kernel than with the other, faults planted and faults seen.
 fn compare(
     meshes: &[(Affine3A, Arc<Mesh>)],
     kernel: Kernel,
@@ -240,7 +244,7 @@ fn compare(
         }
         well += 1;
         let (t, v) = (b.t + (4.0 * ULPS * ulp(seen.t)) as f32, b.v + 4.0 * WEIGHTS as f32);
-        // A neighbour may rightly be met too, at the outline; one farther off not at once.
+        // At the outline a neighbour may be met too, so the fault names a triangle farther off.
         let count = meshes[b.instance as usize].1.triangle_count() as u32;
         let triangle = (b.triangle + count / 2) % count;
         for fault in [None, Some(Hit { t, ..b }), Some(Hit { v, ..b }), Some(Hit { triangle, ..b })]
@@ -251,7 +255,7 @@ fn compare(
     (met, other, well)
 }
 
-/// How the triangle of a hit is seen, in its instance's space.
+/// How the ray sees the triangle of a hit, in its instance's space.
 fn seen_by(ray: &Ray, accel: &Accel, meshes: &[(Affine3A, Arc<Mesh>)], hit: &Hit) -> Seen {
     let placed = accel.placed.iter().find(|p| p.instance == hit.instance).expect("placed");
     let primitive = &meshes[hit.instance as usize].1.primitives[hit.primitive as usize];
@@ -265,9 +269,9 @@ fn name(hit: &Hit) -> [u32; 3] {
     [hit.instance, hit.primitive, hit.triangle]
 }
 
-/// Whether two kernels' hits are the same but for rounding: of one triangle, or of two, of which the
-/// nearer is met so barely that one kernel may miss it, or that lie so close behind each other that
-/// rounding decides which is nearer.
+/// Whether two kernels' hits are the same up to rounding. They may be of one triangle. They may
+/// also be of two: the nearer one is met so barely that a kernel may miss it, or rounding decides
+/// which is nearer.
 fn is_same_surface((a, of_a): (Hit, Seen), (b, of_b): (Hit, Seen)) -> bool {
     if name(&a) == name(&b) {
         let [a, b] = [a, b].map(|hit| Some([hit.t, hit.u, hit.v]));

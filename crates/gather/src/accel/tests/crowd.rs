@@ -1,4 +1,4 @@
-//! A scene in which much lies over each other.
+//! A scene with many overlapping surfaces.
 
 use super::*;
 
@@ -25,14 +25,14 @@ pub(super) fn turned(scale: f32, by: f32, to: Vec3) -> Affine3A {
     Affine3A::from_scale_rotation_translation(Vec3::splat(scale), Quat::from_rotation_x(by), to)
 }
 
-/// Two triangles a side.
+/// A horizontal square of two triangles, with this half-width.
 pub(super) fn sheet(size: f32) -> Arc<Mesh> {
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let corners = corners.map(|[x, z]| size * Vec3::new(x, 0.0, z));
     mesh(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]])
 }
 
-/// A ball and strewn triangles between large sheets, one of which covers them in part.
+/// A ball and scattered triangles between large sheets, one of which is partly transparent.
 pub(super) fn crowd(scale: f32, to: Vec3) -> Vec<(Affine3A, Arc<Mesh>)> {
     let at = |by: f32, x: f32, y: f32, z: f32| turned(scale, by, to + scale * Vec3::new(x, y, z));
     vec![
@@ -43,7 +43,7 @@ pub(super) fn crowd(scale: f32, to: Vec3) -> Vec<(Affine3A, Arc<Mesh>)> {
     ]
 }
 
-/// The instance that lets some rays pass.
+/// The instance that is partly transparent.
 pub(super) const THIN: u32 = 1;
 
 pub(super) fn lets_pass(hit: &Hit, ray: u32) -> bool {

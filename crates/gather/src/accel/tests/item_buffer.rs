@@ -1,26 +1,26 @@
-//! An item buffer says what the hierarchy says.
+//! An item buffer answers as the hierarchy does.
 
 use super::crowd::{THIN, crowd, lets_pass, sheet, snapshot, turned};
 use super::*;
 use crate::accel::{ItemBuffer, Pyramid};
 
-/// Seen from a point towards another, so far to either side.
+/// A pyramid of rays from a point towards another, with this extent to either side.
 fn pyramid(eye: Vec3, target: Vec3, half: [f32; 2]) -> Pyramid {
     let ahead = (target - eye).normalize();
     let right = ahead.cross(Vec3::new(0.1, 1.0, 0.05)).normalize();
     Pyramid { eye, axes: [right, right.cross(ahead), ahead], half, pixel: half[1] / 100.0 }
 }
 
-/// What became of rays.
+/// Numbers of rays by outcome.
 #[derive(Clone, Copy, Debug, Default)]
 struct Outcome {
     hit: usize,
     missed: usize,
-    /// To the hierarchy.
+    /// Left to the hierarchy.
     left: usize,
 }
 
-/// Compares what rays through a pyramid meet, to its edges and a little beyond, many of them through
+/// Compares what rays through a pyramid meet, to its edges and a little beyond. Many go through
 /// corners and edges of triangles.
 fn compare(placed: Vec<(Affine3A, Arc<Mesh>)>, pyramid: &Pyramid, kernel: Kernel) -> Outcome {
     let snapshot = snapshot(placed);
@@ -74,7 +74,7 @@ fn compare(placed: Vec<(Affine3A, Arc<Mesh>)>, pyramid: &Pyramid, kernel: Kernel
         assert!(is_tie, "{pyramid:?} {kernel:?}: {:?}: {tree:?}, {items:?}", rays[n]);
         ties += 1;
     }
-    // Where triangles meet at an edge, either may be found.
+    // At a shared edge either triangle may be found.
     assert!(ties * 50 < rays.len(), "{ties} ties of {}", rays.len());
     Outcome { left, ..found }
 }
@@ -98,7 +98,7 @@ fn says_what_the_hierarchy_says() {
     }
 }
 
-/// Where all of a heap of triangles is seen through one cell, the hierarchy is asked.
+/// Where a crowd of triangles is seen through one cell, rays are left to the hierarchy.
 #[test]
 fn crowded_cells_are_left_to_the_hierarchy() {
     let heap = vec![(turned(0.5, 0.2, Vec3::Y), soup(5000, 0.02))];
@@ -109,7 +109,7 @@ fn crowded_cells_are_left_to_the_hierarchy() {
     }
 }
 
-/// From within a surface, and from so near to some that they cannot be seen as from afar.
+/// Eyes that lie in a surface, or very near to one.
 #[test]
 fn eyes_in_walls() {
     let on_sheet = Vec3::new(0.3, 0.0, 0.2);
@@ -128,7 +128,7 @@ fn eyes_in_walls() {
     }
 }
 
-/// Rays from elsewhere, that go back, or that end are not for it.
+/// Rays that start elsewhere, go backwards or end are not answered.
 #[test]
 fn answers_only_its_own_rays() {
     let accel =
@@ -148,12 +148,12 @@ fn answers_only_its_own_rays() {
     assert!(is_left(ray(pyramid.eye, Vec3::NAN)));
 }
 
-/// What moves on its own, is not there, or is not seen.
+/// Moving instances, empty scenes, and geometry out of view.
 #[test]
 fn flat_and_empty_scenes() {
     let ahead = pyramid(Vec3::Z, Vec3::ZERO, [0.9, 0.5]);
     for kernel in kernels() {
-        // Seen from its edge.
+        // The sheet is seen edge-on.
         compare(vec![(Affine3A::IDENTITY, sheet(1.0))], &ahead, kernel);
         let back = pyramid(Vec3::Z * 5.0, Vec3::Z * 9.0, [0.9, 0.5]);
         let found = compare(crowd(1.0, Vec3::ZERO), &back, kernel);
@@ -166,8 +166,8 @@ fn flat_and_empty_scenes() {
     assert!(ItemBuffer::new(&two, &ahead, |_, _| true).is_none());
 }
 
-/// Thousands of sheets behind one another, through none of which anything is hidden: two of them to a
-/// block, all over the picture, so that there are to be thirty times fewer cells.
+/// Thousands of sheets behind one another, with holes, so that none hides the next. Blocks hold two
+/// of them and fill the picture, so there must be thirty times fewer cells.
 #[test]
 fn deep_scenes_do_not_take_for_ever() {
     let through = |n: u32| (turned(1.0, 0.0, -0.001 * n as f32 * Vec3::Y), sheet(8.0));

@@ -1,4 +1,4 @@
-//! What each kernel says of a single node, a single block of triangles.
+//! Tests of each kernel on a single node and a single block of triangles.
 
 use glam::{DVec3, Vec3, Vec3A};
 
@@ -40,7 +40,7 @@ pub(super) fn has(mask: u32, lane: usize) -> bool {
     mask & (1 << lane) != 0
 }
 
-/// Eight boxes of up to unit size in a cube of two, from the `i`-th set of random numbers.
+/// Eight boxes of up to unit size in a cube of side two, from the `i`-th set of random numbers.
 pub(super) fn random_node(i: u32) -> Node {
     let mut node = Node::EMPTY;
     for lane in 0..8 {
@@ -51,7 +51,7 @@ pub(super) fn random_node(i: u32) -> Node {
     node
 }
 
-/// A direction, every other time with zeros of either sign among its components.
+/// The direction; in half of the cases some components are replaced by zeros of either sign.
 pub(super) fn with_zeros(direction: Vec3, i: u32) -> Vec3 {
     let zero = |bit: u32| if i & bit == 0 { 0.0 } else { -0.0 };
     match i / 8 % 8 {
@@ -115,8 +115,8 @@ fn through(bounds: &Aabb, origin: Vec3, direction: Vec3) -> (f64, f64) {
     (a.min(b).max_element().max(0.0), a.max(b).min_element())
 }
 
-/// Rays aimed at edges and corners of boxes: no box is missed that is met, however barely, and none
-/// is visited that is missed by more than rounding.
+/// Rays aimed at edges and corners of boxes. No box that is barely met is missed. None is visited
+/// that is missed by more than rounding.
 #[test]
 fn boxes_err_outwards_only() {
     for kernel in kernels() {
@@ -152,7 +152,7 @@ fn boxes_err_outwards_only() {
     }
 }
 
-/// A box counts if it begins where the ray ends, but not if it begins any later.
+/// A box that begins exactly where the ray ends counts; one that begins later does not.
 #[test]
 fn rays_end_at_t_max() {
     for kernel in kernels() {
@@ -173,7 +173,7 @@ fn rays_end_at_t_max() {
     }
 }
 
-/// Triangles against f64, and so every kernel against the portable one. How exact an answer can be
+/// Triangles agree with f64, and so every kernel agrees with the portable one. The tolerance
 /// depends on how thin the triangle looks from the ray.
 #[test]
 fn triangles_are_met_where_f64_says() {
@@ -218,7 +218,7 @@ fn triangles_are_met_where_f64_says() {
     }
 }
 
-/// A ray aimed at the edge of two triangles meets one of them, or both.
+/// A ray aimed at the shared edge of two triangles meets at least one of them.
 #[test]
 fn shared_edges_have_no_gap() {
     for kernel in kernels() {
@@ -232,7 +232,8 @@ fn shared_edges_have_no_gap() {
             block.set(2, [b, a, d].map(Vec3A::from));
             let origin = 3.0 * origin - 1.0;
             let direction = target - origin;
-            // Seen edge-on, the two may lie behind each other, and the edge be the outline of both.
+            // Seen edge-on, the two may lie behind each other, so that the edge is the outline of
+            // both.
             let side = |p: Vec3| direction.dot((b - a).cross(p - a)) / direction.length();
             if side(c) * side(d) > -1e-4 {
                 continue;
@@ -264,8 +265,8 @@ fn triangles_with_equal_corners_are_never_met() {
     }
 }
 
-/// Of a ray that is not finite all kernels think alike: an axis without a number excludes no box,
-/// and no triangle is met.
+/// All kernels treat a ray that is not finite alike. An axis that is NaN excludes no box, and no
+/// triangle is met.
 #[test]
 fn rays_that_are_not_finite_are_treated_alike() {
     let mut met = 0;

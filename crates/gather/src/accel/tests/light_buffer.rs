@@ -1,12 +1,12 @@
-//! A light buffer says what the hierarchy says.
+//! A light buffer answers as the hierarchy does.
 
 use super::crowd::{THIN, crowd, lets_pass, sheet, snapshot, turned};
 use super::*;
 use crate::accel::LightBuffer;
 use crate::surface::Frames;
 
-/// How many of the rays along a direction, which leave surfaces and start anywhere, are occluded, and
-/// how many were left to the hierarchy.
+/// Traces rays along a direction that leave surfaces or start anywhere, and compares. Returns how
+/// many are occluded and how many were left to the hierarchy.
 fn compare(placed: Vec<(Affine3A, Arc<Mesh>)>, direction: Vec3, kernel: Kernel) -> (usize, usize) {
     let snapshot = snapshot(placed);
     let accel = AccelCache::new(Levels::One).update(&snapshot, kernel);
@@ -26,15 +26,15 @@ fn compare(placed: Vec<(Affine3A, Arc<Mesh>)>, direction: Vec3, kernel: Kernel) 
             let [a, b, c] = [0, 1, 2].map(corner);
             let own = (block.instance[lane], block.triangle[lane]);
             let mut s = Sampler::new(4, n, lane as u32);
-            // Those that cover cells are the sheets'.
+            // The sheets cover cells, so most rays start on them.
             for _ in 0..if block.instance[lane] < 2 { 500 } else { 4 } {
                 let u = s.square();
                 let (u, v) = if u.x + u.y > 1.0 { (1.0 - u.x, 1.0 - u.y) } else { (u.x, u.y) };
                 let on_it = a + u * (b - a) + v * (c - a);
                 rays.push((on_it - 0.9 * slack * direction, Some(own)));
             }
-            // From edges and corners, where rounding decides; along an axis the hierarchy's boxes may
-            // just miss what the triangle just meets.
+            // At edges and corners rounding decides. Along an axis, the hierarchy's boxes may just
+            // miss what the triangle just meets.
             if direction.abs().max_element() < 1.0 {
                 rays.extend([(a, Some(own)), (0.5 * (a + b), Some(own)), (b, None)]);
             }
@@ -80,7 +80,7 @@ fn says_what_the_hierarchy_says() {
     }
 }
 
-/// Where all of a heap of triangles lies over one cell, the hierarchy is asked.
+/// Where a crowd of triangles lies over one cell, rays are left to the hierarchy.
 #[test]
 fn crowded_cells_are_left_to_the_hierarchy() {
     let desert = (Affine3A::IDENTITY, sheet(1000.0));
@@ -92,7 +92,7 @@ fn crowded_cells_are_left_to_the_hierarchy() {
     }
 }
 
-/// Rays that do not go its way are not for it.
+/// Rays in other directions are not answered.
 #[test]
 fn answers_only_its_own_rays() {
     let accel =
@@ -103,12 +103,12 @@ fn answers_only_its_own_rays() {
     assert!(!buffer.answers(&Ray { t_max: 1.0, ..ray(Vec3::ZERO, Vec3::Y) }));
 }
 
-/// What has no area across the light, or is not there, or moves on its own, is left to the hierarchy or
-/// answered all the same.
+/// Geometry without area across the light, empty scenes and moving instances are left to the
+/// hierarchy or answered correctly.
 #[test]
 fn flat_and_empty_scenes() {
     for kernel in kernels() {
-        // Seen from its edge.
+        // The sheet is seen edge-on.
         compare(vec![(Affine3A::IDENTITY, sheet(1.0))], Vec3::X, kernel);
         let point = mesh(vec![Vec3::ONE; 3], vec![[0, 1, 2]]);
         compare(vec![(Affine3A::IDENTITY, point)], Vec3::Y, kernel);

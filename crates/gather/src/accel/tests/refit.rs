@@ -1,15 +1,16 @@
-//! Hierarchies of what deforms: fitted for as long as their trees are good, then rebuilt.
+//! Hierarchies of deforming meshes: refitted while their trees are good, then rebuilt.
 
 use lumencast_scene::{MorphTarget, Scene};
 
 use super::*;
 use crate::accel::triangle_bvh::{REBUILD_COST, cost};
 
-/// Strewn so far, triangles keep to a tree; strewn so far, they do not, though rays still meet many.
+/// Scattering triangles by `SMALL` keeps the tree good. `LARGE` does not, though rays still meet
+/// many.
 const SMALL: f32 = 0.05;
 const LARGE: f32 = 2.0;
 
-/// A mesh's vertices, each triangle moved on its own by up to half of `strength` an axis.
+/// A mesh's vertices, with each triangle moved by up to half of `strength` along each axis.
 fn strewn(mesh: &Mesh, strength: f32) -> Vec<Vertices> {
     let rest = &mesh.primitives[0].vertices;
     let moved = |(i, p): (u32, &Vec3)| p + strength * (random(6, i / 3) - 0.5);
@@ -17,13 +18,13 @@ fn strewn(mesh: &Mesh, strength: f32) -> Vec<Vertices> {
     vec![Vertices { positions, ..rest.clone() }]
 }
 
-/// Which children nodes have and which triangles leaves have, wherever they are.
+/// The nodes' children and the leaves' triangles, without positions.
 fn shape(bvh: &TriangleBvh) -> (Vec<[u32; 8]>, Vec<[u32; 4]>) {
     let children = bvh.nodes.iter().map(|node| node.child).collect();
     (children, bvh.blocks.iter().map(|block| block.triangle).collect())
 }
 
-/// All that rays see of it, to the bit.
+/// The bytes of all that rays read.
 fn bits(bvh: &TriangleBvh) -> [&[u8]; 2] {
     [bytemuck::cast_slice(&bvh.nodes), bytemuck::cast_slice(&bvh.blocks)]
 }
@@ -32,14 +33,14 @@ fn built(mesh: &Mesh, deformed: Option<&[Vertices]>) -> TriangleBvh {
     TriangleBvh::build(mesh, deformed, Trees::AsBuilt)
 }
 
-/// What becomes of a tree built at rest when its triangles are strewn so far.
+/// Trees of a mesh whose triangles are scattered after the first was built.
 struct Strewn {
     rest: TriangleBvh,
-    /// By the code under test.
+    /// Refitted or rebuilt by the code under test.
     refitted: TriangleBvh,
-    /// Never rebuilt.
+    /// Refitted, never rebuilt.
     only_fitted: TriangleBvh,
-    /// Always rebuilt.
+    /// Built from the scattered triangles.
     fresh: TriangleBvh,
 }
 
@@ -53,13 +54,13 @@ impl Strewn {
         Self { rest, refitted, only_fitted, fresh: built(mesh, Some(&moved)) }
     }
 
-    /// How much dearer the tree would be than at rest, were it never rebuilt.
+    /// Ratio of costs of the tree that was never rebuilt to the tree at rest.
     fn dearer(&self) -> f32 {
         cost(&self.only_fitted.nodes) / cost(&self.rest.nodes)
     }
 }
 
-/// Were all rebuilt, the tree would be another one.
+/// If it were rebuilt, the tree would be another one.
 #[test]
 fn small_deformations_keep_the_tree() {
     let mesh = soup(500, 0.1);
@@ -68,12 +69,12 @@ fn small_deformations_keep_the_tree() {
     assert!(shape(&fresh) != shape(&rest), "had it been rebuilt, that would be seen");
     assert!(bits(&refitted) != bits(&rest), "boxes and triangles follow");
     assert_eq!(refitted.bounds(), fresh.bounds());
-    // Boxes are neither too small nor too large: back at rest they are those that were built.
+    // Boxes are neither too small nor too large: back at rest they equal those that were built.
     refitted.refit(&mesh, &[mesh.primitives[0].vertices.clone()]);
     assert!(bits(&refitted) == bits(&rest), "back at rest");
 }
 
-/// Were none rebuilt, rays would visit several times as much.
+/// If it were never rebuilt, rays would visit several times as much.
 #[test]
 fn large_deformations_rebuild_the_tree() {
     let mesh = soup(500, 0.1);
@@ -84,7 +85,7 @@ fn large_deformations_rebuild_the_tree() {
     assert!(fitted > 3.0 * fresh && strewn.dearer() > 2.0 * REBUILD_COST, "{fitted} {fresh}");
 }
 
-/// From strength to strength a tree is kept up to [`REBUILD_COST`] and not a bit longer, and so never
+/// With growing strength, a tree is kept up to [`REBUILD_COST`] and rebuilt beyond it. So it never
 /// costs much more than a new one.
 #[test]
 fn trees_are_rebuilt_when_they_have_become_too_dear() {
@@ -104,8 +105,8 @@ fn trees_are_rebuilt_when_they_have_become_too_dear() {
     assert!(worst < 2.5, "{worst}");
 }
 
-/// What counts is how dear a tree was when built, not how dear the moment before: of many steps none
-/// is large.
+/// The cost counts against the cost when built, not against the moment before, so many small steps
+/// add up.
 #[test]
 fn creeping_deformations_rebuild_the_tree_too() {
     let mesh = soup(500, 0.1);
@@ -127,8 +128,7 @@ fn creeping_deformations_rebuild_the_tree_too() {
     assert!(cost(&crept.nodes) < 0.7 * before);
 }
 
-/// Rays at triangles as they are in a moment, of a scene whose first deforming instance has one
-/// primitive.
+/// Rays at the triangles of a moment. The scene's first deforming instance must have one primitive.
 fn aimed(moment: &Snapshot) -> Vec<Ray> {
     let of = |i: &Instance| i.deformation.clone().map(|d| (d, i.world_from_object));
     let (deformation, to_world) = moment.instances.iter().find_map(of).expect("one deforms");
@@ -148,7 +148,7 @@ fn hits(accel: &Accel, rays: &[Ray]) -> Vec<Option<Hit>> {
     rays.iter().map(|ray| closest(accel, ray, |_| true)).collect()
 }
 
-/// How many rays of all meet something else in one structure than in another.
+/// Number of rays that meet something else in one structure than in the other.
 fn differing(a: &Accel, b: &Accel, rays: &[Ray]) -> usize {
     let [a, b] = [a, b].map(|accel| hits(accel, rays));
     a.iter().zip(&b).filter(|(a, b)| a != b).count()
@@ -165,7 +165,8 @@ fn morphed(mesh: &Arc<Mesh>, weight: f32) -> Arc<Snapshot> {
     }])
 }
 
-/// A mesh whose only target strews its triangles by up to half of its weight an axis.
+/// A mesh whose only morph target scatters its triangles, by up to half of its weight along each
+/// axis.
 fn morphing() -> Arc<Mesh> {
     let mut mesh = (*soup(500, 0.1)).clone();
     let to = strewn(&mesh, 1.0).remove(0).positions;
@@ -176,9 +177,9 @@ fn morphing() -> Arc<Mesh> {
     Arc::new(mesh)
 }
 
-/// One cache for all moments finds, to the bit, what a new one finds at each, whether its tree is kept,
-/// rebuilt, or both in turns. What it found a moment before is something else, and stays as it was for
-/// whoever still traces that.
+/// One cache for all moments finds, to the bit, what a new one finds at each. Its tree is kept,
+/// rebuilt, or both in turns. A structure of an earlier moment stays unchanged while somebody
+/// traces it.
 #[test]
 fn one_cache_follows_a_deformation() {
     let mesh = morphing();
@@ -207,7 +208,7 @@ fn one_cache_follows_a_deformation() {
     }
 }
 
-/// What no one traces any more is fitted where it is, not copied.
+/// A hierarchy that nobody traces is refitted in place, not copied.
 #[test]
 fn trees_are_fitted_in_place() {
     let (mesh, mut cache) = (morphing(), AccelCache::default());
@@ -224,11 +225,11 @@ fn trees_are_fitted_in_place() {
     assert_eq!(place(0.02).0, third);
 }
 
-/// The same of a scene that moves by its animation: the tomb's curtain, in the draught.
+/// The same for an animated scene: the curtain of the tomb, moved by the draught.
 #[test]
 fn one_cache_follows_the_curtain_of_the_tomb() {
     let mut scene = Scene::open("tomb").expect("a built-in scene");
-    // Without what is large, for the time it takes.
+    // Large objects are left out to save time.
     let mut moment = |seconds| {
         assert!(scene.advance(seconds));
         let mut moment = (*scene.snapshot()).clone();
@@ -250,8 +251,8 @@ fn one_cache_follows_the_curtain_of_the_tomb() {
     }
 }
 
-/// Triangles that for a moment are nowhere take no others with them, and come back. Those that a tree
-/// was built without, fitting alone does not bring.
+/// Triangles that are not finite for a moment do not affect others, and come back. Refitting alone
+/// does not bring back triangles that the tree was built without.
 #[test]
 fn triangles_come_back_from_nowhere() {
     let mesh = soup(500, 0.1);

@@ -1,5 +1,5 @@
-//! Does `sample` choose directions as often as its density says? Pearson's χ² over bins of the
-//! sphere, with directions that are lost among them.
+//! Tests that `sample` chooses directions with the density that it states. It uses Pearson's χ²
+//! over bins of the sphere; directions that are rejected have a bin of their own.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,14 +9,14 @@ use super::*;
 use crate::sampling::{mix, mix2, unit};
 
 const SAMPLES: u32 = 1 << 16;
-/// Chance that a sound BSDF fails anywhere in one test.
+/// Probability that a correct BSDF fails anywhere in one test.
 const SIGNIFICANCE: f64 = 0.01;
-/// Bins by the angle from the mirror direction, and around it.
+/// Number of bins by the angle from the mirror direction, and around it.
 const RINGS: usize = 16;
 const SECTORS: usize = 12;
 
-/// Bins around the mirror direction, fine near it and coarse far from it; light that has gone
-/// through the surface is mirrored back and has bins of its own.
+/// Bins around the mirror direction, fine near it and coarse far from it. Transmitted directions
+/// are mirrored back to the upper side and have bins of their own.
 struct Bins {
     world_from_mirror: DMat3,
     /// Angle below which rings are about equally wide.
@@ -33,7 +33,8 @@ impl Bins {
         (1.0 + PI / self.width).ln()
     }
 
-    /// Ring and sector as real numbers to direction, and the solid angle of a unit of both.
+    /// Maps ring and sector, as real numbers, to a direction. The second value is the solid angle
+    /// of one unit of both.
     fn direction(&self, ring: f64, sector: f64) -> (DVec3, f64) {
         let step = self.rings() / RINGS as f64;
         let polar = self.width * (ring * step).exp_m1();
@@ -74,7 +75,8 @@ impl Bins {
     }
 }
 
-/// Adaptive quadrature over a square: 3 × 3 Gauss-Legendre points, in quarters where those differ.
+/// Adaptive quadrature over a square by 3 × 3 Gauss-Legendre points. It splits the square into
+/// quarters where the two disagree.
 fn integral(f: &impl Fn(f64, f64) -> f64, corner: [f64; 2], side: f64, depth: u32) -> f64 {
     const ALWAYS: u32 = 2;
     const DEEPEST: u32 = 7;
@@ -102,7 +104,8 @@ fn integral(f: &impl Fn(f64, f64) -> f64, corner: [f64; 2], side: f64, depth: u3
     quarters.iter().map(|q| integral(f, *q, half, depth + 1)).sum()
 }
 
-/// Chance that a sampler that obeys `pdf` strays from it by as much as `sample` does.
+/// Probability that a sampler with density `pdf` deviates from it at least as much as `sample`
+/// does.
 fn p_value(
     bins: &Bins,
     pdf: impl Fn(Vec3) -> f32,
@@ -114,7 +117,7 @@ fn p_value(
     chances.push((1.0 - total).max(0.0));
     let mut found = vec![0u32; chances.len()];
     for i in 0..SAMPLES {
-        // Independent numbers, as χ² supposes; those of `Sampler` are spread better than chance.
+        // χ² supposes independent numbers; `Sampler` spreads its numbers more evenly than chance.
         let number = |k: u64| unit(mix(mix2(k, i.into())) as u32);
         let direction = sample(number(0), Vec2::new(number(1), number(2)));
         found[direction.map_or(chances.len() - 1, |l| bins.bin(l))] += 1;
@@ -122,7 +125,7 @@ fn p_value(
     let mut pairs: Vec<(f64, u32)> =
         chances.iter().map(|p| p * f64::from(SAMPLES)).zip(found).collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // χ² is a good approximation where at least five are expected: rarer bins are put together.
+    // χ² is a good approximation where at least five are expected, so rarer bins are merged.
     let (mut statistic, mut terms, mut pool) = (0.0, 0, (0.0, 0));
     for (expected, found) in pairs {
         pool = (pool.0 + expected, pool.1 + found);
@@ -169,7 +172,7 @@ fn upper_gamma(a: f64, x: f64) -> f64 {
     scale * fraction
 }
 
-/// Stirling's series, after moving its argument up to where it is exact.
+/// Stirling's series, after the argument is moved up to where the series is exact.
 fn ln_gamma(mut a: f64) -> f64 {
     let mut down = 0.0;
     while a < 10.0 {
@@ -180,7 +183,8 @@ fn ln_gamma(mut a: f64) -> f64 {
     (a - 0.5) * a.ln() - a + 0.5 * TAU.ln() + series - down
 }
 
-/// The threshold of each of `tests` that together fail a sound BSDF by SIGNIFICANCE (Šidák).
+/// The p-value threshold of each of `tests` tests that together fail a correct BSDF with
+/// probability SIGNIFICANCE (Šidák).
 fn threshold(tests: usize) -> f64 {
     1.0 - (1.0 - SIGNIFICANCE).powf(1.0 / tests as f64)
 }
@@ -215,7 +219,7 @@ fn directions_are_chosen_as_densely_as_stated() {
     }
 }
 
-/// Samplers with the faults that one makes: the test above refuses each.
+/// Samplers with common faults: the test above rejects each.
 #[test]
 fn samplers_with_a_fault_are_refused() {
     let [plain, _, _, metal, ..] = &substances()[..] else { unreachable!() };
@@ -237,9 +241,10 @@ fn samplers_with_a_fault_are_refused() {
             let wider = Bsdf { alpha: 1.1 * bsdf.alpha, ..bsdf };
             let sample = |choice, u| wider.sample(v, choice, u).map(|c| c.direction);
             refused("α a tenth too large", &bsdf, v, &sample);
-            // Narrow lobes and views from above hide few.
+            // Narrow lobes and views from above have few normals that the viewer cannot see.
             if v.z < 0.9 && roughness >= 0.5 {
-                // Walter et al. 2007, equation 35: all normals, whether the viewer sees them or not.
+                // The fault: it samples all normals, seen by the viewer or not (Walter et al. 2007,
+                // equation 35).
                 let all_normals = |_, u: Vec2| {
                     let tan = bsdf.alpha * (u.x / (1.0 - u.x)).sqrt();
                     let azimuth = Vec2::from_angle(std::f32::consts::TAU * u.y);
@@ -248,7 +253,8 @@ fn samplers_with_a_fault_are_refused() {
                 refused("normals that are hidden", &bsdf, v, &all_normals);
             }
         }
-        // At grazing angles there is next to nothing but the specular lobe.
+        // At grazing angles nearly all light is in the specular lobe, so a biased choice would not
+        // show.
         if v.z > 0.1 {
             let bsdf = Bsdf::new(&plain.1);
             let biased = |choice: f32, u| bsdf.sample(v, 0.95 * choice, u).map(|c| c.direction);
@@ -257,7 +263,7 @@ fn samplers_with_a_fault_are_refused() {
     }
 }
 
-/// Upper 5 % points of χ², from tables.
+/// The upper 5 % points of χ², from tables.
 #[test]
 fn incomplete_gamma_is_that_of_tables() {
     for (freedom, point) in

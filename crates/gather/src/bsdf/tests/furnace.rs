@@ -1,12 +1,12 @@
-//! White furnace: what a surface reflects where the same light comes from everywhere.
+//! White furnace: how much a surface reflects where equal radiance arrives from every direction.
 
 use glam::DVec3;
 use lumencast_testkit::vectors::GgxAlbedo;
 
 use super::*;
 
-/// The directional albedo by sampling, with its standard error; `fault` multiplies what each
-/// direction brings.
+/// The directional albedo by sampling, with its standard error. `fault` multiplies the contribution
+/// of each direction.
 fn albedo(bsdf: &Bsdf, v: Vec3, fault: impl Fn(&Chosen) -> f32) -> (DVec3, DVec3) {
     const GROUPS: u32 = 16;
     const SAMPLES: u32 = 4096;
@@ -31,13 +31,14 @@ fn no_fault(_: &Chosen) -> f32 {
     1.0
 }
 
-/// Lambert and every smooth white surface give back exactly what arrives; one whose cosine counts
-/// twice does not.
+/// Lambert and every smooth white surface reflect exactly what arrives. The test must reject a
+/// surface whose cosine counts twice.
 #[test]
 fn smooth_white_surfaces_keep_all_light() {
     let white = |s: Substance| Substance { base_color: Vec3::ONE, roughness: 0.0, ..s };
     let smooth = substances().into_iter().map(|(name, s)| (name, Bsdf::new(&white(s))));
-    // Its dielectric takes the largest channel from what is underneath: less than white.
+    // A tinted specular colour makes it less than white: the diffuse lobe loses the largest
+    // channel.
     let smooth = smooth.filter(|(name, _)| *name != "tinted specular");
     for (name, bsdf) in smooth.chain([("Lambert", Bsdf::lambert(Vec3::ONE))]) {
         let keeps = |v, fault: &dyn Fn(&Chosen) -> f32| {
@@ -53,8 +54,8 @@ fn smooth_white_surfaces_keep_all_light() {
     }
 }
 
-/// No surface reflects more than arrives. Dielectrics of low index and middling roughness may by
-/// 0.18 %: their diffuse lobe loses what the smooth surface would reflect.
+/// No surface reflects more than arrives. Dielectrics of low index and middling roughness may
+/// exceed it by 0.18 %: their diffuse lobe loses only what the smooth surface would reflect.
 #[test]
 fn no_surface_reflects_more_than_arrives() {
     const MOST: f64 = 1.002;
@@ -68,7 +69,7 @@ fn no_surface_reflects_more_than_arrives() {
             }
         }
     }
-    // With glTF's own mix, 1 − F(v·h), far more: the check can fail.
+    // The mix of glTF's sample code, 1 − F(v·h), reflects far more, so the check can fail.
     let bsdf = Bsdf::new(&Substance { roughness: 0.05, ..substances()[0].1 });
     let v = views()[3];
     let naive = |c: &Chosen| {
@@ -79,8 +80,8 @@ fn no_surface_reflects_more_than_arrives() {
     assert!(albedo(&bsdf, v, naive).0.y > 1.2);
 }
 
-/// How many entries of `vectors/ggx_albedo.json`, single-scatter GGX integrated elsewhere, a metal
-/// and a black dielectric do not reflect as much as.
+/// The number of entries of `vectors/ggx_albedo.json` that a metal and a black dielectric disagree
+/// with. The entries are albedos of single-scatter GGX, integrated by other code.
 fn disagreements(
     alpha_of: impl Fn(f32) -> f32,
     fault: impl Fn(&Bsdf, Vec3, &Chosen) -> f32,
@@ -115,7 +116,7 @@ fn rough_surfaces_reflect_what_the_table_says() {
     let (wrong, said) = disagreements(square, |_, _, _| 1.0);
     assert_eq!(wrong, 0, "\n{said}");
 
-    // Textbook faults, of which each must be seen in many entries.
+    // The check must see each of these textbook faults in many entries.
     let lambda = |d: Vec3, alpha: f32| {
         let tan2 = 1.0 / (d.z * d.z) - 1.0;
         0.5 * ((1.0 + alpha * alpha * tan2).sqrt() - 1.0)

@@ -78,7 +78,8 @@ fn asymmetry(eval: impl Fn(Vec3, Vec3) -> Vec3) -> f32 {
         let mut r = Sampler::new(5, 0, i);
         let (a, l) = (sphere(r.square()), sphere(r.square()));
         let v = Vec3::new(a.x, a.y, a.z.abs().max(0.02)).normalize();
-        // Transmission: seen from the other side, the frame is mirrored.
+        // For transmission the path is reversed and seen from the other side, so the frame is
+        // mirrored.
         let (w, k) = if l.z > 0.0 { (l, v) } else { (through(l), through(v)) };
         let forth = eval(v, l) / l.z.abs();
         let back = eval(w, k) / v.z;
@@ -95,7 +96,7 @@ fn reciprocal() {
         let worst = asymmetry(|v, l| bsdf.eval(v, l).value);
         assert!(worst < 1e-3, "{name}: {worst}");
     }
-    // A diffuse lobe that loses only what the surface reflects towards the viewer.
+    // This faulty diffuse lobe loses only what the surface reflects towards the viewer.
     let bsdf = Bsdf::new(&substances()[0].1);
     let one_way = |v: Vec3, l: Vec3| {
         let lost = bsdf.coupling(v, l) - (1.0 - bsdf.reflectance(v.z));

@@ -1,4 +1,4 @@
-//! Lamps that lie in the very plane of a ceiling or a wall: that does not hide them.
+//! Lamps that lie exactly in the plane of a ceiling or a wall must not be hidden by it.
 
 use std::f32::consts::PI;
 
@@ -15,7 +15,7 @@ use crate::surface::MaterialModel;
 use crate::world::{World, WorldCache};
 
 const INTENSITY: f32 = 20.0;
-/// Rays of a scene.
+/// Number of rays in a scene.
 const RAYS: u32 = 400;
 
 /// A white floor at y = 0 and a black sheet through `at` with this unit normal.
@@ -29,7 +29,7 @@ fn floor_and_sheet(at: Vec3, normal: Vec3) -> Stage {
     stage
 }
 
-/// Points of the floor that a ray from a little above them sees, and what is seen there.
+/// Points of the floor that rays from a little above them meet, and their radiance.
 fn floor_seen(stage: &Stage, place: impl Fn(&mut Sampler) -> Vec3) -> Vec<(Vec3, f32)> {
     let (kernel, mut cache) = (Kernel::detect(), WorldCache::default());
     let world = World::new(stage.snapshot(), MaterialModel::Full, kernel, &mut cache);
@@ -45,7 +45,7 @@ fn floor_seen(stage: &Stage, place: impl Fn(&mut Sampler) -> Vec3) -> Vec<(Vec3,
     points.iter().copied().zip(seen).collect()
 }
 
-/// What a white floor shows of a lamp that is a point.
+/// Radiance of a white floor under a point light.
 fn white_under(lamp: Vec3, point: Vec3) -> f32 {
     let to = lamp - point;
     INTENSITY / PI * to.normalize().y / to.length_squared()
@@ -55,7 +55,7 @@ fn lamp(kind: LightKind) -> PunctualLight {
     PunctualLight { kind, color: Vec3::ONE, intensity: INTENSITY, range: None }
 }
 
-/// The floor within 3 m of what is below a place.
+/// Random points of the floor within 3 m of the point below `at`, along each axis.
 fn below(at: Vec3) -> impl Fn(&mut Sampler) -> Vec3 {
     move |sampler| {
         let place = 6.0 * (sampler.square() - 0.5);
@@ -63,7 +63,7 @@ fn below(at: Vec3) -> impl Fn(&mut Sampler) -> Vec3 {
     }
 }
 
-/// Every point of the floor that sees the sheet's plane at an angle is lit as without the sheet.
+/// Checks that the sheet does not darken points of the floor that see its plane at an angle.
 #[track_caller]
 fn lights_the_floor(stage: &mut Stage, kind: LightKind, at: Vec3, normal: Vec3) {
     stage.light(lamp(kind), at, Vec3::NEG_Y);
@@ -78,7 +78,7 @@ fn lights_the_floor(stage: &mut Stage, kind: LightKind, at: Vec3, normal: Vec3) 
     }
 }
 
-/// Places that floating-point numbers hold and such that they do not.
+/// Places that floating-point numbers hold exactly, and places that they do not.
 fn places() -> impl Iterator<Item = Vec3> {
     let at = |n| {
         let mut sampler = Sampler::new(5, 0, n);
@@ -110,7 +110,7 @@ fn a_lamp_in_the_plane_of_a_wall_lights_the_floor() {
     }
 }
 
-/// The plane of a sheet that is turned and scaled into its place is known to some roundings only.
+/// The plane of a sheet that is rotated and scaled into place is known only up to some roundings.
 #[test]
 fn a_lamp_in_a_ceiling_that_is_moved_into_its_place_lights_the_floor() {
     for (at, n) in places().zip(0..) {
@@ -128,7 +128,7 @@ fn a_lamp_in_a_ceiling_that_is_moved_into_its_place_lights_the_floor() {
     }
 }
 
-/// A millimetre behind a sheet a lamp is hidden.
+/// A lamp a millimetre behind a sheet is hidden.
 #[test]
 fn a_lamp_behind_a_sheet_is_hidden() {
     let at = Vec3::new(0.3, 2.7, -1.1);
@@ -137,7 +137,7 @@ fn a_lamp_behind_a_sheet_is_hidden() {
     assert!(floor_seen(&stage, below(at)).iter().all(|(_, seen)| *seen == 0.0));
 }
 
-/// Half a sphere hangs from a ceiling: what each point of it that is not hidden sends, summed up.
+/// A sphere half sunk into a ceiling: the expected light is the sum over its visible points.
 #[test]
 fn a_sphere_half_sunk_into_a_ceiling() {
     let (at, radius) = (Vec3::new(0.3, 2.7, -1.1), 0.4f32);
@@ -161,7 +161,7 @@ fn a_sphere_half_sunk_into_a_ceiling() {
         let (half, whole) = (Vec3::splat(sent(true)), Vec3::splat(sent(false)));
         let mean = look(&stage.snapshot(), point - 0.01 * down(), down(), Paths::new(1));
         if point.x == at.x {
-            // From below nothing of it is hidden.
+            // From directly below nothing of it is hidden.
             check(mean, whole, 0.9 * whole);
         } else {
             check(mean, half, whole);

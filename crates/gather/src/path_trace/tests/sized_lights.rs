@@ -1,4 +1,4 @@
-//! Spheres and suns over a floor.
+//! Spherical lights and suns over a floor.
 
 use std::f32::consts::PI;
 
@@ -25,19 +25,20 @@ fn sun(illuminance: f32, angle: f32) -> PunctualLight {
     }
 }
 
-/// A white floor and where the ray of [`look_down`] meets it.
+/// A white floor, and the point where the ray of [`look_down`] meets it.
 fn white_floor() -> (Stage, Vec3) {
     let mut stage = Stage::default();
     let at = floor(&mut stage, lambert(WHITE, BLACK));
     (stage, at)
 }
 
-/// What a white floor sends back of an illuminance.
+/// Radiance of a white floor under an illuminance.
 fn white(illuminance: f32) -> Vec3 {
     Vec3::splat(illuminance / PI)
 }
 
-/// A black half plane over the receiver, the edge of which is seen `tangent` off the zenith.
+/// A black half plane over the receiver, whose edge is seen at this tangent of the angle from the
+/// zenith.
 fn half_plane(stage: &mut Stage, at: Vec3, tangent: f32) {
     let height = 1.5;
     let black = stage.material(Material { double_sided: true, ..lambert(BLACK, BLACK) });
@@ -45,7 +46,7 @@ fn half_plane(stage: &mut Stage, at: Vec3, tangent: f32) {
     stage.quad(corner, Vec3::X * 40.0, Vec3::NEG_Z * 80.0, black);
 }
 
-/// All of it above the horizon: I cos θ/d², whatever its radius.
+/// A sphere wholly above the horizon gives I cos θ/d², whatever its radius.
 #[test]
 fn a_sphere_in_full_view_lights_as_its_centre_would() {
     let place = Vec3::new(1.0, 1.2, -0.6);
@@ -59,7 +60,8 @@ fn a_sphere_in_full_view_lights_as_its_centre_would() {
     }
 }
 
-/// Its centre on the horizon: L (a − sin a cos a), by integration over rings about the centre.
+/// A sphere with its centre on the horizon gives L (a − sin a cos a), by integration over rings
+/// about the centre.
 #[test]
 fn a_sphere_half_below_the_horizon() {
     let (radius, distance, intensity) = (0.8f32, 1.2f32, 10.0);
@@ -81,7 +83,7 @@ fn a_sphere_half_hidden() {
     check(look_down(&stage, 1), 0.5 * whole, whole);
 }
 
-/// Through the penumbra of an edge: what is left of a circle beside a chord.
+/// The penumbra of an edge: the visible part of the sun is a circle cut by a chord.
 #[test]
 fn the_penumbra_of_the_sun() {
     let angle = 0.04f32;
@@ -100,7 +102,7 @@ fn the_penumbra_of_the_sun() {
     }
 }
 
-/// A receiver within the sphere gets what one on the sphere would.
+/// A receiver within the sphere receives as much as one on its surface.
 #[test]
 fn within_the_sphere() {
     let (mut stage, at) = white_floor();
@@ -136,12 +138,12 @@ fn a_small_sphere_is_a_point() {
     }
 }
 
-/// A mirror shows the disc, evenly; whoever looks at the light itself sees nothing.
+/// A mirror shows an even disc. A camera that looks at the light itself sees nothing.
 #[test]
 fn a_mirror_shows_the_disc() {
     let mirror = Material { metallic: 1.0, roughness: 0.0, ..Material::default() };
     let mirrored = down() * Vec3::new(1.0, -1.0, 1.0);
-    // So large that all but 10⁻⁵ of the lobe's tail lies within.
+    // They are so large that all but 10⁻⁵ of the lobe lies within the disc.
     let (radius, angle) = (1.2f32, 1.0f32);
     let of_sphere = 20.0 / (PI * radius.powi(2));
     let of_sun = 50.0 / (PI * (0.5 * angle).sin().powi(2));
@@ -157,7 +159,7 @@ fn a_mirror_shows_the_disc() {
     }
 }
 
-/// Highlights of a glossy floor, by quadrature over the disc.
+/// Highlights of a glossy floor agree with quadrature over the disc.
 #[test]
 fn highlights_of_a_glossy_floor() {
     let (intensity, radius, distance) = (20.0f32, 0.4f32, 2.0f32);
@@ -180,7 +182,7 @@ fn highlights_of_a_glossy_floor() {
         let up = frame(Vec3::Y).transpose();
         let sine = radius / distance;
         let n = 1 << 16;
-        // Uniform over the disc as it looks: dω = sin² a dA/(π cos).
+        // Points are uniform on the disc as it appears: dω = sin² a dA/(π cos).
         let share = |i: u32| {
             let p = sine * disc(Sampler::new(8, 0, i).square());
             let cos = (1.0 - p.length_squared()).sqrt();
@@ -192,7 +194,7 @@ fn highlights_of_a_glossy_floor() {
     }
 }
 
-/// More lights than are looked at in turn, points among them: the sum of what each gives.
+/// With more lights than candidates, points among them, the result is the sum over the lights.
 #[test]
 fn many_lights() {
     let (mut stage, at) = white_floor();
@@ -209,7 +211,7 @@ fn many_lights() {
     check(look_down(&stage, 1), expected, 1.03 * expected);
 }
 
-/// Light of a lamp scattered once is direct light, however it was found.
+/// Light of a lamp scattered once is direct light, whichever strategy found it.
 #[test]
 fn found_either_way_it_is_direct_light() {
     use super::{Integrator, Kernel, Look, MaterialModel, Paths, World, WorldCache};
