@@ -5,15 +5,15 @@ use glam::{BVec3, Vec3};
 pub struct Aabb {
     /// The corner with the least coordinates.
     pub min: Vec3,
-    /// The corner with the greatest.
+    /// The corner with the greatest coordinates.
     pub max: Vec3,
 }
 
 impl Aabb {
-    /// The box around nothing.
+    /// The empty box.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// Whether nothing is in it.
+    /// Whether the box is empty.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
@@ -26,14 +26,14 @@ impl Aabb {
         })
     }
 
-    /// The box around what a transform makes of this one.
+    /// The box around the transformed corners of this one.
     pub fn transformed(&self, transform: impl Fn(Vec3) -> Vec3) -> Self {
         let mut result = Self::EMPTY;
         self.corners().for_each(|corner| result.grow(transform(corner)));
         result
     }
 
-    /// Takes a point in; points that are not finite are left out.
+    /// Grows the box to hold a point; points that are not finite are ignored.
     pub fn grow(&mut self, point: Vec3) {
         if point.is_finite() {
             self.min = self.min.min(point);

@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec4};
 
-/// What a curve moves.
+/// The property of a node that a curve moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Property {
     Translation,
@@ -11,7 +11,7 @@ pub(crate) enum Property {
     Weights,
 }
 
-/// How a curve goes from key to key.
+/// The interpolation between keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Interpolation {
     Step,
@@ -19,22 +19,24 @@ pub(crate) enum Interpolation {
     CubicSpline,
 }
 
-/// A value over time. Before the first key it has the first's value, after the last the last's.
+/// A value over time. Before the first key it is the first key's, after the last key the last
+/// key's.
 #[derive(Clone, Debug)]
 pub(crate) struct Curve {
     pub(crate) property: Property,
     pub(crate) interpolation: Interpolation,
     /// Numbers in a value: 3, 4 for rotations, or the number of morph targets.
     pub(crate) width: usize,
-    /// Times of the keys, seconds: at least one, none less than the one before. At the time of several
-    /// the value jumps from the first's to the last's.
+    /// Times of the keys, seconds, in ascending order; at least one. Where several keys have the
+    /// same time, the value jumps there from the first one's to the last one's.
     pub(crate) times: Vec<f32>,
-    /// `width` numbers a key; of cubic splines three times that: in-tangent, value, out-tangent.
+    /// `width` numbers for each key. Cubic splines have three times as many: in-tangent, value and
+    /// out-tangent.
     pub(crate) values: Vec<f32>,
 }
 
 impl Curve {
-    /// Number of values that a curve of these keys needs.
+    /// Number of values that a curve of `keys` keys needs.
     pub(crate) fn values_needed(interpolation: Interpolation, width: usize, keys: usize) -> usize {
         let a_key = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
         a_key * width * keys
@@ -103,7 +105,7 @@ fn quat(value: &[f32]) -> Quat {
     v.try_normalize().map_or(Quat::IDENTITY, Quat::from_vec4)
 }
 
-/// A time brought into an animation's length by repeating it, also before 0.
+/// Wraps a time into 0 to `duration` by repeating the animation, also for times before 0.
 pub(crate) fn wrap(time: f64, duration: f64) -> f64 {
     if duration > 0.0 { time - (time / duration).floor() * duration } else { 0.0 }
 }

@@ -1,4 +1,4 @@
-//! What one glTF file holds, read and checked, before it is placed into a scene.
+//! The checked contents of a glTF file, before they are placed into a scene.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,22 +10,22 @@ use crate::settings::Settings;
 use crate::trs::Trs;
 use crate::{Material, Mesh, PunctualLight};
 
-/// A glTF file's contents. Indices (of nodes, meshes, …) are the file's own and lie in range.
+/// A glTF file's contents. Indices (of nodes, meshes, …) are the file's own and are in range.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Asset {
     pub(crate) nodes: Vec<AssetNode>,
-    /// Nodes at the top of the file's scene.
+    /// Root nodes of the file's scene.
     pub(crate) roots: Vec<u32>,
     pub(crate) meshes: Vec<Arc<Mesh>>,
-    /// The file's materials, and the default material as the last.
+    /// The file's materials, followed by the default material.
     pub(crate) materials: Vec<Material>,
-    /// What meshes add to these indices when they name materials: 0 in the file, and the number of
-    /// the first of them in a scene.
+    /// Added to the file's material indices in `meshes`. It is 0 in the file, and the number of the
+    /// file's first material in a scene.
     pub(crate) first_material: u32,
     pub(crate) skins: Vec<Arc<Skin>>,
     pub(crate) animations: Vec<Animation>,
     pub(crate) cameras: Vec<Camera>,
-    /// From the scene's extras.
+    /// Settings from the scene's extras.
     pub(crate) settings: Settings,
     pub(crate) warnings: Vec<String>,
     /// The glTF file, and after it the buffers and images that it refers to.
@@ -40,12 +40,13 @@ pub(crate) struct AssetNode {
     pub(crate) children: Vec<u32>,
     pub(crate) parent_from_node: Trs,
     pub(crate) mesh: Option<u32>,
-    /// Where the mesh is shown, relative to the node; once, at the node, where absent.
+    /// Transforms at which the mesh is shown, relative to the node. Where absent, it is shown once,
+    /// at the node.
     pub(crate) instances: Option<Arc<[DAffine3]>>,
     pub(crate) skin: Option<u32>,
     pub(crate) camera: Option<u32>,
     pub(crate) light: Option<PunctualLight>,
-    /// It and all below it are neither drawn nor give light.
+    /// Whether the node and all below it are hidden: neither drawn nor giving light.
     pub(crate) hidden: bool,
     /// Morph weights; the mesh's own where empty.
     pub(crate) weights: Vec<f32>,
@@ -54,7 +55,7 @@ pub(crate) struct AssetNode {
 /// Joints that deform a mesh.
 #[derive(Debug)]
 pub(crate) struct Skin {
-    /// Nodes of the file, and what brings the mesh at rest into the space of each.
+    /// Each joint's node in the file, and the transform from the mesh at rest to the joint's space.
     pub(crate) joints: Vec<(u32, Affine3A)>,
 }
 
@@ -67,7 +68,7 @@ pub(crate) struct Animation {
     pub(crate) channels: Vec<Channel>,
 }
 
-/// A curve and what it moves.
+/// A curve and the node that it moves.
 #[derive(Clone, Debug)]
 pub(crate) struct Channel {
     pub(crate) node: u32,
@@ -79,25 +80,25 @@ pub(crate) struct Channel {
 pub struct Camera {
     /// Name in the file.
     pub name: String,
-    /// How it draws.
+    /// Its projection.
     pub projection: Projection,
 }
 
 /// A camera's projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
-    /// Things far away are small.
+    /// Perspective: things far away look small.
     Perspective {
         /// Vertical field of view, radians, between 0 and π.
         yfov: f32,
-        /// Width by height; the picture's own when absent.
+        /// Width by height; `None` takes the picture's own.
         aspect_ratio: Option<f32>,
         /// Distance of the near plane, metres.
         near: f32,
         /// Distance of the far plane, metres; infinite when absent.
         far: Option<f32>,
     },
-    /// Things far away are as large as near ones.
+    /// Orthographic: things far away look as large as near ones.
     Orthographic {
         /// Half the width of the view, metres.
         half_width: f32,
@@ -113,9 +114,10 @@ pub enum Projection {
 /// A file that clients need to draw the scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneFile {
-    /// Path relative to the scene's folder, `/` between its parts, not percent-encoded.
+    /// Path relative to the scene's folder, with `/` between its parts and without
+    /// percent-encoding.
     pub name: String,
-    /// What is in it.
+    /// The file's contents.
     pub contents: FileContents,
 }
 

@@ -8,27 +8,27 @@ use rayon::prelude::*;
 use crate::gltf::face_normal;
 use crate::mesh::{Mesh, Primitive, Vertices};
 
-/// Vertices handled by a core at a time.
+/// Number of vertices that a core handles at a time.
 const BATCH: usize = 2048;
 
-/// Where a skin's joints are.
+/// Transforms of a skin's joints at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pose {
-    /// One a joint, from the mesh at rest to the space of the skinned vertices.
+    /// For each joint, the transform from the mesh at rest to the space of the skinned vertices.
     pub joints: Vec<Affine3A>,
-    /// The same for vertices without joints, and for joints that there are not.
+    /// The transform of vertices without joints, and of joints that do not exist.
     pub rigid: Affine3A,
 }
 
 impl Pose {
-    /// The transform of a joint, or of what has none.
+    /// The transform of a joint; `rigid` where there is none.
     pub fn of(&self, joint: Option<usize>) -> &Affine3A {
         joint.and_then(|joint| self.joints.get(joint)).unwrap_or(&self.rigid)
     }
 }
 
-/// How a mesh is deformed. Who deforms vertices elsewhere, on a graphics device, reads the cause
-/// alone; for everyone else they are computed when they are first asked for, and kept.
+/// The deformation of a mesh. Vertices are computed when they are first asked for, and kept. A
+/// client that deforms them on a graphics device reads weights and pose alone.
 #[derive(Debug)]
 pub struct Deformation {
     mesh: Arc<Mesh>,
@@ -38,46 +38,46 @@ pub struct Deformation {
 }
 
 impl Deformation {
-    /// Of a mesh's morph targets by `weights` (1 displaces in full; targets past the last one keep to
-    /// 0), and then of its skin by a pose.
+    /// Deforms a mesh by morph targets, then by a skin. A weight of 1 applies a target in full;
+    /// targets without a weight stay at 0.
     pub fn new(mesh: Arc<Mesh>, weights: Vec<f32>, pose: Option<Pose>) -> Self {
         Self { mesh, weights, pose, vertices: OnceLock::new() }
     }
 
-    /// What is deformed.
+    /// The mesh at rest.
     pub fn mesh(&self) -> &Arc<Mesh> {
         &self.mesh
     }
 
-    /// Of morph targets, the first first.
+    /// Weights of the morph targets, in their order.
     pub fn weights(&self) -> &[f32] {
         &self.weights
     }
 
-    /// Where the joints are; absent for a mesh that is only morphed.
+    /// The pose of the joints; `None` for a mesh that is only morphed.
     pub fn pose(&self) -> Option<&Pose> {
         self.pose.as_ref()
     }
 
-    /// The deformed vertices, one entry a primitive.
+    /// The deformed vertices, one entry for each primitive.
     #[inline]
     pub fn vertices(&self) -> &[Vertices] {
         self.vertices.get().unwrap_or_else(|| {
-            // Not within the lock: a thread that waits for others' batches may take up work that
-            // asks for these vertices too.
+            // This is not computed within the lock. A thread that waits for others' batches may
+            // take up work that asks for these vertices too.
             let vertices = deform(&self.mesh, &self.weights, self.pose.as_ref());
             self.vertices.get_or_init(|| vertices)
         })
     }
 
-    /// Whether it is this one, of that mesh.
+    /// Whether the deformation is of this mesh, with these weights and this pose.
     pub(crate) fn has_cause(&self, mesh: &Arc<Mesh>, weights: &[f32], pose: Option<&Pose>) -> bool {
         Arc::ptr_eq(&self.mesh, mesh) && self.weights == weights && self.pose.as_ref() == pose
     }
 }
 
-/// A mesh's vertices after morphing by `weights` and, where it has a skin, skinning. One entry a
-/// primitive.
+/// Vertices of a mesh after morphing by `weights` and, where there is a pose, skinning; one entry
+/// for each primitive.
 fn deform(mesh: &Mesh, weights: &[f32], pose: Option<&Pose>) -> Vec<Vertices> {
     let deform = |primitive: &Primitive| {
         let mut vertices = morph(primitive, weights);
@@ -156,8 +156,8 @@ fn skin(primitive: &Primitive, vertices: &mut Vertices, pose: &Pose) {
     });
 }
 
-/// The inverse transpose up to a positive factor, also of matrices without inverse: the cofactors
-/// with the determinant's sign, so that normals keep to the side that they are on.
+/// The inverse transpose up to a positive factor; singular matrices have one too. It is the
+/// cofactor matrix with the determinant's sign, so that normals stay on their side.
 fn normal_matrix(m: &Mat3A) -> Mat3A {
     let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
     let cofactors = Mat3A::from_cols(y.cross(z), z.cross(x), x.cross(y));

@@ -1,15 +1,17 @@
-//! Edits: changes of a scene as plain data, the same in scripts, on the wire and in programs.
+//! Edits: changes of a scene as plain data. Scripts, the wire and programs use the same ones.
 
 use glam::{Quat, Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 
 use crate::{AnimationId, Environment, MaterialId, MeshId, NodeId, PunctualLight};
 
-/// A change of the scene. Edits are applied whole or refused with a reason, in the server's order.
+/// A change of the scene. The server applies edits in its order, each wholly, or refuses it with a
+/// reason.
 ///
-/// In JSON an edit is an object whose `edit` names it: `{"edit":"move_node","node":3,"translation":[0,1,0]}`.
-/// Fields left out stay as they are. Where an edit creates a node, the client leaves `node` out; the
-/// server fills it in before it passes the edit on, so that all replicas agree.
+/// In JSON an edit is an object whose `edit` names it:
+/// `{"edit":"move_node","node":3,"translation":[0,1,0]}`. Absent fields stay unchanged. Where an
+/// edit creates a node, the client leaves `node` out. The server fills it in before it passes the
+/// edit on, so that all replicas agree.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "edit", rename_all = "snake_case")]
 pub enum Edit {
@@ -17,28 +19,28 @@ pub enum Edit {
     MoveNode {
         /// The node.
         node: NodeId,
-        /// What to set.
+        /// The new values; absent ones stay unchanged.
         #[serde(flatten)]
         transform: Transform,
     },
     /// Adds a node that shows a mesh of this scene or another glTF file.
     AddInstance {
-        /// Filled in by the server: the first node added (a file's nodes take consecutive numbers).
+        /// Filled in by the server: the first node added. A file's nodes take consecutive numbers.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         node: Option<NodeId>,
-        /// Its name, by which programs find it again.
+        /// Name of the node, by which programs find it again.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<NodeName>,
-        /// What to show.
+        /// The mesh or file to show.
         source: InstanceSource,
-        /// Under which node; the scene's root when absent.
+        /// Parent node; the scene's root when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         parent: Option<NodeId>,
-        /// Where, relative to the parent.
+        /// Transform relative to the parent.
         #[serde(default)]
         transform: Transform,
     },
-    /// Removes a node with all below it.
+    /// Removes a node and all nodes below it.
     RemoveNode {
         /// The node.
         node: NodeId,
@@ -48,15 +50,15 @@ pub enum Edit {
         /// Filled in by the server.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         node: Option<NodeId>,
-        /// Its name, by which programs find it again.
+        /// Name of the node, by which programs find it again.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<NodeName>,
         /// The light.
         light: PunctualLight,
-        /// Under which node; the scene's root when absent.
+        /// Parent node; the scene's root when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         parent: Option<NodeId>,
-        /// Where, relative to the parent.
+        /// Transform relative to the parent.
         #[serde(default)]
         transform: Transform,
     },
@@ -64,7 +66,7 @@ pub enum Edit {
     SetLight {
         /// The node that carries it.
         node: NodeId,
-        /// What to set.
+        /// The new values; absent ones stay unchanged.
         #[serde(flatten)]
         light: LightSpec,
     },
@@ -77,7 +79,7 @@ pub enum Edit {
     SetMaterial {
         /// The material.
         material: MaterialId,
-        /// What to set.
+        /// The new values; absent ones stay unchanged.
         #[serde(flatten)]
         change: MaterialChange,
     },
@@ -85,19 +87,19 @@ pub enum Edit {
     SetAnimation {
         /// The animation.
         animation: AnimationId,
-        /// What to set.
+        /// The new values; absent ones stay unchanged.
         #[serde(flatten)]
         playback: Playback,
     },
     /// Replaces the environment.
     SetEnvironment {
-        /// The new one.
+        /// The new environment.
         environment: Environment,
     },
 }
 
 impl Edit {
-    /// The file that it names, as it writes it.
+    /// The URI of the file that the edit names, as written in the edit.
     pub fn file(&self) -> Option<&str> {
         match self {
             Self::AddInstance { source: InstanceSource::File(uri), .. }
@@ -107,20 +109,20 @@ impl Edit {
     }
 }
 
-/// The name of a node that an edit adds: 1 to 64 bytes of text without control characters.
+/// Name of a node that an edit adds: 1 to 64 bytes of text without control characters.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct NodeName(String);
 
 impl NodeName {
-    /// A name, if the text can be one.
+    /// A name; `None` where the text cannot be one.
     pub fn new(text: impl Into<String>) -> Option<Self> {
         let text = text.into();
         let is_sound = (1..=64).contains(&text.len()) && !text.chars().any(char::is_control);
         is_sound.then_some(Self(text))
     }
 
-    /// As text.
+    /// The name as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -149,12 +151,12 @@ pub struct Transform {
     /// Quaternion x, y, z, w; normalised when applied, refused when its length is near zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<Quat>,
-    /// Factors along the node's axes, none of them zero.
+    /// Factors along the node's axes, none of which may be zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<Vec3>,
 }
 
-/// Where an added instance's mesh comes from.
+/// Source of an added instance's mesh.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum InstanceSource {
@@ -170,10 +172,10 @@ pub struct LightSpec {
     /// Linear colour.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub color: Option<Vec3>,
-    /// Candela or lux.
+    /// Candela, or lux for directional lights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intensity: Option<f32>,
-    /// Metres.
+    /// Distance in metres at which the light ends.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub range: Option<f32>,
     /// Spot lights only: half-angle where falloff begins, radians.
@@ -182,10 +184,10 @@ pub struct LightSpec {
     /// Spot lights only: half-angle where the light ends, radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outer: Option<f32>,
-    /// Point and spot lights only: of the sphere that shines, metres.
+    /// Point and spot lights only: radius of the luminous sphere, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<f32>,
-    /// Directional lights only: angle that the shining disc spans, radians.
+    /// Directional lights only: angular diameter of the luminous disc, radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle: Option<f32>,
 }
@@ -217,10 +219,10 @@ pub struct MaterialChange {
     /// Linear, each channel 0 to 10⁹.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub specular_color: Option<Vec3>,
-    /// Finite; below 0 turns the normal map's x and y around.
+    /// Finite; a negative value flips the normal map's x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal_scale: Option<f32>,
-    /// Masked materials only: 0 or more; above 1 nothing is covered.
+    /// Masked materials only: 0 or more; above 1 the whole surface is a hole.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alpha_cutoff: Option<f32>,
 }
@@ -228,13 +230,13 @@ pub struct MaterialChange {
 /// Playback of an animation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Playback {
-    /// Runs or stands.
+    /// Whether the animation runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub playing: Option<bool>,
-    /// Jumps to this time of the animation, seconds.
+    /// Seconds of the animation to jump to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
-    /// Rate, 1 unless set; negative runs backwards.
+    /// Rate of playback, 1 unless set; negative runs backwards.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed: Option<f64>,
 }

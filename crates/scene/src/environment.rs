@@ -1,4 +1,4 @@
-//! Light from infinitely far, from everywhere.
+//! The environment: light from infinitely far, by direction.
 
 use std::sync::Arc;
 
@@ -30,10 +30,10 @@ pub enum Environment {
     Image {
         /// File name relative to the scene's folder (.hdr or .exr).
         uri: String,
-        /// Multiplies the picture.
+        /// Factor of the picture's texels.
         #[serde(default = "one")]
         intensity: f32,
-        /// Turns the picture about +Y, radians.
+        /// Rotation of the picture about +Y, radians.
         #[serde(default)]
         rotation: f32,
         /// The picture itself, filled in by the scene when it is read.
@@ -50,21 +50,21 @@ impl Environment {
     /// No light.
     pub const BLACK: Self = Self::Constant { radiance: Vec3::ZERO };
 
-    /// A clear sky that gives level ground so many lux.
+    /// A clear sky that illuminates level ground with this illuminance.
     pub fn clear_sky(lux: f32) -> Self {
         const ZENITH: Vec3 = Vec3::new(0.45, 0.65, 1.0);
         const HORIZON: Vec3 = Vec3::new(0.85, 0.93, 1.0);
         const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
-        /// Of what the horizon gives, what the ground below it sends back up.
+        /// Radiance that the ground sends up, as a share of the horizon's.
         const GROUND: f32 = 0.3;
-        // ∫ L cos over the upper half, for L linear in the sine of the elevation.
+        // This is ∫ L cos over the upper half, for L linear in the sine of the elevation.
         let unit = std::f32::consts::PI * (HORIZON / 3.0 + 2.0 * ZENITH / 3.0).dot(LUMINANCE);
         let scale = lux / unit;
         let (zenith, horizon) = (scale * ZENITH, scale * HORIZON);
         Self::Sky { zenith, horizon, ground: GROUND * horizon }
     }
 
-    /// Whether any light comes from it, a picture's texels aside.
+    /// Whether the environment gives light. A picture's texels are not examined.
     pub(crate) fn shines(&self) -> bool {
         match self {
             Self::Constant { radiance } => *radiance != Vec3::ZERO,
@@ -75,7 +75,10 @@ impl Environment {
         }
     }
 
-    /// Whether it makes sense; the reason when it does not.
+    /// Checks values against their ranges.
+    ///
+    /// # Errors
+    /// The reason why the environment makes no sense.
     pub fn check(&self) -> Result<(), String> {
         let is_light = |v: Vec3| v.cmpge(Vec3::ZERO).all() && v.max_element() <= limits::LIGHT;
         let sound = match self {
@@ -107,7 +110,7 @@ pub struct HdrImage {
     pub width: u32,
     /// Height in texels.
     pub height: u32,
-    /// Linear Rec. 709, finite, ≥ 0; `width * height` texels.
+    /// Linear Rec. 709, finite and ≥ 0; `width * height` texels.
     pub texels: Vec<Vec3>,
 }
 
@@ -120,7 +123,7 @@ mod tests {
         let Environment::Sky { zenith, horizon, .. } = Environment::clear_sky(1000.0) else {
             panic!("no sky")
         };
-        // Midpoint rule over rings of equal sin² of the elevation, each of cosine weight π/n.
+        // The midpoint rule over rings of equal sin² of the elevation, each with cosine weight π/n.
         let n = 1000;
         let irradiance: Vec3 = (0..n)
             .map(|i| ((i as f32 + 0.5) / n as f32).sqrt())
@@ -130,7 +133,7 @@ mod tests {
         assert!((lux / 1000.0 - 1.0).abs() < 1e-3, "{lux}");
     }
 
-    /// The page offers the same sky.
+    /// The web page offers the same sky.
     #[test]
     fn the_recorded_sky() {
         let recorded: serde_json::Value =

@@ -1,14 +1,14 @@
-//! What can be wrong with a scene.
+//! Errors of loading a scene.
 
 use std::path::PathBuf;
 
-/// A scene that cannot be loaded: which file, and what is wrong with it.
+/// The reason why a scene cannot be loaded, with the file at fault.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {fault}", file.display())]
 pub struct SceneError {
-    /// The glTF or TOML file at fault, as it was named.
+    /// The glTF or TOML file at fault, as the caller or the scene named it.
     pub file: PathBuf,
-    /// What is wrong.
+    /// What is wrong with the file.
     pub fault: Fault,
 }
 
@@ -16,10 +16,10 @@ pub struct SceneError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Neither a file nor a built-in scene.
+    /// The name is neither a file nor a built-in scene.
     #[error("no such file, and no built-in scene of that name; there are {builtins}")]
     Unknown {
-        /// The names there are.
+        /// Names of the built-in scenes.
         builtins: String,
     },
     /// The file cannot be read.
@@ -28,49 +28,49 @@ pub enum Fault {
     /// A file that the scene refers to cannot be read.
     #[error("refers to {uri:?}, which cannot be read: {source}; put it beside the scene")]
     Missing {
-        /// As the scene names it.
+        /// The URI as the scene writes it.
         uri: String,
-        /// Why.
+        /// Why it cannot be read.
         source: std::io::Error,
     },
     /// A URI leads out of the scene's folder or to another machine.
     #[error("refers to {uri:?}; only files in the scene's own folder are read: copy it there")]
     Outside {
-        /// As the scene names it.
+        /// The URI as the scene writes it.
         uri: String,
     },
-    /// A URI that can be no file's name.
+    /// A URI cannot be the name of a file.
     #[error("refers to {uri:?}, {why}")]
     Name {
-        /// As the scene names it.
+        /// The URI as the scene writes it.
         uri: String,
         /// What is wrong with it.
         why: &'static str,
     },
-    /// Not JSON, or not of glTF's form.
+    /// The file is not JSON, or lacks the structure of glTF.
     #[error("is not valid glTF: {0}")]
     Json(serde_json::Error),
-    /// Not TOML, or not of the form of a scene's settings.
+    /// The file is not TOML, or lacks the structure of a scene's settings.
     #[error("{0}")]
     Toml(toml::de::Error),
     /// The file contradicts itself or glTF; the text says where.
     #[error("{0}")]
     Invalid(String),
-    /// An extension is required that this program does not know.
+    /// The file requires an extension that this program does not know.
     #[error(
         "unknown required extension {0}; export the scene again without it (compressed meshes and \
          textures are not read)"
     )]
     UnknownExtension(String),
-    /// Nothing to draw.
+    /// The scene has no triangles.
     #[error("has no triangles in its scene; points, lines and hidden nodes are not drawn")]
     NoTriangles,
-    /// More than a server should hold.
+    /// The scene exceeds a limit.
     #[error("{what} exceed the limit of {limit}")]
     TooLarge {
-        /// What there is too much of.
+        /// The quantity that is too large.
         what: String,
-        /// How much there may be.
+        /// Its limit.
         limit: u64,
     },
     /// A picture cannot be decoded.
@@ -78,16 +78,16 @@ pub enum Fault {
     Image {
         /// Its URI or index.
         name: String,
-        /// Why.
+        /// Why it cannot be decoded.
         reason: String,
     },
-    /// What was found when the file was last read.
+    /// The fault that was found when the file was last read.
     #[error("{0}")]
     Remembered(String),
 }
 
 impl Fault {
-    /// Says where: `invalid("…").at("mesh 3")` reads `mesh 3: …`.
+    /// Prefixes the message with a place: `invalid("…").at("mesh 3")` reads `mesh 3: …`.
     pub(crate) fn at(self, place: &str) -> Self {
         match self {
             Self::Invalid(what) => Self::Invalid(format!("{place}: {what}")),
@@ -108,7 +108,7 @@ pub(crate) fn invalid(what: impl Into<String>) -> Fault {
     Fault::Invalid(what.into())
 }
 
-/// Adds the place to a fault on its way up.
+/// Adds a place to the fault of a result.
 pub(crate) trait At<T> {
     fn at(self, place: impl FnOnce() -> String) -> Result<T, Fault>;
 }

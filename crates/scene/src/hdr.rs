@@ -12,8 +12,9 @@ use crate::error::Fault;
 use crate::gltf::source::{Folder, shorten};
 use crate::limits::{self, Budget};
 
-/// Reads an .hdr or .exr file, whose name within the scene's folder is `name`. Texels that are not finite or negative become
-/// black, or the largest light; the second value counts them.
+/// Reads an .hdr or .exr file, whose name within the scene's folder is `name`. Texels that are
+/// negative or NaN become black, those that are infinite or too bright the largest light. The
+/// second value is the number of texels changed.
 pub(crate) fn read(
     path: &Path,
     name: &str,
@@ -43,7 +44,8 @@ pub(crate) fn read(
         let side = limits::IMAGE_SIDE;
         return Err(fail(format!("{width} × {height} texels; 1 to {side} a side are read")));
     }
-    // Three floats where other images have four bytes.
+    // The budget counts texels of four bytes; a texel here has three floats, so the height counts
+    // thrice.
     budget.texels(width, 3 * height)?;
     let decoded = reader()?.decode().map_err(|e| fail(e.to_string()))?.into_rgb32f();
     let mut repaired = 0;

@@ -1,12 +1,14 @@
 //! Scenes as data: glTF and built-in scenes, their animation, and edits.
 //!
-//! A [`Scene`] is loaded once, changed by [`Edit`]s and by time, and asked for a [`Snapshot`]: one
-//! moment of it, flattened to placed instances and lights, which is all that a gatherer sees.
+//! A [`Scene`] is loaded once and changed by [`Edit`]s and by time. It gives [`Snapshot`]s: single
+//! moments, flattened to placed instances and lights. A gatherer sees nothing else.
 //!
 //! Space is glTF's: right-handed, +Y up, metres. Colours are linear Rec. 709. Lights have the units
-//! of KHR_lights_punctual (candela, lux); emission is a radiance in cd/m². The back face of a
-//! single-sided material blocks light, reflects none and emits none, wherever light is computed; which
-//! side is the front follows the winding after all transforms, mirroring ones too.
+//! of KHR_lights_punctual (candela, lux); emission is a radiance in cd/m².
+//!
+//! The back face of a single-sided material blocks light, reflects none and emits none, wherever
+//! light is computed. The winding after all transforms, mirroring ones included, tells which side
+//! is the front.
 //!
 //! ```
 //! use lumencast_scene::{Edit, NodeId, Scene, Transform};
@@ -21,8 +23,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Loading is total: any bytes give a scene or an error that says where the fault lies, and memory is
-//! asked for only after it has been counted against limits.
+//! Loading is total: any bytes give a scene or an error that says where the fault lies. Sizes are
+//! checked against limits before memory is allocated.
 
 mod aabb;
 mod animation;
@@ -82,8 +84,8 @@ macro_rules! id {
 }
 
 id! {
-    /// A node: its index in the glTF file, or, for nodes added by edits, the next free number.
-    /// Numbers are never used twice, so every replica of the scene agrees on them.
+    /// A node: its index in the glTF file, or the next free number where an edit added it. Numbers
+    /// are never reused, so every replica of the scene agrees on them.
     NodeId
 }
 id! {

@@ -9,9 +9,9 @@ use crate::{NodeId, limits};
 
 /// A punctual light as in KHR_lights_punctual. It shines along its node's −Z.
 ///
-/// It may have a size, which glTF does not know and reads from the light's `extras.lumencast`.
-/// Intensity means the same whatever the size: what a surface receives that faces the light's
-/// middle and sees all of it.
+/// It may have a size, which glTF does not define; the loader reads it from the light's
+/// `extras.lumencast`. Intensity means the same for any size: it gives the illuminance of a surface
+/// that faces the light's centre and sees all of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PunctualLight {
     /// Point, spot or directional.
@@ -23,19 +23,22 @@ pub struct PunctualLight {
     /// Candela (point, spot) or lux on a surface that faces it (directional); ≥ 0.
     #[serde(default = "one")]
     pub intensity: f32,
-    /// Distance in metres past which the light is cut off smoothly as KHR_lights_punctual
-    /// recommends; infinite when absent.
+    /// Distance in metres at which the light has faded to zero, as KHR_lights_punctual recommends;
+    /// infinite when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub range: Option<f32>,
 }
 
 impl PunctualLight {
-    /// Whether any light comes from it.
+    /// Whether the light gives any light.
     pub(crate) fn shines(&self) -> bool {
         self.intensity > 0.0 && self.color != Vec3::ZERO
     }
 
-    /// Whether it makes sense; the reason when it does not.
+    /// Checks values against their ranges.
+    ///
+    /// # Errors
+    /// The reason why the light makes no sense.
     pub fn check(&self) -> Result<(), String> {
         let Self { kind, color, intensity, range } = *self;
         if !(0.0..=limits::LIGHT).contains(&intensity) {
@@ -84,7 +87,7 @@ fn one() -> f32 {
     1.0
 }
 
-/// By reference, as serde asks.
+/// Takes a reference, as serde requires.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
 fn is_zero(size: &f32) -> bool {
     *size == 0.0
@@ -94,9 +97,9 @@ fn is_zero(size: &f32) -> bool {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum LightKind {
-    /// Shines alike in every direction.
+    /// Shines equally in all directions.
     Point {
-        /// Of the sphere that shines, metres; 0 for a point.
+        /// Radius of the luminous sphere, metres; 0 for a point.
         #[serde(default, skip_serializing_if = "is_zero")]
         radius: f32,
     },
@@ -106,14 +109,14 @@ pub enum LightKind {
         inner: f32,
         /// Half-angle where the light ends, at most π/2.
         outer: f32,
-        /// Of the sphere that shines, metres; 0 for a point. Falloff is by the direction from the
-        /// sphere's centre.
+        /// Radius of the luminous sphere, metres; 0 for a point. The falloff depends on the
+        /// direction from the sphere's centre.
         #[serde(default, skip_serializing_if = "is_zero")]
         radius: f32,
     },
     /// Light from infinitely far.
     Directional {
-        /// Angle that the shining disc spans, radians: 0.0093 for the sun, at most π; 0 for
+        /// Angular diameter of the luminous disc, radians: 0.0093 for the sun, at most π; 0 for
         /// parallel light.
         #[serde(default, skip_serializing_if = "is_zero")]
         angle: f32,
@@ -121,7 +124,7 @@ pub enum LightKind {
 }
 
 impl LightKind {
-    /// Sets those sizes that are given; the reason where the kind has no such size.
+    /// Sets the sizes that are given. The error says that the kind of light has no such size.
     pub(crate) fn resize(
         &mut self,
         new_radius: Option<f32>,
@@ -150,10 +153,10 @@ impl LightKind {
 pub struct PlacedLight {
     /// The node that carries it.
     pub node: NodeId,
-    /// What it is.
+    /// Its properties.
     pub light: PunctualLight,
     /// World position, metres.
     pub position: Vec3,
-    /// Unit vector along which it shines.
+    /// Unit vector along which the light shines.
     pub direction: Vec3,
 }

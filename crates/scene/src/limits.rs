@@ -1,43 +1,44 @@
-//! What a scene may hold, so that no file takes a server down. Counted before memory is asked for,
-//! over the scene's own file and all that edits add to it.
+//! Limits of what a scene may hold, so that no file exhausts a server's memory. They are checked
+//! before memory is allocated. They cover the scene's own file and all files that edits add.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::Fault;
 
-/// Bytes of one file.
+/// Size of one file in bytes.
 pub(crate) const FILE_BYTES: u64 = 4 << 30;
-/// Bytes of a file that an edit names, and of each file that this one refers to.
+/// Size in bytes of a file that an edit names, and of each file that it refers to.
 pub(crate) const ADDED_FILE_BYTES: u64 = 512 << 20;
-/// Bytes of one glTF's JSON.
+/// Size in bytes of one glTF's JSON.
 pub(crate) const JSON_BYTES: u64 = 256 << 20;
-/// Triangles.
+/// Number of triangles.
 pub(crate) const TRIANGLES: u64 = 64 << 20;
-/// Bytes of vertices, indices, morph targets and key frames, decoded.
+/// Decoded size in bytes of vertices, indices, morph targets and key frames.
 pub(crate) const GEOMETRY_BYTES: u64 = 4 << 30;
-/// Texels of all images together.
+/// Number of texels of all images together.
 pub(crate) const TEXELS: u64 = 512 << 20;
-/// Texels along an image's side.
+/// Number of texels along an image's side.
 pub(crate) const IMAGE_SIDE: u32 = 16_384;
-/// Elements of an accessor that no buffer stands behind (all zeros, or sparse).
+/// Number of elements of an accessor without a buffer (all zeros, or sparse).
 pub(crate) const ZERO_ELEMENTS: u64 = 1 << 24;
-/// Nodes at a time, and their instances.
+/// Number of nodes at a time, together with their instances.
 pub(crate) const NODES: usize = 1_000_000;
-/// glTF files that edits add.
+/// Number of glTF files that edits add.
 pub(crate) const FILES: usize = 1_024;
-/// Probes of one volume.
+/// Number of probes of one volume.
 pub(crate) const PROBES: u64 = 65_536;
-/// Cells along z of a volume as it is sent; deeper ones are split. Its atlas at L2, as which every
-/// order is drawn, has to fit the 256 slices that WebGL2 guarantees: 7 · (34 + 2) = 252.
+/// Number of cells along z of a volume on the wire; deeper volumes are split. Clients draw every
+/// order as L2, whose atlas has to fit the 256 slices that WebGL2 guarantees: 7 · (34 + 2) = 252.
 pub(crate) const VOLUME_DEPTH: u32 = 34;
-/// Volumes of a scene.
+/// Number of volumes of a scene.
 pub(crate) const VOLUMES: usize = 64;
-/// Largest radiance (cd/m²), luminous intensity (cd) and illuminance (lx); the sun's disc has 2·10⁹.
+/// Largest radiance (cd/m²), luminous intensity (cd) and illuminance (lx); the sun's disc has 2·10⁹
+/// cd/m².
 pub(crate) const LIGHT: f32 = 1e12;
 /// Largest coordinate (metres) and scale.
 pub(crate) const EXTENT: f32 = 1e9;
 
-/// How much of the limits files take.
+/// Amounts of the limited quantities that files use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Taken {
     triangles: u64,
@@ -46,7 +47,7 @@ pub(crate) struct Taken {
 }
 
 impl Taken {
-    /// An error that says which limit it exceeds.
+    /// Returns an error that names the limit exceeded, if any.
     pub(crate) fn check(self) -> Result<(), Fault> {
         let limits = [
             (self.triangles, TRIANGLES, WHAT_TRIANGLES),
@@ -101,7 +102,7 @@ const WHAT_TRIANGLES: &str = "triangles";
 const WHAT_GEOMETRY: &str = "bytes of geometry and animation";
 const WHAT_TEXELS: &str = "texels";
 
-/// What is taken of the limits while files are read, by several threads.
+/// Amounts used while several threads read files.
 #[derive(Debug, Default)]
 pub(crate) struct Budget {
     triangles: AtomicU64,
@@ -110,7 +111,7 @@ pub(crate) struct Budget {
 }
 
 impl Budget {
-    /// What is left of the limits once so much is taken.
+    /// A budget of which these amounts are used.
     pub(crate) fn starting_at(taken: Taken) -> Self {
         Self {
             triangles: taken.triangles.into(),
@@ -131,7 +132,7 @@ impl Budget {
         take(&self.triangles, n as u64, TRIANGLES, WHAT_TRIANGLES)
     }
 
-    /// Room for `n` values of type T.
+    /// Uses room for `n` values of type T.
     pub(crate) fn geometry<T>(&self, n: usize) -> Result<(), Fault> {
         let bytes = (n as u64).saturating_mul(size_of::<T>() as u64);
         take(&self.geometry, bytes, GEOMETRY_BYTES, WHAT_GEOMETRY)

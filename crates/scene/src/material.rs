@@ -26,26 +26,28 @@ pub struct Material {
     pub normal_texture: Option<TextureRef>,
     /// Scale of the normal map's x and y.
     pub normal_scale: f32,
-    /// Share of indirect light that arrives in R, linear. For clients that rasterise: a path tracer
-    /// finds occlusion by itself.
+    /// Share of indirect light that arrives, in R, linear. It serves clients that rasterise; a path
+    /// tracer finds occlusion by itself.
     pub occlusion_texture: Option<TextureRef>,
-    /// How far the occlusion map is believed, 0 to 1: of indirect light, 1 + strength · (R − 1) arrives.
+    /// Strength of the occlusion map, 0 to 1: the share of indirect light that arrives is 1 +
+    /// strength · (R − 1).
     pub occlusion_strength: f32,
-    /// Emitted radiance in cd/m²: factor times strength.
+    /// Emitted radiance in cd/m²: the file's factor times its strength.
     pub emissive: Vec3,
-    /// sRGB.
+    /// sRGB colour.
     pub emissive_texture: Option<TextureRef>,
-    /// What alpha means.
+    /// How alpha is used.
     pub alpha_mode: AlphaMode,
     /// When false, the back face blocks light and reflects none.
     pub double_sided: bool,
-    /// Base colour is shown as it is; the surface emits nothing into the scene and reflects none.
+    /// The base colour is shown as it is. The surface emits no light into the scene and reflects
+    /// none.
     pub unlit: bool,
-    /// 0 to 1, share of light transmitted instead of diffusely reflected.
+    /// Share of light transmitted instead of diffusely reflected, 0 to 1.
     pub transmission: f32,
     /// Transmission in R.
     pub transmission_texture: Option<TextureRef>,
-    /// Index of refraction, 1.5 unless said otherwise; 0 means infinite (F0 = 1).
+    /// Index of refraction, 1.5 by default; 0 means infinite (F0 = 1).
     pub ior: f32,
     /// Strength of the dielectric specular reflection, 0 to 1.
     pub specular: f32,
@@ -53,7 +55,7 @@ pub struct Material {
     pub specular_texture: Option<TextureRef>,
     /// Colour of the dielectric specular reflection at normal incidence (linear, may exceed 1).
     pub specular_color: Vec3,
-    /// sRGB.
+    /// sRGB colour.
     pub specular_color_texture: Option<TextureRef>,
 }
 
@@ -92,20 +94,20 @@ pub enum AlphaMode {
     /// Alpha is ignored.
     #[default]
     Opaque,
-    /// Covered where alpha ≥ the cutoff.
+    /// Opaque where alpha is at least the cutoff, a hole elsewhere.
     Mask(f32),
-    /// Covered with probability alpha.
+    /// Opaque with probability alpha.
     Blend,
 }
 
-/// A texture as a material refers to it.
+/// A texture and how a material samples it.
 #[derive(Clone, Debug)]
 pub struct TextureRef {
-    /// Pixels.
+    /// The texels.
     pub image: Arc<Image>,
-    /// Which of the two sets of texture coordinates that [`Primitive::uv`](crate::Primitive) holds.
+    /// Index into [`Primitive::uv`](crate::Primitive): the set of texture coordinates.
     pub tex_coord: usize,
-    /// KHR_texture_transform; identity unless said otherwise.
+    /// KHR_texture_transform; the identity by default.
     pub texture_from_mesh: Affine2,
     /// Wrapping of u and v.
     pub wrap: [Wrap; 2],
@@ -116,16 +118,16 @@ pub struct TextureRef {
 /// Texture wrapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Wrap {
-    /// Tiles.
+    /// The texture repeats.
     #[default]
     Repeat,
-    /// Tiles, every other one mirrored.
+    /// The texture repeats, every other copy mirrored.
     Mirror,
-    /// Edge texels go on.
+    /// Texels at the edge continue.
     Clamp,
 }
 
-/// Texture filtering of the finest level.
+/// Filtering of the finest mip level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Filter {
     /// Nearest texel.
@@ -135,8 +137,8 @@ pub enum Filter {
     Linear,
 }
 
-/// An 8-bit RGBA image, first row at the top (v = 0). Whether its colours are sRGB or linear
-/// follows from the slot of the material it stands in.
+/// An 8-bit RGBA image, first row at the top (v = 0). The material's slot determines whether its
+/// colours are sRGB or linear.
 #[derive(Clone, Debug)]
 pub struct Image {
     /// Name or URI, for messages.

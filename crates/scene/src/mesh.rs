@@ -11,15 +11,15 @@ pub struct Mesh {
     pub name: String,
     /// Triangle lists.
     pub primitives: Vec<Primitive>,
-    /// Morph weights at rest, one a target.
+    /// Default morph weights, one for each target.
     pub morph_weights: Vec<f32>,
-    /// The point of the file's mesh that vertices are relative to, metres: zero unless that lies far
-    /// from its own origin.
+    /// Point of the file's object space that vertices are relative to, metres. It is zero unless
+    /// the mesh lies far from its own origin.
     pub origin: Vec3,
 }
 
 impl Mesh {
-    /// The box around its vertices at rest, as the file has them.
+    /// Bounds of its vertices at rest, in the file's object space.
     pub(crate) fn bounds(&self) -> [DVec3; 2] {
         let mut bounds = Aabb::EMPTY;
         let positions = self.primitives.iter().flat_map(|p| &p.vertices.positions);
@@ -37,36 +37,36 @@ impl Mesh {
 /// guarantees that every index lies inside the vertices and every position and normal is finite.
 #[derive(Clone, Debug, Default)]
 pub struct Primitive {
-    /// Indices into the vertices; counter-clockwise seen from the front.
+    /// Indices into the vertices; counter-clockwise as seen from the front.
     pub triangles: Vec<[u32; 3]>,
     /// Vertices at rest, in object space.
     pub vertices: Vertices,
-    /// The two sets of texture coordinates that its material reads, TEXCOORD_0 and 1 unless it asks for
-    /// others; empty where the file has none, else one a vertex.
+    /// The two sets of texture coordinates that its material reads: TEXCOORD_0 and 1 unless it asks
+    /// for others. Each is empty or has one entry for each vertex.
     pub uv: [Vec<Vec2>; 2],
-    /// Vertex colours (linear, multiplied into the base colour); empty or one a vertex.
+    /// Vertex colours (linear, factors of the base colour); empty or one for each vertex.
     pub colors: Vec<Vec4>,
-    /// Joint indices into the skin of the node; empty where the mesh is not skinned. Each vertex has
-    /// as many fours as any needs, one after the other: see [`Self::influence_sets`].
+    /// Joint indices into the skin of the node; empty where the mesh is not skinned. Each vertex
+    /// has [`Self::influence_sets`] entries of four joints, one after the other.
     pub joints: Vec<[u16; 4]>,
-    /// Weights of the joints, four by four; those of a vertex sum to 1.
+    /// Weights of the joints, in the same layout; those of a vertex sum to 1.
     pub weights: Vec<Vec4>,
     /// Morph targets (displacements).
     pub morph_targets: Vec<MorphTarget>,
-    /// The file has no normals: each triangle has three vertices of its own and its normals are the
-    /// triangle's, also when it is deformed.
+    /// Whether the file has no normals. Then each triangle has three vertices of its own with the
+    /// triangle's normal, also when it is deformed.
     pub flat: bool,
-    /// Material; the default material of glTF has a number of its own.
+    /// Its material; glTF's default material has a number of its own.
     pub material: MaterialId,
 }
 
 impl Primitive {
-    /// Fours of joints a vertex hangs on; 0 where the mesh is not skinned.
+    /// Number of entries of four joints for each vertex; 0 where the mesh is not skinned.
     pub fn influence_sets(&self) -> usize {
         self.joints.len() / self.vertices.positions.len().max(1)
     }
 
-    /// The joints that a vertex hangs on, and with which weight.
+    /// The joints that move a vertex, with their weights.
     pub fn influences(&self, vertex: usize) -> impl Iterator<Item = (u16, f32)> {
         let sets = self.influence_sets();
         let of_vertex = vertex * sets..(vertex + 1) * sets;
@@ -80,21 +80,21 @@ impl Primitive {
 /// The vertex attributes that deformation changes.
 #[derive(Clone, Debug, Default)]
 pub struct Vertices {
-    /// Metres, object space.
+    /// Positions in object space, metres.
     pub positions: Vec<Vec3>,
-    /// Unit length, one a vertex; flat normals where the file has none.
+    /// Unit normals, one for each vertex; flat normals where the file has none.
     pub normals: Vec<Vec3>,
-    /// xyz unit tangent, w = ±1 the sign of the bitangent; empty where neither the file nor a
-    /// normal map asks for it.
+    /// Unit tangents (xyz) and signs of the bitangent (w = ±1). Empty where neither the file has
+    /// them nor a normal map needs them.
     pub tangents: Vec<Vec4>,
 }
 
-/// Displacements of one morph target; each list is empty or has one entry a vertex.
+/// Displacements of one morph target; each list is empty or has one entry for each vertex.
 #[derive(Clone, Debug, Default)]
 pub struct MorphTarget {
-    /// Metres.
+    /// Displacements in metres.
     pub positions: Vec<Vec3>,
-    /// Added to normals before normalisation.
+    /// Added to normals before they are normalised.
     pub normals: Vec<Vec3>,
     /// Added to the xyz of tangents.
     pub tangents: Vec<Vec3>,

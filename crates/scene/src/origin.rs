@@ -1,24 +1,27 @@
-//! The point that places are relative to.
+//! Origins: the points that positions are relative to.
 //!
-//! 32-bit floats have 24 binary digits: a million metres from the origin, as in map coordinates, they
-//! are 6 cm apart. So places are put together in 64 bits and kept relative to a point in their midst:
-//! those of a scene's meshes and lights to [`Snapshot::origin`](crate::Snapshot), those of a mesh's
-//! vertices to [`Mesh::origin`](crate::Mesh). What lies about the world's own origin stays as it is.
+//! 32-bit floats have 24 binary digits. A million metres from the origin, as in map coordinates,
+//! neighbouring floats are 6 cm apart. So positions are computed in 64 bits and stored relative to
+//! a point among them. Positions of a scene's meshes and lights are relative to
+//! [`Snapshot::origin`](crate::Snapshot), those of a mesh's vertices to
+//! [`Mesh::origin`](crate::Mesh). Where a scene lies near the world's origin, that is its origin.
 
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::Aabb;
 use crate::mesh::Primitive;
 
-/// What lies within so many metres is relative to the world's own origin: floats are a millimetre apart
-/// at most.
+/// Scenes and meshes whose middle is within this distance in metres keep the world's own origin.
+/// There floats are at most a millimetre apart.
 pub(crate) const NEAR: f64 = 8192.0;
-/// Origins are multiples of it, metres, so that 32-bit floats hold them and differences from them.
+/// Origins are multiples of it, metres, so that 32-bit floats hold them and differences from them
+/// exactly.
 const GRID: f64 = 1024.0;
-/// Of a scene's reach, how thick walls are that no ray passes: what tracing allows for rounding.
+/// Thickness of walls that light may pass, as a share of the scene's reach: the tolerance of
+/// tracing.
 const LOST: f64 = 5e-6;
 
-/// The origin for what has its middle there.
+/// The origin for geometry with this middle.
 pub(crate) fn about(middle: DVec3) -> Vec3 {
     if middle.is_finite() && middle.abs().max_element() >= NEAR {
         ((middle / GRID).round() * GRID).as_vec3()
@@ -27,8 +30,8 @@ pub(crate) fn about(middle: DVec3) -> Vec3 {
     }
 }
 
-/// Moves a mesh's vertices to an origin in their midst, and returns that. Those of a skinned mesh stay:
-/// its joints say where they are.
+/// Moves a mesh's vertices to an origin in their middle, and returns that origin. Vertices of a
+/// skinned mesh stay, since its joints place them.
 pub(crate) fn centre(primitives: &mut [Primitive]) -> Vec3 {
     if primitives.iter().any(|p| !p.joints.is_empty()) {
         return Vec3::ZERO;
@@ -44,7 +47,7 @@ pub(crate) fn centre(primitives: &mut [Primitive]) -> Vec3 {
     origin
 }
 
-/// A part of a scene: its box in the world, and what it counts for.
+/// A part of a scene: its box in the world, and its number of triangles.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lump {
     pub(crate) min: DVec3,
@@ -53,14 +56,14 @@ pub(crate) struct Lump {
 }
 
 impl Lump {
-    /// The box around points, without triangles.
+    /// The box around points, with zero triangles.
     pub(crate) fn around(points: impl Iterator<Item = DVec3>) -> Self {
         let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (min, max) = points.fold(nothing, |(min, max), p| (min.min(p), max.max(p)));
         Self { min, max, triangles: 0 }
     }
 
-    /// The box around another at its place.
+    /// The box around a transformed box, with zero triangles.
     pub(crate) fn placed([min, max]: &[DVec3; 2], place: &DAffine3) -> Self {
         let corner = |i: usize| {
             let far = [i & 1 != 0, i & 2 != 0, i & 4 != 0];
@@ -70,8 +73,8 @@ impl Lump {
     }
 }
 
-/// The origin of a scene: about the median of its triangles, so that nothing far away draws it from
-/// where most is.
+/// The origin of a scene, near the median of its triangles. Distant strays do not move it away from
+/// most of the scene.
 pub(crate) fn of_scene(lumps: &[Lump]) -> Vec3 {
     let half: usize = lumps.iter().map(|lump| lump.triangles).sum::<usize>() / 2;
     let median = |axis: usize| {
@@ -88,7 +91,7 @@ pub(crate) fn of_scene(lumps: &[Lump]) -> Vec3 {
     about(DVec3::new(median(0), median(1), median(2)))
 }
 
-/// What is lost all the same, for people.
+/// Warnings of the precision that is lost in spite of the origin, for display.
 pub(crate) fn warnings(lumps: &[Lump], origin: Vec3) -> Vec<String> {
     let origin = origin.as_dvec3();
     let farthest = |from: DVec3| {
@@ -118,7 +121,7 @@ pub(crate) fn warnings(lumps: &[Lump], origin: Vec3) -> Vec<String> {
     warnings
 }
 
-/// Metres, for people.
+/// A length in metres, for display.
 fn length(metres: f64) -> String {
     match metres {
         m if m >= 1e4 => format!("{:.0} km", m / 1e3),

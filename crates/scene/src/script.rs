@@ -6,9 +6,10 @@ use crate::Edit;
 
 /// Edits with the scene time at which each is due.
 ///
-/// As text it is a JSON array or one JSON object a line: `{"at": 1.5, "edit": {"edit": "move_node",
-/// "node": 3, "translation": [0, 1, 0]}}`. Empty lines and lines that begin with `#` are left out.
-/// One object may be `{"repeat": 10}`: then all starts again every ten seconds.
+/// As text a script is a JSON array, or lines of one JSON object each: `{"at": 1.5, "edit":
+/// {"edit": "move_node", "node": 3, "translation": [0, 1, 0]}}`. Empty lines and lines that begin
+/// with `#` are ignored. One object may be `{"repeat": 10}`, which repeats the script every ten
+/// seconds.
 ///
 /// ```
 /// let script = lumencast_scene::Script::parse(
@@ -22,7 +23,7 @@ use crate::Edit;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Script {
-    /// By growing time.
+    /// Times and edits, in ascending order of time.
     entries: Vec<(f64, Edit)>,
     repeat: Option<f64>,
 }
@@ -31,7 +32,7 @@ pub struct Script {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScriptError {
-    /// Not of a script's form.
+    /// The text is not JSON, or lacks the structure of a script.
     #[error("{place}: {error}")]
     Json {
         /// Line or entry, from 1.
@@ -39,7 +40,7 @@ pub enum ScriptError {
         /// What is wrong.
         error: serde_json::Error,
     },
-    /// A time that is not finite, negative, or past the repetition.
+    /// A time is negative, not finite, or past the repetition.
     #[error("{place}: times are finite, not negative, and before the repetition")]
     Time {
         /// Line or entry, from 1.
@@ -69,7 +70,7 @@ impl Script {
     /// Reads a script.
     ///
     /// # Errors
-    /// Text of another form, and times that make no sense; the message says where.
+    /// Text of another structure, and times out of range; the message says where.
     pub fn parse(text: &str) -> Result<Self, ScriptError> {
         let mut script = Self::default();
         if text.trim_start().starts_with('[') {
@@ -96,7 +97,7 @@ impl Script {
     }
 
     fn add(&mut self, value: serde_json::Value, place: String) -> Result<(), ScriptError> {
-        // By hand, for an untagged enum's message says nothing.
+        // The variants are told apart by hand: serde's message for an untagged enum says nothing.
         let entry = match value.get("repeat") {
             Some(_) => serde_json::from_value(value).map(|Repeat { repeat }| Entry::Repeat(repeat)),
             None => serde_json::from_value(value).map(Entry::At),
@@ -113,8 +114,8 @@ impl Script {
         Ok(())
     }
 
-    /// The edits due from scene time `from` on and before `to`, in order. Of a script that repeats,
-    /// at most one round.
+    /// The edits due from scene time `from` to before `to`, in order. A script that repeats gives
+    /// each edit at most once.
     pub fn due(&self, from: f64, to: f64) -> impl Iterator<Item = &Edit> {
         let (from, to) = match self.repeat {
             None => (from, to),

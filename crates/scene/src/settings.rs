@@ -1,7 +1,7 @@
-//! What a scene says to Lumencast: its environment and its probe volumes.
+//! Settings of a scene for Lumencast: its environment and its probe volumes.
 //!
-//! Both stand in the glTF, as `extras.lumencast` of its scene, or beside it in a TOML file named
-//! `<stem>.lumencast.toml`, which goes first:
+//! They are `extras.lumencast` of the glTF's scene, or a TOML file beside it named
+//! `<stem>.lumencast.toml`. The file has precedence:
 //!
 //! ```toml
 //! [environment]

@@ -4,7 +4,7 @@ use glam::{Affine3A, DAffine3, DMat4, DVec3, Quat, Vec3};
 
 use crate::{Transform, limits};
 
-/// parent_from_node = translation · rotation · scale.
+/// A local transform: parent_from_node = translation · rotation · scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Trs {
     pub(crate) translation: DVec3,
@@ -23,7 +23,7 @@ impl Trs {
         self.precise().as_affine3a()
     }
 
-    /// The transform with all its digits.
+    /// The transform in double precision.
     pub(crate) fn precise(&self) -> DAffine3 {
         let rotation = self.rotation.as_dquat().normalize();
         let scale = self.scale.as_dvec3();
@@ -37,8 +37,8 @@ impl Trs {
         is_finite && largest <= f64::from(limits::EXTENT)
     }
 
-    /// Takes a matrix apart as three.js does: a mirroring one gets a negative x scale. The flag
-    /// tells whether the parts make up the matrix again; they do not where it shears.
+    /// Decomposes a matrix as three.js does: a mirroring one gets a negative x scale. The flag
+    /// tells whether the parts reproduce the matrix, which they do not where it shears.
     pub(crate) fn from_matrix(matrix: DMat4) -> (Self, bool) {
         let affine = Affine3A::from_mat4(matrix.as_mat4());
         let (m, translation) = (affine.matrix3, matrix.w_axis.truncate());
@@ -54,7 +54,7 @@ impl Trs {
         (trs, same)
     }
 
-    /// This, with the parts of an edit put in; their rotation is normalised.
+    /// This transform with the parts of an edit in place of its own; the rotation is normalised.
     pub(crate) fn with(self, edit: &Transform) -> Self {
         Self {
             translation: edit.translation.map_or(self.translation, |t| t.as_dvec3()),
@@ -64,18 +64,19 @@ impl Trs {
     }
 }
 
-/// Unit length; left alone where it is that already, so that what was normalised once stays as it is.
+/// Normalises a rotation. One of unit length is returned unchanged, so normalising twice has no
+/// effect.
 fn normalize(q: Quat) -> Quat {
     if q.is_normalized() { q } else { q.normalize() }
 }
 
-/// Whether a transform has a usable inverse: finite, and volumes do not vanish.
+/// Whether a transform has a usable inverse: it is finite and its determinant is not near zero.
 pub(crate) fn is_invertible(affine: &Affine3A) -> bool {
     let determinant = affine.matrix3.determinant();
     affine.is_finite() && determinant.is_normal() && affine.inverse().is_finite()
 }
 
-/// Whether a place in the world can be reckoned with.
+/// Whether a transform is finite and places things near enough to the origin to compute with.
 pub(crate) fn is_in_world(world: &Affine3A) -> bool {
     world.is_finite() && world.translation.abs().max_element() <= 1e15
 }

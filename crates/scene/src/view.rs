@@ -1,4 +1,4 @@
-//! From where a picture is seen.
+//! Cameras as views of pictures.
 
 use glam::{Affine3A, EulerRot, Mat3, Quat, Vec2, Vec3};
 
@@ -6,30 +6,30 @@ use crate::{Aabb, Projection};
 
 /// A camera at its place.
 ///
-/// The picture takes its height from the projection and its width from the picture's own size, so
-/// that pixels are square whatever aspect ratio the file states. The near and far planes, which a
-/// rasteriser needs, cut nothing off here.
+/// The projection gives the picture's height, and the picture's size its width. So pixels are
+/// square whatever aspect ratio the file states. The near and far planes, which a rasteriser needs,
+/// clip nothing here.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// Looks along −Z, +Y up; scale is taken out.
+    /// The camera's transform: it looks along −Z with +Y up, without scale.
     pub world_from_camera: Affine3A,
-    /// How it projects.
+    /// Its projection.
     pub projection: Projection,
 }
 
-/// A view with what it is called.
+/// A view with its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedView {
-    /// The camera's name, else its node's, else its number.
+    /// Name of the camera, or of its node where that is empty, or else its number.
     pub name: String,
-    /// The name of its node; may be empty.
+    /// Name of its node; may be empty.
     pub node_name: String,
-    /// What it sees.
+    /// The view itself.
     pub view: View,
 }
 
 impl View {
-    /// A perspective view of a whole box, from above one of its corners.
+    /// A perspective view of the whole box from above one of its corners.
     pub fn overview(bounds: &Aabb) -> Self {
         const FIELD_OF_VIEW: f32 = 50.0 * std::f32::consts::PI / 180.0;
         let radius = (0.5 * (bounds.max - bounds.min).length()).max(1e-3);
@@ -48,7 +48,7 @@ impl View {
         }
     }
 
-    /// A perspective view from `eye` towards `target` with +Y up where possible; `yfov` is the
+    /// A perspective view from `eye` towards `target`, with +Y up where possible. `yfov` is the
     /// vertical field of view in radians, between 0 and π. `None` where eye and target coincide or
     /// a number is not finite.
     #[must_use]
@@ -65,7 +65,7 @@ impl View {
         })
     }
 
-    /// The same view where places are relative to a point of the world, as a snapshot's are.
+    /// The same view with positions relative to `origin`, a world position, as a snapshot's are.
     #[must_use]
     pub fn relative_to(&self, origin: Vec3) -> Self {
         let mut view = *self;
@@ -73,15 +73,15 @@ impl View {
         view
     }
 
-    /// Origin and unit direction of the ray through a point of the picture: (0, 0) is its upper
-    /// left corner, (1, 1) its lower right. `aspect` is width by height.
+    /// Origin and unit direction of the ray through a point of the picture. (0, 0) is the picture's
+    /// upper left corner, (1, 1) its lower right one. `aspect` is width by height.
     #[inline]
     #[must_use]
     pub fn ray(&self, at: Vec2, aspect: f32) -> (Vec3, Vec3) {
         self.rays(aspect).through(at)
     }
 
-    /// All rays of a picture, for whoever wants many.
+    /// The rays of a picture, prepared to compute many.
     #[must_use]
     pub fn rays(&self, aspect: f32) -> Rays {
         let m = &self.world_from_camera;
@@ -103,20 +103,21 @@ impl View {
 /// The rays of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays {
-    /// Where the camera is, metres.
+    /// Position of the camera, metres.
     pub eye: Vec3,
     /// Unit.
     pub forward: Vec3,
-    /// From the middle of the picture to its edge; of a perspective view at a distance of 1.
+    /// Vector from the picture's centre to its right edge. For a perspective view it is at a
+    /// distance of 1.
     pub right: Vec3,
-    /// Likewise.
+    /// Vector from the picture's centre to its upper edge, likewise.
     pub up: Vec3,
-    /// Rays start at the eye and part, else they are parallel.
+    /// Whether all rays start at the eye; otherwise they are parallel.
     pub is_perspective: bool,
 }
 
 impl Rays {
-    /// As [`View::ray`].
+    /// The ray through a point of the picture, as in [`View::ray`].
     #[inline]
     #[must_use]
     pub fn through(&self, at: Vec2) -> (Vec3, Vec3) {
@@ -140,7 +141,8 @@ mod tests {
         let (eye, middle) = view.ray(Vec2::splat(0.5), 2.0);
         assert_eq!(eye, Vec3::new(0.0, 0.0, 5.0));
         assert!((middle - Vec3::NEG_Z).length() < 1e-6);
-        // 90° high, twice as wide: the upper left corner is at x = −2, y = 1 one metre ahead.
+        // The view is 90° high and twice as wide, so one metre ahead the upper left corner is at x
+        // = −2, y = 1.
         let (_, corner) = view.ray(Vec2::ZERO, 2.0);
         assert!((corner / -corner.z - Vec3::new(-2.0, 1.0, -1.0)).length() < 1e-5, "{corner}");
         assert!(View::look_at(Vec3::ONE, Vec3::ONE, 1.0).is_none());

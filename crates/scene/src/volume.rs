@@ -1,4 +1,4 @@
-//! Where a scene's probes are.
+//! Probe volumes of a scene.
 
 use glam::{UVec3, Vec3};
 use lumencast_light::{Grid, Order};
@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::limits;
 
-/// A probe volume as a scene asks for it.
+/// A probe volume that a scene asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VolumeSpec {
-    /// The box and its cells: at most 65,536 of them.
+    /// The box and its cells, of which there are at most 65,536.
     #[serde(flatten)]
     pub grid: Grid,
     /// Order of the expansion.
@@ -18,7 +18,10 @@ pub struct VolumeSpec {
 }
 
 impl VolumeSpec {
-    /// Whether it makes sense; the reason when it does not.
+    /// Checks values against their ranges.
+    ///
+    /// # Errors
+    /// The reason why the volume makes no sense.
     pub fn check(&self) -> Result<(), String> {
         let Grid { center, rotation, size, resolution } = self.grid;
         if !(center.is_finite() && rotation.is_finite() && size.is_finite()) {
@@ -43,9 +46,9 @@ impl VolumeSpec {
         Ok(())
     }
 
-    /// The volume cut across z into as few pieces as have at most 34 layers of cells, nearly equally
-    /// many: browsers hold no more in one texture. The probes stay where they are; a volume that is
-    /// not too deep is the one piece.
+    /// Splits the volume across z into the fewest pieces of at most 34 layers of cells, the most
+    /// that browsers hold in one texture. Pieces are nearly equal, and probes keep their positions.
+    /// A volume that is shallow enough is one piece.
     pub fn split(self) -> impl Iterator<Item = Self> {
         let Grid { center, rotation, size, resolution } = self.grid;
         let pieces = resolution.z.div_ceil(limits::VOLUME_DEPTH);
@@ -121,7 +124,7 @@ mod tests {
     fn light_is_continuous_across_the_cuts() {
         let rotation = Quat::from_xyzw(0.1, 0.5, -0.3, 0.8).normalize();
         let whole = deep(70, rotation);
-        // Light that changes from layer to layer, as far as it can.
+        // The light changes from layer to layer as much as it can.
         let lit = |(id, piece, first): (u32, VolumeSpec, u32)| {
             let mut volume = ProbeVolume::dark(FieldId(id), piece.grid, piece.order);
             for probe in 0..piece.grid.probe_count() {
@@ -143,14 +146,14 @@ mod tests {
             let position = whole.grid.center + rotation * Vec3::new(0.3, 0.2, z);
             light.sample(&Place::in_space(position)).expect("light").values()[0].x
         };
-        // In hundredths of a cell, from the first probe to the last.
+        // Steps are hundredths of a cell, from the first probe to the last.
         let values: Vec<(f32, f32)> = (50..=6950)
             .map(|i| (i as f32 * 0.01 - 35.0) * cell)
             .map(|z| (read(&pieces, z), read(&whole_light, z)))
             .collect();
         let steepest = values.windows(2).map(|v| (v[1].0 - v[0].0).abs()).fold(0.0, f32::max);
         assert!(steepest < 0.03, "{steepest}");
-        // Trilinear light goes straight from probe to probe; at the cuts it takes a curve there.
+        // Trilinear light is linear between probes; at the cuts between pieces it is a curve.
         let farthest = values.iter().map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(farthest > 0.01 && farthest < 0.15, "{farthest}");
     }

@@ -1,5 +1,5 @@
-//! The Cornell box: two metres a side, open to the front, with the colours of the published one. A
-//! tall box stands in it and a sphere goes round. About 4,000 triangles.
+//! The Cornell box, two metres a side, open to the front, with the published colours. It holds a
+//! tall box and a moving sphere. About 4,000 triangles.
 
 use std::f32::consts::TAU;
 
@@ -49,7 +49,7 @@ pub(super) fn glb() -> Vec<u8> {
     let moved = (sphere, "translation");
     w.animation("sphere goes round", moved, "LINEAR", &times, ("VEC3", &places));
 
-    // A spot light, so that it does not scorch the ceiling that it hangs from.
+    // It is a spot light, so that it does not overexpose the ceiling that it hangs from.
     let down = Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2).to_array();
     w.light(
         json!({
@@ -65,7 +65,7 @@ pub(super) fn glb() -> Vec<u8> {
     w.finish(json!({ "lumencast": { "volumes": [volume] } }))
 }
 
-/// Where the sphere is, a round in eight seconds.
+/// Position of the sphere on its path, for `round` from 0 to 1.
 fn path(round: f32) -> Vec3 {
     let (sin, cos) = (TAU * round).sin_cos();
     Vec3::new(0.45 + 0.2 * cos, 0.32 + 0.25 * (1.0 - (2.0 * TAU * round).cos()), 0.35 + 0.3 * sin)

@@ -1,5 +1,5 @@
-//! Light through a narrow doorway: a lit front room, and a dark one behind with a green sphere in
-//! it, from which the camera looks to the door. About 11,000 triangles.
+//! Light through a narrow doorway from a lit front room into a dark one. A green sphere is in the
+//! dark room, and the camera looks from there to the door. About 11,000 triangles.
 
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
@@ -12,7 +12,7 @@ const WALL: f32 = 0.1;
 const HEIGHT: f32 = 2.8;
 const HALF_WIDTH: f32 = 2.5;
 const DEPTH: f32 = 5.0;
-/// The doorway from left to right, and its height.
+/// The doorway: its left and right edge and its height, metres.
 const DOOR: (f32, f32, f32) = (0.7, 1.4, 2.1);
 
 pub(super) fn glb() -> Vec<u8> {
@@ -43,7 +43,7 @@ pub(super) fn glb() -> Vec<u8> {
         "name": "camera", "translation": [-1.7, 1.5, -4.4], "rotation": (look * Quat::from_rotation_x(-0.12)).to_array(),
     });
     w.camera("camera", 0.95, camera);
-    // They meet within the wall, so that the doorway is in one or the other.
+    // The volumes meet within the wall, so that the doorway is in one or the other.
     let volume = |z: f32| {
         json!({
             "center": [0.0, HEIGHT / 2.0, z],

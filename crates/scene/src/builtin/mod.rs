@@ -1,7 +1,7 @@
-//! Scenes made in code, as .glb files, so that clients draw the same file that the server loads.
+//! Scenes made in code as .glb files, so that clients draw the same file that the server loads.
 //!
-//! They follow the scenes of the first paper (NetLight): a Cornell box, a dark room behind a door,
-//! and a tomb lit by a flashlight.
+//! They resemble the scenes of the first paper (NetLight): a Cornell box, a dark room behind a
+//! door, and a tomb lit by a flashlight.
 
 mod cornell;
 mod door;

@@ -1,10 +1,10 @@
-//! Shapes to build scenes from.
+//! Shapes for built-in scenes.
 
 use std::f32::consts::TAU;
 
 use glam::{Affine3A, Vec3};
 
-/// A triangle mesh with normals, counter-clockwise seen from the front.
+/// A triangle mesh with normals; triangles are counter-clockwise as seen from the front.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shape {
     pub(crate) positions: Vec<Vec3>,
@@ -13,9 +13,9 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    /// A grid of `columns` × `rows` quadrilaterals over a surface that (s, t) in [0, 1]² run over;
-    /// its front is where the derivative along s crossed with the one along t points. Normals are
-    /// those of the surface, by differences.
+    /// A grid of `columns` × `rows` quadrilaterals over a surface, parametrised by (s, t) in [0,
+    /// 1]². Its front is in the direction of the derivative along s crossed with the one along t.
+    /// Normals are those of the surface, by finite differences.
     pub(crate) fn surface(columns: u32, rows: u32, at: impl Fn(f32, f32) -> Vec3) -> Self {
         let mut shape = Self::default();
         const STEP: f32 = 1e-3;
@@ -38,12 +38,13 @@ impl Shape {
         shape.without_degenerate()
     }
 
-    /// A rectangle from a corner along two edges, in `n` × `n` cells; its front is edge × edge.
+    /// A rectangle from a corner along two edges, in `n` × `n` cells; its front is in the direction
+    /// along × up.
     pub(crate) fn rectangle(corner: Vec3, along: Vec3, up: Vec3, n: u32) -> Self {
         Self::surface(n, n, |s, t| corner + s * along + t * up)
     }
 
-    /// A box between two corners, each face in `n` × `n` cells, seen from outside.
+    /// A box between two corners, each face in `n` × `n` cells, with the front outside.
     pub(crate) fn cuboid(min: Vec3, max: Vec3, n: u32) -> Self {
         let size = max - min;
         let (x, y, z) = (Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z);
@@ -71,7 +72,7 @@ impl Shape {
         sphere
     }
 
-    /// A solid of revolution about +Y: `profile` gives radius and height from bottom to top.
+    /// A solid of revolution about +Y. `profile` gives radius and height from bottom to top.
     pub(crate) fn lathe(around: u32, rings: u32, profile: impl Fn(f32) -> (f32, f32)) -> Self {
         Self::surface(around, rings, |s, t| {
             let (radius, height) = profile(t.clamp(0.0, 1.0));
@@ -108,7 +109,7 @@ impl Shape {
         joined
     }
 
-    /// The same, moved; the transform may turn and scale but not mirror.
+    /// The transformed shape; the transform may turn and scale but not mirror.
     pub(crate) fn placed(mut self, world_from_shape: Affine3A) -> Self {
         let normal_matrix = world_from_shape.matrix3.inverse().transpose();
         self.positions.iter_mut().for_each(|p| *p = world_from_shape.transform_point3(*p));

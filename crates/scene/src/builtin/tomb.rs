@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::shapes::Shape;
 use super::writer::Writer;
 
-/// The room: x, z from −HALF to HALF, y from 0 to HEIGHT; metres.
+/// Size of the room, metres: x and z from −HALF to HALF, y from 0 to HEIGHT.
 const HALF: Vec3 = Vec3::new(5.0, 0.0, 6.0);
 const HEIGHT: f32 = 4.5;
 
@@ -72,7 +72,7 @@ pub(super) fn glb() -> Vec<u8> {
     w.finish(json!({ "lumencast": { "volumes": [volume] } }))
 }
 
-/// The rotation that turns −Z from a point towards another.
+/// The rotation that turns −Z at one point towards another.
 fn aimed(from: Vec3, to: Vec3) -> Value {
     let (x, y, z) = (to - from).normalize_or(Vec3::NEG_Z).into();
     let yaw = f32::atan2(-x, -z);
@@ -80,7 +80,7 @@ fn aimed(from: Vec3, to: Vec3) -> Value {
     json!(rotation.to_array())
 }
 
-/// A full turn about +Y in so many seconds; backwards when negative.
+/// Adds an animation that turns a node once about +Y in `seconds`; negative turns it backwards.
 fn turn(w: &mut Writer, name: &str, node: usize, seconds: f32) {
     const KEYS: u32 = 8;
     let times: Vec<f32> = (0..=KEYS).map(|k| seconds.abs() * k as f32 / KEYS as f32).collect();
@@ -91,7 +91,7 @@ fn turn(w: &mut Writer, name: &str, node: usize, seconds: f32) {
     w.animation(&name, (node, "rotation"), "LINEAR", &times, ("VEC4", &values));
 }
 
-/// Bumps of stone: a few sines that do not repeat soon; −1 to 1.
+/// Bumps of stone, −1 to 1: a few sines with a long common period.
 fn bumps(p: Vec3) -> f32 {
     let a = (p.x * 3.1 + 0.7).sin() * (p.y * 2.7 + 1.9).sin() * (p.z * 3.7 + 0.2).sin();
     let b = (p.x * 7.3 + 2.1).sin() * (p.y * 8.1 + 0.4).sin() * (p.z * 6.7 + 1.3).sin();
@@ -105,7 +105,7 @@ fn room() -> Shape {
     let wall = |corner: Vec3, along: Vec3, up: Vec3| {
         let normal = along.cross(up).normalize_or(Vec3::Y);
         Shape::surface(72, 72, move |s, t| {
-            // Flat at the edges, so that walls meet.
+            // The walls are flat at the edges, so that they meet.
             let edge = (s.min(1.0 - s).min(t.min(1.0 - t)) * 20.0).clamp(0.0, 1.0);
             let p = corner + s * along + t * up;
             p + normal * (edge * 0.04 * bumps(p))
@@ -133,7 +133,7 @@ fn column() -> Shape {
     })
 }
 
-/// A (p, q) torus knot, its tube ribbed.
+/// A (p, q) torus knot with a ribbed tube.
 fn knot(p: f32, q: f32) -> Shape {
     let curve = move |s: f32| {
         let (around, through) = (TAU * p * s, TAU * q * s);
@@ -144,7 +144,7 @@ fn knot(p: f32, q: f32) -> Shape {
     Shape::tube(800, 64, curve, radius)
 }
 
-/// A figure of rings, each a little turned.
+/// A figure of stacked rings, each rotated a little.
 fn idol() -> Shape {
     Shape::surface(256, 200, |s, t| {
         let t = t.clamp(0.0, 1.0);
@@ -167,8 +167,8 @@ fn shell() -> Shape {
     })
 }
 
-/// A curtain before the back wall: two morph targets a quarter of a wave apart, whose weights go
-/// round, make waves that run along it.
+/// A curtain in front of the back wall. The weights of two morph targets a quarter of a wave apart
+/// circulate, which makes waves run along it.
 fn curtain(w: &mut Writer) {
     let fold = |s: f32| 0.07 * (14.0 * TAU * s).sin();
     let at = |s: f32, t: f32| Vec3::new(3.4 * (s - 0.5), 3.2 * t, fold(s));

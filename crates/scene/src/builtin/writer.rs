@@ -1,11 +1,11 @@
-//! Writes .glb files: as much of glTF as the built-in scenes and tests need.
+//! Writes .glb files, with the parts of glTF that the built-in scenes and tests need.
 
 use glam::Vec3;
 use serde_json::{Map, Value, json};
 
 use super::shapes::Shape;
 
-/// A .glb file in the making. Everything that is added gets the next index of its kind.
+/// A .glb file under construction. Each added object gets the next index of its kind.
 #[derive(Debug, Default)]
 pub(crate) struct Writer {
     json: Map<String, Value>,
@@ -25,7 +25,7 @@ impl Writer {
         }
     }
 
-    /// Adds an accessor of floats: "SCALAR", "VEC3", …
+    /// Adds an accessor of floats; `kind` is "SCALAR", "VEC2", "VEC3", ….
     pub(crate) fn floats(&mut self, kind: &str, values: &[f32]) -> usize {
         let components = match kind {
             "VEC2" => 2,
@@ -92,7 +92,7 @@ impl Writer {
         self.surface(name, color, 1.0)
     }
 
-    /// Adds a dielectric material of a perceptual roughness.
+    /// Adds a dielectric material of this perceptual roughness.
     pub(crate) fn surface(&mut self, name: &str, color: [f32; 3], roughness: f32) -> usize {
         self.dielectric(name, color, roughness, false)
     }
@@ -178,7 +178,7 @@ impl Writer {
         }
     }
 
-    /// The file, with a scene of all nodes that are no one's children.
+    /// The file, with a scene of all nodes that have no parent.
     pub(crate) fn finish(self, extras: Value) -> Vec<u8> {
         let nodes = self.json.get("nodes").and_then(Value::as_array).cloned().unwrap_or_default();
         let children: Vec<u64> = nodes
@@ -205,7 +205,7 @@ impl Writer {
     }
 }
 
-/// A .glb of JSON and a binary chunk.
+/// Packs JSON and a binary chunk into a .glb.
 pub(crate) fn container(json: &str, binary: &[u8]) -> Vec<u8> {
     let mut json = json.as_bytes().to_vec();
     json.resize(json.len().next_multiple_of(4), b' ');

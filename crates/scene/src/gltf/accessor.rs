@@ -1,13 +1,13 @@
-//! Accessors: typed, bounds-checked, possibly sparse views into buffers.
+//! Accessors: typed, bounds-checked and possibly sparse views into buffers.
 //!
-//! Every length is checked against the bytes that are there before memory is asked for.
+//! Every length is checked against the bytes that exist before memory is allocated.
 
 use super::json::{Accessor, Root};
 use super::source::Bytes;
 use crate::error::{At, Fault, invalid};
 use crate::limits::{self, Budget};
 
-/// Reads accessors of one glTF.
+/// Reads the accessors of one glTF.
 #[derive(Clone, Copy)]
 pub(super) struct Accessors<'a> {
     pub(super) root: &'a Root,
@@ -15,7 +15,7 @@ pub(super) struct Accessors<'a> {
     pub(super) budget: &'a Budget,
 }
 
-/// How a component is stored.
+/// The storage format of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Component {
     I8,
@@ -47,7 +47,7 @@ impl Component {
         }
     }
 
-    /// One component as a float; normalised integers as glTF 2.0, section 3.11, says.
+    /// One component as a float; normalised integers as in glTF 2.0, section 3.11.
     fn float(self, b: &[u8], normalized: bool) -> f32 {
         let (value, largest) = match self {
             Self::I8 => (f32::from(b[0] as i8), 127.0),
@@ -60,7 +60,7 @@ impl Component {
         if normalized { (value / largest).max(-1.0) } else { value }
     }
 
-    /// One component as an unsigned integer; `None` where it is none.
+    /// One component as an unsigned integer; `None` for other formats.
     fn integer(self, b: &[u8]) -> Option<u32> {
         match self {
             Self::U8 => Some(u32::from(b[0])),
@@ -82,7 +82,7 @@ fn components(kind: &str) -> Option<usize> {
     })
 }
 
-/// Elements that lie in a buffer at a stride.
+/// Elements in a buffer at a stride.
 struct Strided<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -124,7 +124,7 @@ impl<'a> Accessors<'a> {
         })
     }
 
-    /// Number of elements that an accessor says it has.
+    /// Number of elements that an accessor declares.
     pub(super) fn count(&self, index: usize) -> Result<u64, Fault> {
         self.accessor(index).map(|a| a.count)
     }
@@ -208,7 +208,7 @@ impl<'a> Accessors<'a> {
         Ok(())
     }
 
-    /// Finds the bytes of `count` elements and checks that they are all there.
+    /// Finds the bytes of `count` elements and checks that all exist.
     fn strided(
         &self,
         view_index: usize,

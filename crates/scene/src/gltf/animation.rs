@@ -46,7 +46,7 @@ pub(super) fn read(
     Ok(Animation { name: json.name.clone(), duration: f64::from(last), channels })
 }
 
-/// Numbers in a value of a property of a node.
+/// Numbers in a value of a node's property.
 fn width(
     property: Property,
     node: usize,

@@ -1,6 +1,6 @@
-//! KHR_materials_pbrSpecularGlossiness, by what there is of metalness and roughness: a dielectric whose
-//! reflection at normal incidence is a colour (an index of refraction of 0, as KHR_materials_ior has
-//! it), and a roughness of one less glossiness.
+//! Expresses KHR_materials_pbrSpecularGlossiness by the metallic-roughness model. The result is a
+//! dielectric with the specular colour as its reflectance at normal incidence, by an index of
+//! refraction of 0 as in KHR_materials_ior. Roughness is 1 − glossiness.
 
 use std::sync::Arc;
 
@@ -11,8 +11,9 @@ use crate::error::Fault;
 use crate::limits::Budget;
 use crate::material::{Image, Material, TextureRef};
 
-/// Makes a material of its factors and textures: of diffuse colour, and of specular colour with
-/// glossiness as alpha. The extension goes before the metalness and roughness beside it.
+/// Sets a material's factors and textures from the extension, which has precedence over
+/// metallic-roughness values. The extension has a diffuse colour, and a specular colour with
+/// glossiness in alpha.
 pub(super) fn apply(
     material: &mut Material,
     json: &json::SpecularGlossiness,
@@ -39,7 +40,7 @@ pub(super) fn apply(
     Ok(())
 }
 
-/// Roughness as green, as glTF has it.
+/// An image of roughness in G, as glTF has it, from glossiness in A.
 fn roughness(gloss: &Image, factor: f32) -> Image {
     let rough = |alpha: u8| (255.0 - factor * f32::from(alpha)).round().clamp(0.0, 255.0) as u8;
     let texels = gloss.texels.iter().map(|t| [0, rough(t[3]), 0, 255]).collect();

@@ -1,4 +1,4 @@
-//! EXT_mesh_gpu_instancing: where a node's mesh is shown, relative to the node.
+//! EXT_mesh_gpu_instancing: transforms at which a node's mesh is shown, relative to the node.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,8 +12,8 @@ use crate::error::{At, Fault, invalid};
 use crate::limits;
 use crate::trs::Trs;
 
-/// Gives nodes their instances. Those of a node without a mesh mean nothing; those of a skinned mesh
-/// are left out, as it is where its joints are.
+/// Gives nodes their instances. Instances of a node without a mesh are ignored. So are those of a
+/// skinned mesh, since its joints place it.
 pub(super) fn read(
     accessors: Accessors<'_>,
     nodes: &mut [AssetNode],
@@ -44,7 +44,7 @@ pub(super) fn read(
 
 const ATTRIBUTES: [&str; 3] = ["TRANSLATION", "ROTATION", "SCALE"];
 
-/// How many instances there are; `None` where no attribute places any.
+/// Number of instances; `None` where no attribute places any.
 fn count(
     accessors: Accessors<'_>,
     attributes: &BTreeMap<String, usize>,
@@ -108,7 +108,7 @@ fn transforms(
     (0..count as usize).map(transform).collect()
 }
 
-/// Bytes and shorts hold a unit quaternion only about.
+/// Normalises a rotation. Bytes and shorts represent unit quaternions only approximately.
 fn unit(q: Quat) -> Option<Quat> {
     let length = q.length();
     (length > 1e-3 && length.is_finite()).then(|| q / length)

@@ -1,4 +1,4 @@
-//! glTF 2.0's JSON, as far as Lumencast reads it. Indices are checked where they are followed.
+//! The JSON of glTF 2.0, as far as Lumencast reads it. Indices are checked where they are used.
 
 use std::collections::BTreeMap;
 
@@ -29,8 +29,8 @@ pub(super) struct Root {
 }
 
 impl Root {
-    /// Takes the NULs off the ends of names and URIs that were written from buffers of a fixed length;
-    /// true where there were any.
+    /// Removes NULs at the ends of names and URIs, which come from buffers of a fixed length.
+    /// Returns whether there were any.
     pub(super) fn trim_padding(&mut self) -> bool {
         let names = self.animations.iter_mut().map(|a| &mut a.name);
         let names = names.chain(self.cameras.iter_mut().map(|c| &mut c.name));

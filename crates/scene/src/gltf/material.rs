@@ -22,7 +22,7 @@ pub(super) fn images_used(root: &json::Root) -> Result<Vec<usize>, Fault> {
     Ok(used.into_iter().collect())
 }
 
-/// The file's materials, and after them glTF's default material.
+/// The file's materials, followed by glTF's default material.
 pub(super) fn read(
     root: &json::Root,
     images: &Images,
@@ -108,7 +108,7 @@ fn alpha_mode(json: &json::Material) -> Result<AlphaMode, Fault> {
     }
 }
 
-/// Refuses what has no meaning, and brings shares a little out of range back into it.
+/// Refuses values without meaning; clamps shares that are a little out of range.
 fn check(m: &mut Material) -> Result<(), Fault> {
     let numbers = [
         m.metallic,

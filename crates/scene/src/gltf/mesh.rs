@@ -1,8 +1,8 @@
-//! glTF meshes to triangle lists.
+//! Converts glTF meshes to triangle lists.
 //!
-//! What comes out holds what [`Primitive`] promises: indices inside the vertices, finite positions,
-//! unit normals. Triangles without area are left out (of meshes that deform, only those that name a
-//! vertex twice, for the others may open).
+//! Results are as [`Primitive`] promises: indices inside the vertices, finite positions, unit
+//! normals. Triangles without area are removed. Of meshes that deform, only those that name a
+//! vertex twice are, since others may gain area.
 
 use std::collections::BTreeMap;
 
@@ -120,7 +120,7 @@ fn read_attributes(
     primitive.vertices.positions = positions;
     if let Some(index) = attribute("NORMAL") {
         primitive.vertices.normals = vec3s(accessors, index, "NORMAL")?;
-        // They get the mean of their triangles.
+        // Normals of zero get the mean of their triangles later.
         mend("NORMAL", &mut primitive.vertices.normals, Vec3::ZERO, notes);
         check("NORMAL", primitive.vertices.normals.len())?;
         if let Some(index) = attribute("TANGENT") {
@@ -168,7 +168,8 @@ fn vec3s(accessors: Accessors<'_>, index: usize, name: &str) -> Result<Vec<Vec3>
     Ok(values.into_iter().map(Vec3::from).collect())
 }
 
-/// Refuses triangles whose corners have no place; puts vertices of no triangle where another is.
+/// Refuses triangles with an invalid position. Invalid vertices of no triangle are moved to where
+/// another vertex is.
 fn check_positions(primitive: &mut Primitive, notes: &mut Notes) -> Result<(), Fault> {
     let positions = &mut primitive.vertices.positions;
     let is_nowhere = |i: &u32| !positions[*i as usize].is_sound();
@@ -224,7 +225,7 @@ fn read_morph_targets(
         .collect()
 }
 
-/// The triangles of lists (mode 4), strips (5) and fans (6), counter-clockwise.
+/// The triangles of a list (mode 4), strip (5) or fan (6), counter-clockwise.
 fn read_triangles(
     accessors: Accessors<'_>,
     json: &json::Primitive,
@@ -275,13 +276,13 @@ fn doubled_area(triangle: [u32; 3], positions: &[Vec3]) -> f64 {
     (b - a).cross(c - a).length()
 }
 
-/// The unit normal of a triangle, counter-clockwise front; +Y where it has none.
+/// The unit normal of a triangle whose front is counter-clockwise; +Y where it has none.
 pub(crate) fn face_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
     let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
     (b - a).cross(c - a).try_normalize().map_or(Vec3::Y, |n| n.as_vec3())
 }
 
-/// Gives each triangle its own vertices, with the triangle's normal (glTF 2.0, section 3.7.2.1).
+/// Gives each triangle its own vertices with the triangle's normal (glTF 2.0, section 3.7.2.1).
 fn make_flat(primitive: &mut Primitive, accessors: Accessors<'_>) -> Result<(), Fault> {
     let corners = primitive.triangles.len() * 3;
     let a_vertex = size_of::<[f32; 6]>()
@@ -300,7 +301,7 @@ fn make_flat(primitive: &mut Primitive, accessors: Accessors<'_>) -> Result<(), 
     Ok(())
 }
 
-/// Makes normals unit length; those without direction get the mean of their triangles.
+/// Normalises normals; those without direction get the mean of their triangles.
 fn repair_normals(primitive: &mut Primitive) {
     let mut broken = false;
     for normal in &mut primitive.vertices.normals {

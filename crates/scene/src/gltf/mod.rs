@@ -1,7 +1,8 @@
-//! The glTF 2.0 reader: bytes to an [`Asset`](crate::asset::Asset), or a fault that says where it is.
+//! The glTF 2.0 reader. It turns bytes into an [`Asset`](crate::asset::Asset), or a fault that says
+//! where it is.
 //!
-//! It is total: whatever the bytes, it gives a value or an error, and asks for no memory that the
-//! bytes or the limits do not warrant.
+//! It is total: any bytes give a value or an error. It allocates no more memory than the bytes and
+//! the limits warrant.
 
 mod accessor;
 mod animation;
@@ -32,7 +33,7 @@ use crate::error::{At, Fault, invalid};
 use crate::limits::Budget;
 use crate::settings::Settings;
 
-/// Extensions that are understood.
+/// Extensions that the reader understands.
 const KNOWN: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",

@@ -97,7 +97,7 @@ fn references(
     })
 }
 
-/// Sets parents; refuses nodes with two of them, and circles.
+/// Sets parents; refuses nodes with two parents, and cycles.
 fn link_parents(nodes: &mut [AssetNode]) -> Result<(), Fault> {
     for parent in 0..nodes.len() {
         for child in nodes[parent].children.clone() {
@@ -124,7 +124,7 @@ fn link_parents(nodes: &mut [AssetNode]) -> Result<(), Fault> {
     Err(invalid(format!("nodes form a circle; node {first} is below itself or in no tree")))
 }
 
-/// The nodes at the top of the scene to draw.
+/// The root nodes of the scene to draw.
 pub(super) fn roots(root: &json::Root, nodes: &[AssetNode]) -> Result<Vec<u32>, Fault> {
     let index = root.scene.unwrap_or(0);
     let Some(scene) = root.scenes.get(index) else {
@@ -210,11 +210,11 @@ pub(super) fn cameras(root: &json::Root, warnings: &mut Vec<String>) -> Result<V
     root.cameras.iter().enumerate().map(read).collect()
 }
 
-/// Where the near plane of a perspective is put that has none, metres, and as a share of the far one's
-/// distance at most.
+/// Distance of the near plane for a perspective camera whose file has 0: in metres, and at most as
+/// a share of the far plane's distance.
 const NEAR: f32 = 0.01;
 
-/// A camera, and whether its near plane had to be put somewhere.
+/// A camera, and whether its near plane had to be invented.
 fn read_camera(json: &json::Camera) -> Result<(Camera, bool), Fault> {
     let has_no_near = json.perspective.as_ref().is_some_and(|p| p.znear == 0.0);
     let positive = |v: f32| v > 0.0 && v.is_finite();
@@ -248,7 +248,7 @@ fn read_camera(json: &json::Camera) -> Result<(Camera, bool), Fault> {
     }
 }
 
-/// Checks that every joint that a skinned mesh names is one of the skin's, and weights of nodes.
+/// Checks that all joints of skinned meshes are the skin's, and checks the nodes' morph weights.
 pub(super) fn check_meshes(
     nodes: &[AssetNode],
     meshes: &[std::sync::Arc<Mesh>],

@@ -1,4 +1,4 @@
-//! Skins, and the joints that vertices hang on.
+//! Skins, and the joints that move vertices.
 
 use glam::{Affine3A, Mat4, Vec4};
 
@@ -34,7 +34,7 @@ pub(super) fn read_skin(accessors: Accessors<'_>, index: usize) -> Result<Skin, 
     read().at(|| format!("skin {index}"))
 }
 
-/// The joints and weights of a primitive's vertices, of all its sets; none where it has no set.
+/// Joints and weights of a primitive's vertices, from all its sets; empty where it has none.
 pub(super) fn read(
     accessors: Accessors<'_>,
     json: &json::Primitive,
@@ -58,7 +58,7 @@ pub(super) fn read(
                 return Err(invalid(format!("{name} has {length} elements, POSITION {vertices}")));
             }
         }
-        // Exporters fill a second set where only other meshes need it.
+        // Exporters fill a second set even where only other meshes need it.
         let is_used = weights.iter().any(|four| four.cmpgt(Vec4::ZERO).any());
         if is_used || sets.is_empty() {
             sets.push((joints, weights));
@@ -83,7 +83,7 @@ pub(super) fn read(
     Ok(all)
 }
 
-/// A joint without weight becomes 0.
+/// Converts joint indices to 16 bits; the index of a joint without weight becomes 0.
 fn narrow(joints: [u32; 4], weights: Vec4) -> Result<[u16; 4], Fault> {
     let mut narrow = [0; 4];
     for (i, joint) in joints.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Where the bytes of a glTF come from: its container, and the files that it refers to.
+//! Sources of a glTF's bytes: its container, and the files that it refers to.
 //!
 //! Only files in the scene's folder are read. A URI may not be absolute, name another machine,
 //! climb with `..`, or reach out through a symbolic link.
@@ -17,7 +17,7 @@ use crate::limits;
 
 /// Reads a regular file of at most `most` bytes.
 pub(crate) fn read_file(path: &Path, most: u64) -> io::Result<Vec<u8>> {
-    // To open a pipe is to wait for its writer.
+    // Opening a pipe would wait for its writer.
     if !std::fs::metadata(path)?.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
     }
@@ -29,27 +29,27 @@ pub(crate) fn read_file(path: &Path, most: u64) -> io::Result<Vec<u8>> {
         return Err(too_large());
     }
     let mut bytes = Vec::with_capacity(length as usize);
-    // It may grow while it is read.
+    // The file may grow while it is read.
     match file.take(most + 1).read_to_end(&mut bytes)? as u64 > most {
         true => Err(too_large()),
         false => Ok(bytes),
     }
 }
 
-/// The folder of a scene, and the place within it that URIs are relative to.
+/// The folder of a scene, and the folder within it that URIs are relative to.
 #[derive(Clone, Debug)]
 pub(crate) struct Folder {
-    /// The scene's folder without links, and the same as given.
+    /// The scene's folder with links resolved.
     canonical: PathBuf,
     given: PathBuf,
-    /// Folder of the referring file within the scene's folder: empty, or ending in `/`.
+    /// Folder of the referring file, relative to the scene's folder: empty, or with `/` at the end.
     prefix: String,
-    /// Bytes that a file may have.
+    /// Largest size of a file, bytes.
     most: u64,
 }
 
 impl Folder {
-    /// The folder that a scene's file lies in.
+    /// The folder of a scene's file.
     pub(crate) fn of(file: &Path) -> io::Result<Self> {
         let given = match file.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -60,13 +60,13 @@ impl Folder {
         Ok(Self { canonical, given, prefix, most: limits::FILE_BYTES })
     }
 
-    /// The folder of a file whose name within the scene's folder is `name`.
+    /// The folder of the file whose name within the scene's folder is `name`.
     pub(crate) fn beside(&self, name: &str) -> Self {
         let prefix = name.rfind('/').map_or("", |end| &name[..=end]);
         Self { prefix: prefix.to_owned(), ..self.clone() }
     }
 
-    /// The same folder, of which files of at most `most` bytes are read.
+    /// The same folder, with files limited to `most` bytes.
     pub(crate) fn limited(&self, most: u64) -> Self {
         Self { most, ..self.clone() }
     }
@@ -76,7 +76,7 @@ impl Folder {
         read_file(path, self.most)
     }
 
-    /// Name within the scene's folder and place on disk of a URI.
+    /// A URI's name within the scene's folder, and its path on disk.
     pub(crate) fn resolve(&self, uri: &str) -> Result<(String, PathBuf), Fault> {
         let outside = || Fault::Outside { uri: shorten(uri) };
         let faulty = |why| Fault::Name { uri: shorten(uri), why };
@@ -105,9 +105,9 @@ impl Folder {
     }
 }
 
-/// The one name of a file that a path within the scene's folder leads to: `/` between its parts, also
-/// where the path has `\` as Windows does, doubled slashes or `.`. `None` where it leads elsewhere: an
-/// absolute path, another machine's, one with `..`.
+/// The canonical name of a file, given a path within the scene's folder. Its parts are separated by
+/// `/`. The path may also have `\` as on Windows, doubled slashes or `.`. `None` where the path
+/// leads out of the folder: an absolute path, one with `..`, or one of another machine.
 pub fn file_name(path: &str) -> Option<String> {
     let mut parts = path.split(['/', '\\']);
     let first = parts.next()?;
@@ -158,7 +158,7 @@ pub(crate) fn data_uri(uri: &str) -> Option<Result<Vec<u8>, Fault>> {
     Some(engine.decode(data).map_err(|e| invalid(format!("a data: URI is not base64: {e}"))))
 }
 
-/// For messages: data URIs are long.
+/// Shortens a URI for messages, since data URIs are long.
 pub(crate) fn shorten(uri: &str) -> String {
     match uri.char_indices().nth(80) {
         Some((end, _)) => format!("{}…", &uri[..end]),
@@ -166,7 +166,7 @@ pub(crate) fn shorten(uri: &str) -> String {
     }
 }
 
-/// Bytes that are shared with others: a file, or a part of it.
+/// Shared bytes: a whole file, or a part of it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Bytes {
     data: Arc<Vec<u8>>,
@@ -192,18 +192,18 @@ impl std::ops::Deref for Bytes {
 pub(super) struct Container {
     pub(super) json: Bytes,
     pub(super) binary: Option<Bytes>,
-    /// The JSON was padded with NUL characters, which are left out.
+    /// Whether the JSON was padded with NULs, which are removed.
     pub(super) is_padded: bool,
 }
 
 const MAGIC: &[u8] = b"glTF";
-/// Of UTF-8.
+/// The byte-order mark of UTF-8.
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 const JSON_CHUNK: u32 = u32::from_le_bytes(*b"JSON");
 const BINARY_CHUNK: u32 = u32::from_le_bytes(*b"BIN\0");
 
 impl Container {
-    /// Takes a .glb apart, or passes a .gltf on; told apart by their first bytes.
+    /// Splits a .glb into its chunks, or takes a .gltf as JSON. Their first bytes tell them apart.
     pub(super) fn open(bytes: Vec<u8>) -> Result<Self, Fault> {
         if !bytes.starts_with(MAGIC) {
             return Self::of(bytes.into(), None);
@@ -239,7 +239,7 @@ impl Container {
         Self::of(json, binary)
     }
 
-    /// Leaves out what some programs put around JSON: a byte-order mark before it, NULs after it.
+    /// Removes what some programs put around JSON: a byte-order mark before it, NULs after it.
     fn of(mut json: Bytes, binary: Option<Bytes>) -> Result<Self, Fault> {
         if json.len() as u64 > limits::JSON_BYTES {
             return Err(Fault::TooLarge {

@@ -1,11 +1,11 @@
-//! Tangents for normal maps, where the file has none.
+//! Computes tangents for normal maps where the file has none.
 //!
-//! At each vertex the directions in which u grows over its triangles are averaged, weighted by the
-//! angle (as MikkTSpace does), then made orthogonal to the normal. A vertex between triangles whose
-//! texture is mirrored and ones where it is not is split in two.
+//! At each vertex, the directions of growing u over its triangles are averaged, weighted by angle
+//! (as in MikkTSpace). The mean is made orthogonal to the normal. A vertex between triangles with
+//! mirrored and unmirrored texture is split in two.
 //!
-//! Texture coordinates are those that the normal map is read at: of its own set, and transformed
-//! (KHR_texture_transform). A primitive has one material, so one normal map, and tangents of its own.
+//! Texture coordinates are those of the normal map's set, transformed (KHR_texture_transform). A
+//! primitive has one material, so it has one normal map and its own tangents.
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -13,7 +13,7 @@ use super::vertices::select_vertices;
 use crate::material::TextureRef;
 use crate::mesh::Primitive;
 
-/// Fills in the tangents of a primitive for a normal map.
+/// Computes the tangents of a primitive for a normal map.
 pub(super) fn generate(primitive: &mut Primitive, map: &TextureRef) {
     if primitive.uv[map.tex_coord].is_empty() {
         return;
@@ -41,7 +41,7 @@ pub(super) fn generate(primitive: &mut Primitive, map: &TextureRef) {
         .collect();
 }
 
-/// Texture coordinates of a map, but for where they begin.
+/// Texture coordinates of a map, without their translation.
 fn turned_uv(primitive: &Primitive, map: &TextureRef) -> Vec<Vec2> {
     let uv = primitive.uv[map.tex_coord].iter();
     uv.map(|uv| map.texture_from_mesh.transform_vector2(*uv)).collect()
@@ -52,9 +52,9 @@ fn tangent(sum: Vec3, normal: Vec3, mirrored: bool) -> Vec4 {
     direction.extend(if mirrored { -1.0 } else { 1.0 })
 }
 
-/// How a texture lies on a triangle.
+/// The placement of a texture on a triangle.
 struct Frame {
-    /// Direction in which u grows; zero where the texture has no area.
+    /// Direction of growing u; zero where the texture coordinates have no area.
     u_axis: Vec3,
     mirrored: bool,
 }
@@ -68,9 +68,9 @@ impl Frame {
     }
 }
 
-/// Whether a triangle shows the texture mirrored. A normal map's y points up the image while v grows
-/// down it, and the bitangent is cross(normal, tangent)·w: so a texture seen the right way round has
-/// clockwise texture coordinates on its counter-clockwise triangles, and w = 1.
+/// Whether the texture is mirrored on a triangle. A normal map's y points up the image, while v
+/// grows down it. The bitangent is cross(normal, tangent)·w. So an unmirrored texture has clockwise
+/// coordinates on its counter-clockwise triangles, and w = 1.
 fn is_mirrored([a, b, c]: [Vec2; 3]) -> bool {
     (b - a).perp_dot(c - a) > 0.0
 }
@@ -81,7 +81,7 @@ fn angle_at(corners: [Vec3; 3], k: usize) -> f32 {
     cosine.clamp(-1.0, 1.0).acos()
 }
 
-/// Gives triangles with a mirrored texture vertices of their own where others share them.
+/// Splits vertices that triangles with mirrored and unmirrored texture share.
 fn split_mirrored(primitive: &mut Primitive, map: &TextureRef) {
     let uv = turned_uv(primitive, map);
     let mirrored: Vec<bool> =

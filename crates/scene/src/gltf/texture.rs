@@ -1,4 +1,4 @@
-//! Images and the textures that show them.
+//! Images and textures.
 
 use std::io::Cursor;
 use std::path::PathBuf;
@@ -16,10 +16,10 @@ use crate::error::{At, Fault, invalid};
 use crate::limits;
 use crate::material::{Filter, Image, TextureRef, Wrap};
 
-/// A file that a glTF refers to: its name in the scene's folder, and its place on disk.
+/// A file that a glTF refers to: its name within the scene's folder, and its path on disk.
 pub(super) type Referred = (String, PathBuf);
 
-/// Decoded images by index; those that no texture of a material shows are not decoded.
+/// Decoded images by index. Images that no material's texture shows are not decoded.
 #[derive(Debug, Default)]
 pub(super) struct Images {
     images: Vec<Option<Arc<Image>>>,
@@ -98,7 +98,7 @@ fn decode(bytes: &[u8], name: &str, accessors: Accessors<'_>) -> Result<Image, F
     let mut bounds = Limits::default();
     bounds.max_image_width = Some(side);
     bounds.max_image_height = Some(side);
-    // Sixteen bits a channel while decoding, and as much again for the decoder itself.
+    // Decoding takes up to 16 bits a channel, and as much again for the decoder itself.
     bounds.max_alloc = Some(16 * u64::from(side).pow(2));
     second.limits(bounds);
     let decoded = second.decode().map_err(|e| fail(e.to_string()))?.into_rgba8();
@@ -110,7 +110,8 @@ fn decode(bytes: &[u8], name: &str, accessors: Accessors<'_>) -> Result<Image, F
     Ok(Image { name: name.to_owned(), width, height, texels })
 }
 
-/// Index of the image that a texture shows; `None` when it has only one in a format that is not read.
+/// Index of the image that a texture shows; `None` where its only image has a format that is not
+/// read.
 pub(super) fn image_of(root: &json::Root, texture: usize) -> Result<Option<usize>, Fault> {
     let there = root.textures.len();
     let json = root
@@ -127,7 +128,7 @@ pub(super) fn image_of(root: &json::Root, texture: usize) -> Result<Option<usize
 }
 
 impl Images {
-    /// The texture that a material refers to, if it can be shown.
+    /// The texture that a material refers to; `None` where it cannot be shown.
     pub(super) fn texture(
         &self,
         root: &json::Root,
@@ -172,7 +173,7 @@ impl Images {
     }
 }
 
-/// KHR_texture_transform: translation · rotation · scale, where a positive rotation turns the texture
+/// KHR_texture_transform: translation · rotation · scale. A positive rotation turns texture
 /// coordinates counter-clockwise in an image whose v runs down.
 fn texture_from_mesh(transform: &json::TextureTransform) -> Result<Affine2, Fault> {
     let (sin, cos) = transform.rotation.sin_cos();

@@ -1,8 +1,8 @@
-//! Which texture coordinates materials read.
+//! Sets of texture coordinates that materials read.
 
 use super::json;
 
-/// All textures of a material, those that count for more first.
+/// All textures of a material, the more important ones first.
 pub(super) fn textures(m: &json::Material) -> impl Iterator<Item = &json::TextureInfo> {
     let pbr = &m.pbr_metallic_roughness;
     let specular = m.extensions.specular.as_ref();
@@ -24,8 +24,8 @@ pub(super) fn textures(m: &json::Material) -> impl Iterator<Item = &json::Textur
     .flatten()
 }
 
-/// Which sets of texture coordinates a material reads, as many as vertices hold: TEXCOORD_0 and 1
-/// unless it asks for a later one.
+/// The two sets of texture coordinates that a material reads: TEXCOORD_0 and 1 unless it asks for a
+/// later one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct UvSets([usize; 2]);
 
@@ -40,19 +40,19 @@ impl UvSets {
         if sets.iter().all(|set| *set < 2) {
             return Self([0, 1]);
         }
-        // Those of textures that count for more come first.
+        // The sets of the most important textures come first.
         sets.truncate(2);
         sets.sort_unstable();
         let first = sets[0];
         Self([first, sets.get(1).copied().unwrap_or(if first == 0 { 1 } else { 0 })])
     }
 
-    /// By place among a vertex's coordinates.
+    /// Numbers of the sets, by their index among a vertex's coordinates.
     pub(super) fn numbers(self) -> [usize; 2] {
         self.0
     }
 
-    /// The place of a set.
+    /// Index of a set among a vertex's coordinates.
     pub(super) fn place(self, set: usize) -> Option<usize> {
         self.0.iter().position(|here| *here == set)
     }

@@ -1,10 +1,10 @@
-//! Vertices as lists: what mends them, and what puts them in another order.
+//! Lists of vertex attributes: repair and reordering.
 
 use glam::{Vec2, Vec3, Vec4};
 
 use crate::mesh::Primitive;
 
-/// What reading meshes leaves besides them.
+/// Results of reading meshes besides the meshes.
 #[derive(Debug, Default)]
 pub(super) struct Notes {
     pub(super) warnings: Vec<String>,
@@ -28,7 +28,7 @@ macro_rules! element {
 
 element!(Vec2, Vec3, Vec4);
 
-/// Puts something harmless in the place of elements that cannot be reckoned with.
+/// Replaces elements that are not finite or too large by a harmless one.
 pub(super) fn mend<T: Element>(name: &str, values: &mut [T], harmless: T, notes: &mut Notes) {
     let mut count = 0;
     for value in values.iter_mut().filter(|value| !value.is_sound()) {
@@ -42,7 +42,7 @@ pub(super) fn mend<T: Element>(name: &str, values: &mut [T], harmless: T, notes:
     }
 }
 
-/// Replaces the vertices by copies of those named, in that order.
+/// Replaces the vertices by copies of those in `order`.
 pub(super) fn select_vertices(primitive: &mut Primitive, order: &[u32]) {
     fn select<T: Copy>(values: &mut Vec<T>, order: &[u32]) {
         if !values.is_empty() {

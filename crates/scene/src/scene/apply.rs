@@ -1,9 +1,9 @@
-//! Edits: each is checked, then made whole, or refused and nothing is changed.
+//! Application of edits. Each is checked, then applied wholly, or refused without any change.
 //!
-//! **Animated nodes.** A node has one transform; whoever sets it last has set it. An animation that
-//! runs sets what it moves at every step, so an edit of such a part lasts until the next; one that
-//! stands leaves its nodes where they are, and edits move them on from there. Pausing, seeking and
-//! playing put the animation's nodes where it has them at that moment.
+//! **Animated nodes.** A node has one transform, and the last one to set it wins. A running
+//! animation sets its nodes at every step, so an edit of such a part lasts until the next step. A
+//! paused animation leaves its nodes where they are, and edits move them from there. Pausing,
+//! seeking and playing move the animation's nodes to where it has them at that moment.
 
 use glam::{Affine3A, Quat, Vec3, Vec4};
 
@@ -19,32 +19,32 @@ use crate::{
     MaterialChange, MaterialId, MeshId, NodeId, NodeName, Playback, PunctualLight, Transform,
 };
 
-/// Why an edit is refused. The text is meant for the one who sent it.
+/// The reason why an edit is refused, meant for its sender.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EditError {
-    /// No node of that number.
+    /// There is no node of that number.
     #[error("node {0} does not exist")]
     UnknownNode(NodeId),
-    /// No mesh of that number.
+    /// There is no mesh of that number.
     #[error("mesh {0} does not exist")]
     UnknownMesh(MeshId),
-    /// No material of that number.
+    /// There is no material of that number.
     #[error("material {0} does not exist")]
     UnknownMaterial(MaterialId),
-    /// No animation of that number.
+    /// There is no animation of that number.
     #[error("animation {0} does not exist")]
     UnknownAnimation(AnimationId),
     /// The node carries no light.
     #[error("{0} carries no light")]
     NoLight(String),
-    /// A number of a node that is to be added is in use or was.
+    /// The number of a node to add is in use or was used.
     #[error("node number {0} is taken")]
     Taken(NodeId),
-    /// A value that makes no sense.
+    /// A value makes no sense.
     #[error("{what}: {why}")]
     Senseless {
-        /// What was to be changed.
+        /// The thing to be changed.
         what: String,
         /// What is wrong with the value.
         why: String,
@@ -52,7 +52,7 @@ pub enum EditError {
     /// A file cannot be added.
     #[error("{file:?} {fault}")]
     File {
-        /// As the edit names it.
+        /// Its URI, as the edit writes it.
         file: String,
         /// What is wrong with it.
         fault: Fault,
@@ -62,22 +62,22 @@ pub enum EditError {
     TooMany,
 }
 
-/// Who gives nodes that an edit adds their numbers.
+/// The source of the numbers of nodes that an edit adds.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Numbers {
-    /// This scene; a number in the edit is ignored.
+    /// This scene gives the number; one in the edit is ignored.
     Given,
-    /// The edit has it.
+    /// The edit has the number.
     InEdit,
 }
 
 impl Scene {
-    /// Applies an edit, or refuses it and changes nothing. Gives the edit back with the number of the
-    /// node that it added filled in; numbers are given here, whatever the edit says. A file that it
-    /// names is read first, where it has not been ([`Scene::file_to_read`]).
+    /// Applies an edit, or refuses it and changes nothing. Returns the edit with the number of the
+    /// added node filled in; this scene chooses that number, whatever the edit says. Reads the file
+    /// that the edit names unless it has been read ([`Scene::file_to_read`]).
     ///
     /// # Errors
-    /// An edit that makes no sense for this scene.
+    /// The edit makes no sense for this scene.
     pub fn apply(&mut self, edit: &Edit) -> Result<Edit, EditError> {
         self.apply_numbered(edit, Numbers::Given)
     }
@@ -85,7 +85,7 @@ impl Scene {
     /// Applies an edit that another replica of the scene has accepted, with the numbers in it.
     ///
     /// # Errors
-    /// As [`Scene::apply`]; a number that is missing or taken.
+    /// Those of [`Scene::apply`], and a number that is missing or taken.
     pub fn replay(&mut self, edit: &Edit) -> Result<(), EditError> {
         self.apply_numbered(edit, Numbers::InEdit).map(|_| ())
     }
@@ -139,7 +139,7 @@ impl Scene {
         }
     }
 
-    /// How messages name a node.
+    /// A node's name for messages.
     fn describe(&self, id: NodeId) -> String {
         match self.nodes.get(id) {
             Some(node) if !node.name.is_empty() => format!("node {id} {:?}", node.name),
@@ -165,7 +165,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Whether a node and all below it have a place in the world after a change of the node.
+    /// Checks that a changed node and all nodes below it still have transforms within the world.
     fn check_places(&self, id: NodeId, before: &Trs) -> Result<(), EditError> {
         let local = self.nodes.get(id).map(|n| n.parent_from_node.affine()).unwrap_or_default();
         if !is_invertible(&local) && is_invertible(&before.affine()) {
@@ -181,7 +181,8 @@ impl Scene {
         }
     }
 
-    /// Whether there is room for so many nodes, and for nodes and instances together.
+    /// Checks that there is room for `nodes` nodes from `id` on, and for `size` more nodes and
+    /// instances.
     fn check_room(&self, id: NodeId, nodes: usize, size: usize) -> Result<(), EditError> {
         let there_are_numbers =
             u32::try_from(nodes).is_ok_and(|n| id.0.checked_add(n).is_some_and(|n| n < u32::MAX));
@@ -191,7 +192,7 @@ impl Scene {
         }
     }
 
-    /// Where a node that is to be added would be; an error when it cannot be there.
+    /// The transform that an added node would have; an error where it cannot be there.
     pub(super) fn check_addition(
         &self,
         what: &str,
@@ -271,7 +272,8 @@ impl Scene {
         Ok(())
     }
 
-    /// Whether a file's nodes have room in the scene, and places in the world.
+    /// Checks that the scene has room for a file's nodes and that their transforms are within the
+    /// world.
     fn check_file(&self, id: NodeId, asset: &Asset, world: Affine3A) -> Result<(), EditError> {
         self.check_room(id, asset.nodes.len() + 1, asset.size() + 1)?;
         match asset.fits(world) {
@@ -304,7 +306,7 @@ impl Scene {
         }
         self.nodes.remove(id);
         for model in &mut self.models[1..] {
-            // A copy is there as long as the node that it was added with.
+            // A copy exists as long as the node that it was added with.
             model.copies.retain(|first| self.nodes.contains(NodeId(first - 1)));
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! The scene at one moment, flattened.
+//! Captures the scene at one moment, flattened to instances and lights.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use super::nodes::{Node, PlacedSkin};
 use crate::trs::is_invertible;
 use crate::{Deformation, Instance, Mesh, NodeId, PlacedLight, Pose, Snapshot};
 
-/// Deformations by node, kept while they stay as they are.
+/// Deformations by node, kept while they are unchanged.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Deformations(BTreeMap<NodeId, Kept>);
 
@@ -20,13 +20,14 @@ struct Kept {
     used: bool,
 }
 
-/// The space of skinned meshes that are mirrored: their triangles then wind as at rest, and the
-/// transform tells, as for any other instance, that they are to be seen from the other side.
+/// The space of skinned meshes that are mirrored. Their triangles then wind as at rest. The
+/// transform says, as for any mirrored instance, that they are seen from the other side.
 const MIRROR: Affine3A =
     Affine3A { matrix3: Mat3A::from_diagonal(Vec3::new(-1.0, 1.0, 1.0)), translation: Vec3A::ZERO };
 
 impl Scene {
-    /// The scene as it is now. Cheap while nothing changes: then it is the same one.
+    /// The scene at the current moment. It is cheap while nothing changes, since it returns the
+    /// same one.
     pub fn snapshot(&mut self) -> Arc<Snapshot> {
         let snapshot = match self.snapshot.take() {
             Some(mut snapshot) => {
@@ -65,8 +66,7 @@ impl Scene {
         instances
     }
 
-    /// The mesh of a node, or of one of its instances; `None` where it has none or has shrunk to
-    /// nothing.
+    /// The instance of a node's mesh; `None` where there is no mesh or it has shrunk to nothing.
     fn instance(
         &self,
         id: NodeId,
@@ -87,7 +87,7 @@ impl Scene {
         } else if !is_invertible(&world_from_node) {
             return None;
         }
-        // A skinned mesh is where its joints are; its own node's place does not count.
+        // The joints place a skinned mesh; its own node's transform does not.
         let world_from_object = match &world_from_rest {
             Some(joints) if is_mirrored(joints) => MIRROR,
             Some(_) => Affine3A::IDENTITY,
@@ -117,8 +117,8 @@ impl Scene {
         placed.skin.joints.iter().map(world_from_rest).collect()
     }
 
-    /// Every punctual light that is shown in the scene, also those without intensity; as in a snapshot,
-    /// their places are relative to [`Snapshot::origin`].
+    /// All punctual lights that the scene shows, also those without intensity. Positions are
+    /// relative to [`Snapshot::origin`].
     pub fn lights(&self) -> Vec<PlacedLight> {
         let shown = self.nodes.shown().into_iter();
         shown.filter_map(|(id, node, place)| place_light(id, node, &place.as_affine3a())).collect()
@@ -145,13 +145,13 @@ impl Deformations {
     }
 }
 
-/// Whether most joints turn what they move inside out.
+/// Whether most joints mirror the mesh.
 fn is_mirrored(joints: &[Affine3A]) -> bool {
     let mirrored = joints.iter().filter(|joint| joint.matrix3.determinant() < 0.0).count();
     2 * mirrored > joints.len()
 }
 
-/// The light of a node. Its intensity is the same whatever the node's scale.
+/// The light of a node. The node's scale does not change its intensity.
 fn place_light(id: NodeId, node: &Node, world_from_node: &Affine3A) -> Option<PlacedLight> {
     let light = node.light?;
     let direction = (world_from_node.matrix3 * Vec3A::NEG_Z).try_normalize()?;

@@ -1,4 +1,4 @@
-//! From a file to a scene.
+//! Loads scenes from files.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -22,13 +22,13 @@ use crate::trs::{Trs, is_in_world};
 use crate::{Environment, MaterialId, MeshId, NodeId, SceneError};
 
 impl Scene {
-    /// Opens a file (.gltf or .glb), or, where there is none of that name, a built-in scene.
+    /// Opens a .gltf or .glb file or, where there is no file of that name, a built-in scene.
     ///
     /// # Errors
-    /// See [`Scene::load`]; a name that is neither.
+    /// Those of [`Scene::load`], and a name that is neither.
     pub fn open(name: &str) -> Result<Self, SceneError> {
         let path = Path::new(name);
-        // A folder does not hide the built-in scene of its name.
+        // A folder does not hide the built-in scene of the same name.
         if !path.is_file()
             && let Some(scene) = Self::builtin(name)
         {
@@ -40,12 +40,12 @@ impl Scene {
         Err(Fault::Unknown { builtins: builtin::NAMES.join(", ") }.of(path))
     }
 
-    /// Loads a .gltf or .glb file. Files that it refers to, and those that edits add later, have to
-    /// lie in its folder.
+    /// Loads a .gltf or .glb file. Files that it refers to, and those that edits add later, must be
+    /// in its folder.
     ///
     /// # Errors
-    /// A file that cannot be read, is no valid glTF, requires an extension that is not read, exceeds
-    /// the limits, or has no triangles in its scene. The message says where, and what to do.
+    /// The file cannot be read, is not valid glTF, requires an unknown extension, exceeds the
+    /// limits, or has no triangles in its scene. The message says where, and what to do.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         let budget = Budget::default();
         let read = || {
@@ -67,10 +67,10 @@ impl Scene {
         Ok(scene)
     }
 
-    /// A scene from a .glb in memory that refers to no files.
+    /// Loads a scene from a .glb in memory that refers to no files.
     ///
     /// # Errors
-    /// See [`Scene::load`].
+    /// Those of [`Scene::load`].
     pub fn from_glb(name: &str, bytes: impl Into<Arc<[u8]>>) -> Result<Self, SceneError> {
         let file = format!("{name}.glb");
         let budget = Budget::default();
@@ -91,7 +91,7 @@ impl Scene {
         match Self::from_glb(name, builtin::glb(name)?) {
             Ok(scene) => Some(scene),
             Err(error) => {
-                // Tests load them all.
+                // Tests load all of them.
                 tracing::error!(%error, "a built-in scene is broken");
                 None
             }
@@ -122,7 +122,8 @@ impl Scene {
         scene
     }
 
-    /// Makes places relative to the scene's own middle, and warns of what is lost all the same.
+    /// Makes transforms relative to the scene's own middle, and warns of the precision that is
+    /// still lost.
     fn choose_origin(&mut self) {
         let mut boxes = HashMap::new();
         let mut lumps = Vec::new();
@@ -143,7 +144,7 @@ impl Scene {
         self.warnings.extend(origin::warnings(&lumps, origin));
     }
 
-    /// A skinned mesh is where its joints are.
+    /// The box around a skin's joints, which place the mesh.
     fn lump_of_joints(&self, PlacedSkin { skin, first_node }: &PlacedSkin) -> Lump {
         let joints = skin.joints.iter().map(|(joint, _)| NodeId(first_node + joint));
         Lump::around(joints.map(|joint| self.nodes.place_of(joint).translation))
@@ -180,7 +181,7 @@ impl Scene {
         if triangles == 0 { Err(Fault::NoTriangles) } else { Ok(()) }
     }
 
-    /// Takes over what a file beside the scene says.
+    /// Applies the settings of the file beside the scene.
     fn settle(&mut self, settings: Settings) -> Result<(), Fault> {
         if let Some(environment) = settings.environment {
             self.light_by(environment)?;
@@ -192,14 +193,14 @@ impl Scene {
         Ok(())
     }
 
-    /// Takes an environment of its files, whose picture is read first.
+    /// Sets an environment that the scene's files name; its picture is read first.
     fn light_by(&mut self, environment: Environment) -> Result<(), Fault> {
         self.read_now(self.picture_to_read(&environment));
         self.environment = self.with_picture(environment)?;
         Ok(())
     }
 
-    /// Adds a file to the scene's models; from now on it counts as part of the scene.
+    /// Adds a file to the scene's models; it then counts as part of the scene.
     pub(super) fn take_model(
         &mut self,
         name: String,
@@ -242,7 +243,7 @@ impl Scene {
         self.models.len() - 1
     }
 
-    /// Puts the nodes of a file in, numbered from `first` on.
+    /// Inserts the nodes of a file, numbered from `first` on.
     pub(super) fn place(&mut self, model: usize, first: u32) {
         self.models[model].copies.push(first);
         let Model { asset, first_mesh, .. } = &self.models[model];
@@ -267,8 +268,8 @@ impl Scene {
         }
     }
 
-    /// Puts a copy of a file in: a node of its own number, which has `trs`, and below it the file's
-    /// nodes, numbered from the next number on.
+    /// Inserts a copy of a file: a new node with `trs`, and below it the file's nodes. Numbers are
+    /// consecutive.
     pub(super) fn place_below(
         &mut self,
         model: usize,
@@ -290,7 +291,7 @@ impl Scene {
         self.nodes.attach(id, wrapper);
     }
 
-    /// The scene as its file has it, `time` seconds after its beginning, without reading anything
+    /// The scene as in its file, `time` seconds after its beginning, without reading anything
     /// again.
     #[must_use]
     pub fn pristine(&self, time: f64) -> Self {
@@ -304,7 +305,8 @@ impl Scene {
         scene.place(0, 0);
         main.asset.roots.iter().for_each(|root| scene.nodes.add_root(NodeId(*root)));
         let environment = main.asset.settings.environment.clone().unwrap_or_default();
-        // Its file was loaded with it; where another took its place, nobody asks for this one.
+        // The picture was loaded with the scene. Where another has replaced it, nobody asks for
+        // this one.
         scene.environment = scene.with_picture(environment.clone()).unwrap_or(environment);
         scene.volumes.clone_from(&self.volumes);
         scene.nodes.set_origin(self.nodes.origin());
@@ -327,13 +329,13 @@ fn weights(asset: &Asset, node: &AssetNode) -> Vec<f32> {
 }
 
 impl Asset {
-    /// How many nodes it has, and their instances.
+    /// Number of nodes and instances.
     pub(super) fn size(&self) -> usize {
         let instances = self.nodes.iter().filter_map(|node| node.instances.as_ref());
         self.nodes.len() + instances.map(|instances| instances.len()).sum::<usize>()
     }
 
-    /// Whether all its nodes have a finite place in the world when its roots are placed so.
+    /// Whether the transforms of all nodes are within the world when the roots have this transform.
     pub(super) fn fits(&self, world_from_roots: Affine3A) -> bool {
         let mut open: Vec<_> = self.roots.iter().map(|r| (*r, world_from_roots)).collect();
         while let Some((index, world_from_parent)) = open.pop() {
@@ -347,7 +349,7 @@ impl Asset {
         true
     }
 
-    /// Makes meshes name materials by their numbers in a scene whose next number is `first`.
+    /// Renumbers the materials of the meshes for a scene whose next number is `first`.
     fn number_materials(&mut self, first: u32) {
         for mesh in &mut self.meshes {
             for primitive in &mut Arc::make_mut(mesh).primitives {
@@ -358,7 +360,7 @@ impl Asset {
     }
 }
 
-/// A scene's name as part of an address.
+/// A scene's name as part of an address, made from the file's stem.
 fn short_name(stem: &str) -> String {
     let keep = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' };
     let name: String = stem.to_ascii_lowercase().chars().map(keep).take(64).collect();

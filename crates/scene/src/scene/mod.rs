@@ -1,4 +1,4 @@
-//! The scene: loaded once, changed by edits and by time, asked for snapshots.
+//! The scene: loaded once, changed by edits and by time, captured in snapshots.
 
 mod apply;
 mod capture;
@@ -30,28 +30,28 @@ use crate::{
     PunctualLight, Snapshot, Transform, View, VolumeSpec,
 };
 
-/// A scene: what its file says, what edits have made of it, and its time.
+/// A scene: the contents of its file, the changes by edits, and its time.
 #[derive(Debug)]
 pub struct Scene {
     name: String,
-    /// Absent for built-in scenes.
+    /// The scene's folder; absent for built-in scenes.
     folder: Option<Folder>,
     volumes: Vec<VolumeSpec>,
     warnings: Vec<String>,
-    /// The scene's own file and the files that edits have added, in order.
+    /// The scene's own file, then the files that edits have added, in order.
     models: Vec<Model>,
-    /// Files of another copy of this scene, to be added without reading them again.
+    /// Files of another copy of this scene, which can be added without reading them again.
     library: BTreeMap<String, (Arc<Asset>, Taken)>,
-    /// Pictures of the environment, and of the one that the scene's file has, by name.
+    /// Pictures of the current environment and of that in the scene's file, by name.
     pictures: BTreeMap<String, Picture>,
-    /// What has been read and is not shown.
+    /// Files that have been read and are not shown.
     shelf: Shelf,
     nodes: Nodes,
     meshes: Vec<Arc<Mesh>>,
     materials: Vec<Material>,
     clocks: Vec<Clock>,
     environment: Environment,
-    /// The environment is another one than the glTF file's.
+    /// Whether the environment differs from the glTF file's.
     environment_replaced: bool,
     time: f64,
     version: u64,
@@ -60,8 +60,8 @@ pub struct Scene {
     snapshot: Option<Arc<Snapshot>>,
 }
 
-/// A glTF file in the scene, and where its things stand in the scene's numbering. All copies of it
-/// share meshes, materials and animations.
+/// A glTF file in the scene, with the first numbers of its meshes and animations. All copies of the
+/// file share meshes, materials and animations.
 #[derive(Clone, Debug)]
 struct Model {
     /// Name within the scene's folder.
@@ -70,20 +70,20 @@ struct Model {
     taken: Taken,
     first_mesh: u32,
     first_animation: u32,
-    /// For each copy in the scene, the number of the node that is the file's node 0.
+    /// For each copy, the number of the node that is the file's node 0.
     copies: Vec<u32>,
     /// The first node that this file was added with.
     added_as: Option<NodeId>,
 }
 
-/// A node, as others see it.
+/// A description of a node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeInfo<'a> {
     /// Its number.
     pub id: NodeId,
     /// Its name in the file; may be empty.
     pub name: &'a str,
-    /// The node above it.
+    /// Its parent node.
     pub parent: Option<NodeId>,
     /// Its transform relative to the parent; all parts are set.
     pub transform: Transform,
@@ -111,20 +111,20 @@ impl<'a> NodeInfo<'a> {
     }
 }
 
-/// An animation and how it stands.
+/// An animation and its state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AnimationInfo<'a> {
     /// Its number.
     pub id: AnimationId,
     /// Its name in the file; may be empty.
     pub name: &'a str,
-    /// Seconds.
+    /// Duration in seconds.
     pub duration: f64,
-    /// Runs or stands.
+    /// Whether it runs.
     pub playing: bool,
-    /// Where it stands, 0 to its duration.
+    /// Its current time, 0 to its duration, seconds.
     pub time: f64,
-    /// Rate.
+    /// Rate of playback; negative runs backwards.
     pub speed: f64,
 }
 
@@ -137,19 +137,19 @@ pub struct PlacedCamera<'a> {
     pub node_name: &'a str,
     /// Its name and projection.
     pub camera: &'a Camera,
-    /// It looks along −Z with +Y up.
+    /// Its transform; it looks along −Z with +Y up.
     pub world_from_camera: Affine3A,
 }
 
 impl PlacedCamera<'_> {
-    /// What it sees.
+    /// The view through the camera.
     pub fn view(&self) -> View {
         View { world_from_camera: self.world_from_camera, projection: self.camera.projection }
     }
 }
 
 impl Scene {
-    /// A short name made of the file's: lower-case letters, digits, `-`, `_` and `.`.
+    /// Short name made from the file's: lower-case letters, digits, `-`, `_` and `.`.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -164,17 +164,18 @@ impl Scene {
         self.time
     }
 
-    /// Grows by one at every change that can change light.
+    /// Version of the scene, incremented by every change that can change light.
     pub fn version(&self) -> u64 {
         self.version
     }
 
-    /// What was found odd while loading: extensions left out, faults that were mended, and the like.
+    /// Oddities found while loading, such as ignored extensions and repaired faults.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// Whether all that is drawn is black: no lamp shines, nothing emits light, none comes from afar.
+    /// Whether the scene has no light: no lamp shines, no surface emits, and the environment is
+    /// black.
     pub fn is_dark(&self) -> bool {
         let shines = |mesh: MeshId| {
             let primitives = &self.meshes[mesh.0 as usize].primitives;
@@ -188,12 +189,12 @@ impl Scene {
             && !self.drawn_nodes().filter_map(|node| node.mesh).any(shines)
     }
 
-    /// The volumes that the scene asks for; none where it leaves that to others.
+    /// The volumes that the scene asks for; empty where it leaves the choice to others.
     pub fn volumes(&self) -> Vec<VolumeSpec> {
         self.volumes.clone()
     }
 
-    /// The files that clients need to draw the scene, those that edits have added included.
+    /// The files that clients need to draw the scene, including those that edits have added.
     pub fn files(&self) -> Vec<SceneFile> {
         let mut files: Vec<SceneFile> =
             self.models.iter().flat_map(|m| m.asset.files.iter().cloned()).collect();
@@ -203,15 +204,14 @@ impl Scene {
         files
     }
 
-    /// The picture of the environment, where it is one.
+    /// The file of the environment's picture, where it has one.
     pub fn environment_file(&self) -> Option<SceneFile> {
         let Environment::Image { uri, .. } = &self.environment else { return None };
         let (name, path) = self.folder.as_ref()?.resolve(uri).ok()?;
         Some(SceneFile { name, contents: FileContents::Path(path) })
     }
 
-    /// The box around everything that is drawn, in the world. Empty scenes have none: then it is a
-    /// point at the origin.
+    /// World bounds of everything that is drawn. For an empty scene they are a point at the origin.
     pub fn bounds(&self) -> Aabb {
         let mut bounds = Aabb::EMPTY;
         let mut add = |world: &Affine3A, positions: &[Vec3]| {
@@ -234,7 +234,7 @@ impl Scene {
         self.nodes.iter().map(|(id, node)| NodeInfo::of(id, node))
     }
 
-    /// Those of the scene that the file names, without what it hides, by number.
+    /// The nodes of the file's scene that are not hidden, in ascending order of numbers.
     pub fn drawn_nodes(&self) -> impl Iterator<Item = NodeInfo<'_>> {
         let mut drawn = self.nodes.shown();
         drawn.sort_by_key(|(id, _, _)| *id);
@@ -254,7 +254,7 @@ impl Scene {
         camera.collect()
     }
 
-    /// Views of the scene: those of its cameras, in order, and at last one of all of it.
+    /// Views of the scene: those of its cameras, in order, then one of the whole scene.
     pub fn views(&self) -> Vec<NamedView> {
         let of_camera = |(number, placed): (usize, PlacedCamera<'_>)| {
             let names = [placed.camera.name.as_str(), placed.node_name];
@@ -271,7 +271,7 @@ impl Scene {
         views
     }
 
-    /// The animations and how they stand.
+    /// The animations and their state.
     pub fn animations(&self) -> impl Iterator<Item = AnimationInfo<'_>> {
         let animations = self.models.iter().flat_map(|m| &m.asset.animations);
         (0..).zip(animations.zip(&self.clocks)).map(|(id, (animation, clock))| AnimationInfo {
@@ -299,8 +299,8 @@ impl Scene {
         &self.environment
     }
 
-    /// Lets `seconds` pass and moves what is animated; true when something has moved. A time that is
-    /// negative or not finite is none.
+    /// Lets `seconds` pass and moves what is animated. Returns whether something has moved. A time
+    /// that is negative or not finite has no effect.
     pub fn advance(&mut self, seconds: f64) -> bool {
         if seconds.is_finite() && seconds > 0.0 {
             self.time += seconds;
@@ -317,7 +317,7 @@ impl Scene {
         self.snapshot = None;
     }
 
-    /// Puts nodes where the animations that run have them; where two move the same one, the later
+    /// Moves nodes as the running animations have them. Where two move the same node, the later
     /// number wins.
     fn play(&mut self) -> bool {
         let mut moved = false;
@@ -329,14 +329,15 @@ impl Scene {
         moved
     }
 
-    /// Puts nodes where one animation has them now; true when that moves any.
+    /// Moves nodes as one animation has them now; returns whether any has moved.
     fn pose(&mut self, index: usize) -> bool {
         let model = self.models.partition_point(|m| m.first_animation as usize <= index) - 1;
         let copies = self.models[model].copies.clone();
         self.pose_copies(model, index, &copies)
     }
 
-    /// Puts a new copy of a file where the file's animations have it, those that stand included.
+    /// Moves the nodes of a new copy of a file as the file's animations have them, including paused
+    /// ones.
     fn pose_new_copy(&mut self, model: usize, first_node: u32) {
         let first = self.models[model].first_animation as usize;
         let mut order: Vec<_> =
@@ -375,7 +376,7 @@ impl Scene {
     }
 }
 
-/// Sets a value; true when it was another one before.
+/// Sets a value; returns whether it changed.
 fn set<T: PartialEq>(place: &mut T, value: T) -> bool {
     let is_new = *place != value;
     *place = value;

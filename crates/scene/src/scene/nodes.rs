@@ -17,15 +17,16 @@ pub(crate) struct Node {
     pub(crate) children: Vec<NodeId>,
     pub(crate) parent_from_node: Trs,
     pub(crate) mesh: Option<MeshId>,
-    /// Where the mesh is shown, relative to the node; once, at the node, where absent.
+    /// Transforms at which the mesh is shown, relative to the node. Where absent, it is shown once,
+    /// at the node.
     pub(crate) instances: Option<Arc<[DAffine3]>>,
     pub(crate) skin: Option<PlacedSkin>,
     pub(crate) light: Option<PunctualLight>,
-    /// Model and index of its camera.
+    /// Index of the model, and index of the camera in it.
     pub(crate) camera: Option<(usize, u32)>,
-    /// It and all below it are neither drawn nor give light.
+    /// Whether the node and all below it are hidden: neither drawn nor giving light.
     pub(crate) hidden: bool,
-    /// Morph weights, one a target of the mesh.
+    /// Morph weights, one for each target of the mesh.
     pub(crate) weights: Vec<f32>,
 }
 
@@ -33,21 +34,21 @@ pub(crate) struct Node {
 #[derive(Clone, Debug)]
 pub(crate) struct PlacedSkin {
     pub(crate) skin: Arc<Skin>,
-    /// The number of the node that is the file's node 0.
+    /// Number of the node that is the file's node 0.
     pub(crate) first_node: u32,
 }
 
-/// Nodes by number, and the roots of what is drawn. A node that is neither a root nor below one is
-/// known but not drawn (glTF files can hold such).
+/// Nodes by number, and the roots of the drawn trees. A node that is in none of these trees is
+/// known but not drawn; glTF files can hold such nodes.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Nodes {
     nodes: BTreeMap<NodeId, Node>,
     roots: Vec<NodeId>,
-    /// The next free number; numbers are never used twice.
+    /// The next free number; numbers are never reused.
     next: u32,
-    /// Of all nodes that have a list of them.
+    /// Number of instances of all nodes.
     instances: usize,
-    /// The point of the world that places are relative to.
+    /// The world position that transforms are relative to.
     origin: Vec3,
 }
 
@@ -56,8 +57,8 @@ impl Node {
         self.instances.as_ref().map_or(0, |instances| instances.len())
     }
 
-    /// Where its mesh is shown when the node is there: once, or for each instance that has a place in
-    /// the world.
+    /// Transforms at which the mesh is shown, given the node's: one, or one for each instance whose
+    /// transform is within the world.
     pub(crate) fn places(&self, node: &DAffine3) -> impl Iterator<Item = DAffine3> {
         let once = self.instances.is_none().then_some(*node);
         let instances = self.instances.as_deref().unwrap_or_default();
@@ -67,7 +68,7 @@ impl Node {
 }
 
 impl Nodes {
-    /// How many there are, and their instances.
+    /// Number of nodes and instances.
     pub(crate) fn size(&self) -> usize {
         self.nodes.len() + self.instances
     }
@@ -80,12 +81,12 @@ impl Nodes {
         self.origin
     }
 
-    /// Makes places relative to this point of the world.
+    /// Sets the world position that transforms are relative to.
     pub(crate) fn set_origin(&mut self, origin: Vec3) {
         self.origin = origin;
     }
 
-    /// The world's place.
+    /// The world's transform, relative to the origin.
     fn place_of_world(&self) -> DAffine3 {
         DAffine3::from_translation(-self.origin.as_dvec3())
     }
@@ -102,12 +103,12 @@ impl Nodes {
         self.nodes.contains_key(&id)
     }
 
-    /// In order of their numbers.
+    /// Nodes in ascending order of numbers.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (NodeId, &Node)> {
         self.nodes.iter().map(|(id, node)| (*id, node))
     }
 
-    /// Puts a node in, with its parent and children as it names them.
+    /// Inserts a node whose parent and children are set.
     pub(crate) fn insert(&mut self, id: NodeId, node: Node) {
         self.next = self.next.max(id.0.saturating_add(1));
         self.instances += node.instance_count();
@@ -118,7 +119,7 @@ impl Nodes {
         self.roots.push(id);
     }
 
-    /// Puts a node in below another, or at the top.
+    /// Inserts a node below its parent, or at the top.
     pub(crate) fn attach(&mut self, id: NodeId, node: Node) {
         match node.parent.and_then(|parent| self.nodes.get_mut(&parent)) {
             Some(parent) => parent.children.push(id),
@@ -127,7 +128,7 @@ impl Nodes {
         self.insert(id, node);
     }
 
-    /// A node with all below it, parents first.
+    /// A node and all nodes below it, parents first.
     pub(crate) fn subtree(&self, id: NodeId) -> Vec<NodeId> {
         let mut found = vec![id];
         let mut at = 0;
@@ -140,7 +141,7 @@ impl Nodes {
         found
     }
 
-    /// Takes a node with all below it out.
+    /// Removes a node and all nodes below it.
     pub(crate) fn remove(&mut self, id: NodeId) {
         let parent = self.nodes.get(&id).and_then(|n| n.parent);
         let siblings = match parent.and_then(|parent| self.nodes.get_mut(&parent)) {
@@ -154,7 +155,7 @@ impl Nodes {
         }
     }
 
-    /// A node's place, relative to the origin like all places.
+    /// A node's transform, relative to the origin.
     pub(crate) fn place_of(&self, id: NodeId) -> DAffine3 {
         let mut place = DAffine3::IDENTITY;
         let mut at = Some(id);
@@ -165,22 +166,22 @@ impl Nodes {
         self.place_of_world() * place
     }
 
-    /// Nodes of the scene, parents first, with their places.
+    /// The drawn trees' nodes, parents first, with their transforms.
     pub(crate) fn placed(&self) -> Vec<(NodeId, &Node, DAffine3)> {
         self.placed_below(self.tops(), |_| true)
     }
 
-    /// Those of them that are neither hidden nor below a hidden node.
+    /// Those nodes that are neither hidden nor below a hidden node.
     pub(crate) fn shown(&self) -> Vec<(NodeId, &Node, DAffine3)> {
         self.placed_below(self.tops(), |node| !node.hidden)
     }
 
-    /// The roots, with what they are placed in.
+    /// The roots, with the transform that they are placed in.
     fn tops(&self) -> impl Iterator<Item = (NodeId, DAffine3)> {
         self.roots.iter().map(|root| (*root, self.place_of_world()))
     }
 
-    /// A node and all below it, parents first, with their places.
+    /// A node and all nodes below it, parents first, with their transforms.
     pub(crate) fn placed_from(&self, id: NodeId) -> Vec<(NodeId, &Node, DAffine3)> {
         let parent = self.nodes.get(&id).and_then(|n| n.parent);
         let place = parent.map_or(self.place_of_world(), |parent| self.place_of(parent));

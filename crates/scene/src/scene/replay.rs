@@ -1,4 +1,4 @@
-//! What has become of a scene since it was loaded, as edits: what those who join late are told.
+//! The changes of a scene since it was loaded, as edits for clients that join late.
 
 use super::nodes::Node;
 use super::{Model, Scene};
@@ -9,16 +9,17 @@ use crate::{
 };
 
 impl Scene {
-    /// Edits that turn the scene as it stands in its file, [advanced](Scene::advance) to this
-    /// scene's time, into this one by [`Scene::replay`]. Their number depends on what is different,
-    /// not on how many edits there have been.
+    /// Edits for [`Scene::replay`] that reproduce this scene. They start from the scene as in its
+    /// file, [advanced](Scene::advance) to this scene's time. Their number depends on the
+    /// differences, not on how many edits there have been.
     pub fn edits_since_load(&self) -> Vec<Edit> {
         let mut edits = self.structure();
         edits.extend(self.playbacks());
         let mut replica = self.pristine(self.time);
         for edit in &edits {
             if let Err(error) = replica.replay(edit) {
-                // Tests show that this does not happen; the differences below then say the rest.
+                // Tests show that this does not happen. If it does, the differences below say the
+                // rest.
                 tracing::error!(%error, ?edit, "an own edit is refused");
             }
         }
@@ -26,14 +27,15 @@ impl Scene {
         edits
     }
 
-    /// Nodes that were added, in the order of their numbers, and then those that were removed.
+    /// Edits that add nodes, in ascending order of numbers, then those that remove nodes.
     fn structure(&self) -> Vec<Edit> {
         let mut edits = Vec::new();
         let file_nodes = self.models[0].asset.nodes.len() as u32;
         for (id, node) in self.nodes.iter().filter(|(id, _)| id.0 >= file_nodes) {
             edits.extend(self.addition(id, node).map(|edit| (id, edit)));
         }
-        // A file whose first copy has gone still has to come first in the numbering of materials.
+        // A file whose first copy has been removed is still added first, since that numbers its
+        // materials.
         for model in &self.models[1..] {
             if let Some(id) = model.added_as.filter(|id| !self.nodes.contains(*id)) {
                 let source = source_of(model);
@@ -67,7 +69,8 @@ impl Scene {
             let source = InstanceSource::Mesh(mesh);
             return Some(Edit::AddInstance { node: Some(id), name, source, parent, transform });
         }
-        // A light that was added; where it was removed since, the node that carried it is left.
+        // An added light. Where the light has been removed, the node remains and a black light
+        // stands in.
         let light = node.light.unwrap_or(NO_LIGHT);
         Some(Edit::AddLight { node: Some(id), name, light, parent, transform })
     }
@@ -79,7 +82,7 @@ impl Scene {
         })
     }
 
-    /// Nodes of files that are in the scene, of which the parent is still there and they are not.
+    /// Nodes of files that have been removed although their parent remains.
     fn removed(&self) -> Vec<NodeId> {
         let mut removed = Vec::new();
         for model in &self.models {
@@ -97,8 +100,8 @@ impl Scene {
         removed
     }
 
-    /// How animations stand that have been set, or that came with added files, in the order in which
-    /// they were set: of those that stand still, the last one has placed its nodes.
+    /// Playback of animations that were set or came with added files, in the order of setting. Of
+    /// those that are paused, the last one has placed its nodes.
     fn playbacks(&self) -> impl Iterator<Item = Edit> {
         let of_file = self.models[0].asset.animations.len();
         let mut set: Vec<_> = self.clocks.iter().enumerate().collect();
@@ -136,7 +139,7 @@ impl Scene {
     }
 }
 
-/// Stands for a light that has been removed, until the edit that removes it.
+/// Stands in for a light until the edit that removes it.
 const NO_LIGHT: PunctualLight = PunctualLight {
     kind: LightKind::Point { radius: 0.0 },
     color: glam::Vec3::ZERO,
@@ -144,7 +147,7 @@ const NO_LIGHT: PunctualLight = PunctualLight {
     range: None,
 };
 
-/// Names are URIs.
+/// The source that names a model's file; it is a URI, so `%` is escaped.
 fn source_of(model: &Model) -> InstanceSource {
     InstanceSource::File(model.name.replace('%', "%25"))
 }
@@ -157,7 +160,7 @@ fn whole(trs: Trs) -> Transform {
     }
 }
 
-/// `new` where it differs.
+/// The new value where it differs from the old one.
 fn differing<T: PartialEq>(old: T, new: T) -> Option<T> {
     (old != new).then_some(new)
 }
@@ -185,7 +188,7 @@ fn light_change(node: NodeId, old: PunctualLight, new: PunctualLight) -> Edit {
     Edit::SetLight { node, light }
 }
 
-/// All parts that a light has.
+/// All values of a light.
 fn parts(light: PunctualLight) -> LightSpec {
     let PunctualLight { kind, color, intensity, range } = light;
     let spec =

@@ -1,8 +1,8 @@
-//! Files that edits name: which are still to be read, and what has been read of them.
+//! Files that edits name: which the scene has still to read, and which it has read.
 //!
-//! Reading takes long and needs no scene, so that a server does it beside its tick:
-//! [`Scene::file_to_read`] tells what an edit waits for, [`FileToRead::read`] reads it on any
-//! thread, and [`Scene::take_in`] hands it over. [`Scene::apply`] does the three at once.
+//! Reading takes long and needs no scene, so a server does it beside its tick.
+//! [`Scene::file_to_read`] names the file that an edit waits for. [`FileToRead::read`] reads it on
+//! any thread, and [`Scene::take_in`] hands it over. [`Scene::apply`] does all three at once.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -16,26 +16,27 @@ use crate::gltf::{self, source::Folder};
 use crate::limits::{self, Budget, Taken};
 use crate::{Edit, Environment, HdrImage, InstanceSource, hdr};
 
-/// How many files are kept although nothing in the scene shows them; the oldest goes first.
+/// Number of files that are kept although the scene does not show them; the oldest is dropped
+/// first.
 const UNUSED: usize = 4;
-/// How many failures are remembered.
+/// Number of failures that are remembered.
 const FAILURES: usize = 64;
 
-/// What a file is read as.
+/// The kind of a file's contents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Model,
     Picture,
 }
 
-/// What has been read of a file.
+/// The contents of a file.
 #[derive(Debug)]
 enum Contents {
     Model(Arc<Asset>),
     Picture(Arc<HdrImage>),
 }
 
-/// A file's state on disk: one that is written anew is read anew.
+/// A file's state on disk; a file whose state has changed is read again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stamp {
     length: u64,
@@ -60,7 +61,7 @@ pub struct FileToRead {
 }
 
 impl FileToRead {
-    /// The file's name within the scene's folder: one name, however edits write it.
+    /// Name of the file within the scene's folder. It is the same however edits write it.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -89,7 +90,7 @@ impl FileToRead {
     }
 }
 
-/// A file that was read for a scene, or the reason why it could not be.
+/// A file that was read for a scene, or the reason why it could not be read.
 #[derive(Debug)]
 pub struct FileRead {
     kind: Kind,
@@ -100,13 +101,13 @@ pub struct FileRead {
 }
 
 impl FileRead {
-    /// [`FileToRead::name`].
+    /// As [`FileToRead::name`].
     pub fn name(&self) -> &str {
         &self.name
     }
 }
 
-/// What is known of files that the scene does not show.
+/// Files that were read and are not shown, and failures.
 #[derive(Debug, Default)]
 pub(super) struct Shelf {
     unused: VecDeque<(String, Contents, Taken)>,
@@ -122,7 +123,8 @@ struct Failure {
 }
 
 impl Shelf {
-    /// Keeps a file for as long as it fits beside the `used` of the limits, the newest in any case.
+    /// Keeps a file, and drops old ones until all fit the limits beside the `used` amounts. The
+    /// newest always stays.
     fn keep(&mut self, name: String, contents: Contents, taken: Taken, used: Taken) {
         let fits = |unused: &VecDeque<(_, _, Taken)>| {
             let unused: Taken = unused.iter().map(|(.., taken)| *taken).sum();
@@ -138,7 +140,7 @@ impl Shelf {
         self.unused.iter().any(|(other, contents, _)| other == name && contents.kind() == kind)
     }
 
-    /// Hands out a file to be shown, or tells why there is none.
+    /// Takes a file off the shelf to show it, or tells why it is not there.
     fn take(&mut self, kind: Kind, name: &str) -> Result<(Contents, Taken), Fault> {
         let is_it =
             |(other, contents, _): &(String, Contents, _)| other == name && contents.kind() == kind;
@@ -162,7 +164,7 @@ impl Contents {
     }
 }
 
-/// A picture that the scene shows, or that stands in its file.
+/// A picture that the scene shows or its file names.
 #[derive(Clone, Debug)]
 pub(super) struct Picture {
     image: Arc<HdrImage>,
@@ -176,8 +178,9 @@ pub(super) struct FoundModel {
 }
 
 impl Scene {
-    /// The file that an edit names, unless the scene has read it, or has tried to and the file is as
-    /// it was. An edit that would be refused whatever the file holds needs none.
+    /// The file that an edit names, if it has to be read. `None` where the scene has read it, or
+    /// failed to and the file is unchanged. `None` also where the edit would be refused whatever
+    /// the file holds.
     pub fn file_to_read(&self, edit: &Edit) -> Option<FileToRead> {
         match edit {
             Edit::AddInstance { source: InstanceSource::File(uri), parent, transform, .. } => {
@@ -192,7 +195,7 @@ impl Scene {
         }
     }
 
-    /// The same of an environment's picture.
+    /// The file of an environment's picture, likewise.
     pub(super) fn picture_to_read(&self, environment: &Environment) -> Option<FileToRead> {
         let Environment::Image { uri, .. } = environment else { return None };
         self.unread(Kind::Picture, uri)
@@ -221,8 +224,9 @@ impl Scene {
         Some(FileToRead { kind, name, path, folder, budget })
     }
 
-    /// Takes in what [`FileToRead::read`] has read: the scene stays as it is, and edits that name the
-    /// file are applied, or refused for what is wrong with it, without reading it again.
+    /// Takes in a file that [`FileToRead::read`] has read. The scene does not change. Edits that
+    /// name the file can be applied without reading it again, or are refused for the fault that was
+    /// found.
     pub fn take_in(&mut self, read: FileRead) {
         let FileRead { kind, name, stamp, contents, warnings } = read;
         self.shelf.failures.retain(|failure| failure.kind != kind || failure.name != name);
@@ -250,8 +254,8 @@ impl Scene {
         }
     }
 
-    /// What the scene will have taken of the limits beside one more file of a kind: a picture takes the
-    /// place of the one that is shown.
+    /// Amounts of the limits in use beside one more file of a kind. A picture replaces the one that
+    /// is shown.
     fn used_beside(&self, kind: Kind) -> Taken {
         let models: Taken = self.models.iter().map(|model| model.taken).sum();
         match kind {
@@ -269,19 +273,19 @@ impl Scene {
         Ok((contents, taken))
     }
 
-    /// Keeps what is not shown, or no longer.
+    /// Keeps a file that the scene does not show.
     fn keep(&mut self, name: String, contents: Contents, taken: Taken) {
         let used = self.used_beside(Kind::Model);
         self.shelf.keep(name, contents, taken, used);
     }
 
-    /// The name of a file in the scene's folder.
+    /// Name of a URI's file within the scene's folder.
     pub(super) fn file_name(&self, uri: &str) -> Result<String, Fault> {
         let folder = self.folder.as_ref().ok_or_else(|| Fault::Outside { uri: uri.into() })?;
         Ok(folder.resolve(uri)?.0)
     }
 
-    /// A model that has been read and is not in the scene.
+    /// Takes a model that has been read and is not in the scene.
     pub(super) fn find_model(&mut self, name: &str) -> Result<FoundModel, Fault> {
         if self.models.len() > limits::FILES {
             let limit = limits::FILES as u64;
@@ -296,14 +300,14 @@ impl Scene {
         }
     }
 
-    /// Puts a model back that cannot be added where it was to be.
+    /// Puts back a model that cannot be added.
     pub(super) fn put_back(&mut self, name: &str, FoundModel { asset, taken }: FoundModel) {
         if !self.library.contains_key(name) {
             self.keep(name.to_owned(), Contents::Model(asset), taken);
         }
     }
 
-    /// Fills in the picture of an environment that has one; it has to have been read.
+    /// Fills in the picture of an environment, which must have been read.
     pub(super) fn with_picture(&mut self, environment: Environment) -> Result<Environment, Fault> {
         let Environment::Image { uri, intensity, rotation, .. } = environment else {
             return Ok(environment);
@@ -318,7 +322,7 @@ impl Scene {
         Ok(Environment::Image { uri, intensity, rotation, image })
     }
 
-    /// Gives back what pictures have taken that neither the scene nor its file shows any more.
+    /// Moves pictures that neither the scene nor its file shows to the shelf.
     pub(super) fn give_back_pictures(&mut self) {
         let own = self.models[0].asset.settings.environment.as_ref();
         let shown: Vec<_> = [own, Some(&self.environment)]

@@ -1,5 +1,5 @@
-//! Files that are broken, by accident or on purpose: each gives an error that says what is wrong, and
-//! none a panic, or memory that its size does not warrant.
+//! Broken files, by accident or on purpose. Each gives an error that says what is wrong. None
+//! causes a panic, or an allocation that its size does not warrant.
 
 use serde_json::{Value, json};
 
@@ -7,7 +7,7 @@ use super::{TRIANGLE, fault, fault_of, load, triangle};
 use crate::builtin::writer::{Writer, container};
 use crate::{Fault, Scene};
 
-/// A file with a bit of everything.
+/// A file with one of everything.
 fn rich() -> Vec<u8> {
     let mut w = triangle();
     let positions = w.floats("VEC3", &TRIANGLE);
@@ -46,9 +46,9 @@ fn rich() -> Vec<u8> {
     )
 }
 
-/// A PNG that says it has this size. It is whole when that is 2 × 2.
+/// A PNG that declares this size. It is complete for 2 × 2.
 pub(super) fn png(width: u32, height: u32) -> Vec<u8> {
-    // Two rows of a filter byte and two grey texels.
+    // The data are two rows of a filter byte and two grey texels.
     stored_png(width, height, 8, &[0, 10, 20, 0, 30, 40])
 }
 
@@ -91,7 +91,7 @@ fn crc(bytes: &[u8]) -> u32 {
     })
 }
 
-/// Loads, and if that goes well, uses what was loaded.
+/// Loads a file and, where that succeeds, uses the scene.
 fn exercise(glb: Vec<u8>) {
     if let Ok(mut scene) = Scene::from_glb("test", glb) {
         scene.snapshot();
@@ -137,7 +137,7 @@ fn damaged_anywhere_it_does_no_harm() {
         let mut damaged = whole.clone();
         for _ in 0..=round % 4 {
             let at = random(damaged.len());
-            // Digits for digits too, so that the JSON often stays whole.
+            // Digits are replaced by digits, so that the JSON often stays valid.
             damaged[at] = match damaged[at] {
                 b'0'..=b'9' => b'0' + random(10) as u8,
                 _ => random(256) as u8,
@@ -147,7 +147,7 @@ fn damaged_anywhere_it_does_no_harm() {
     }
 }
 
-/// Replaces every number of the JSON by others, one at a time.
+/// Replaces every number of the JSON by other values, one at a time.
 #[test]
 fn any_number_may_be_absurd() {
     let whole = rich();
@@ -196,7 +196,7 @@ fn huge_counts_are_refused_before_memory_is_asked_for() {
     }
 }
 
-/// One buffer may be named again and again.
+/// Many primitives may name the same buffer, and all their triangles count.
 #[test]
 fn triangles_named_again_and_again_are_counted() {
     let mut w = Writer::default();
@@ -211,7 +211,7 @@ fn triangles_named_again_and_again_are_counted() {
     assert!(fault.contains("exceed the limit"), "{fault}");
 }
 
-/// A bad number among the triangle's attributes, in a mesh of its own.
+/// A file with a bad number in an attribute of a triangle, in a mesh of its own.
 pub(super) fn bent(attribute: &str, bad: f32) -> Vec<u8> {
     let mut w = triangle();
     let (kind, mut numbers) = match attribute {
@@ -232,7 +232,7 @@ pub(super) fn bent(attribute: &str, bad: f32) -> Vec<u8> {
     }
     attributes[attribute] = w.floats(kind, &numbers).into();
     w.add("meshes", json!({ "name": "bent", "primitives": [{ "attributes": attributes }] }));
-    // JSON has no NaN: the bounds have to go.
+    // JSON has no NaN, so the accessor's bounds are removed.
     without_bounds(w)
 }
 
@@ -305,7 +305,7 @@ fn image_bombs_are_refused() {
         assert!(fault.contains("\"wall\""), "{fault}");
         assert!(reasons.iter().all(|reason| fault.contains(reason)), "{fault}");
     }
-    // Each within bounds, together too many.
+    // Each image is within bounds, but together they are too many.
     let mut w = triangle();
     for _ in 0..3 {
         show_image(&mut w, &png(16_000, 16_000));
@@ -325,7 +325,7 @@ fn show_image(w: &mut Writer, png: &[u8]) {
 #[test]
 fn the_smallest_and_the_largest_image_load() {
     for side in [1u32, 16_384] {
-        // One bit a texel, all white but the last.
+        // A texel is one bit; all are white except the last.
         let row = [&[0][..], &vec![0xff; side.div_ceil(8) as usize]].concat();
         let mut rows = row.repeat(side as usize);
         *rows.last_mut().expect("a row") = 0xfe << ((8 - side % 8) % 8);
@@ -341,7 +341,7 @@ fn the_smallest_and_the_largest_image_load() {
     }
 }
 
-/// A million nodes that show one mesh: as many as a scene may have, and one more.
+/// A million nodes that show one mesh are allowed; one more is not.
 #[test]
 fn a_million_nodes() {
     const MILLION: usize = 1_000_000;

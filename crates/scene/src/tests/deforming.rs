@@ -1,4 +1,4 @@
-//! Animation, morph targets and skins, against results found by hand.
+//! Animation, morph targets and skins, compared with results computed by hand.
 
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ fn animations_play_in_a_loop_and_tell_when_something_moves() {
     assert!(!scene.advance(0.0), "no time has passed");
     assert!(scene.advance(2.25), "by way of the end");
     assert_eq!(scene.version(), 2);
-    // After 2.75 s of a loop of 2 s it stands where it stood after 0.75 s.
+    // After 2.75 s of a loop of 2 s it is where it was after 0.75 s.
     assert!((translation(&scene, 0).x - 1.5).abs() < 1e-6);
     let world = scene.snapshot().instances[0].world_from_object;
     assert!((world.translation.x - 1.5).abs() < 1e-6);
@@ -97,7 +97,7 @@ fn morph_targets_displace_by_their_weights() {
     assert_eq!(vertices.positions, want);
     assert!(vertices.normals.iter().all(|n| *n == Vec3::Z));
 
-    // Unchanged weights keep the same vertices, changed ones give new ones.
+    // Unchanged weights keep the same vertices; changed ones give new ones.
     let kept =
         |scene: &mut Scene| scene.snapshot().instances[0].deformation.clone().expect("deformed");
     let before = kept(&mut scene);
@@ -108,8 +108,8 @@ fn morph_targets_displace_by_their_weights() {
     assert!(!Arc::ptr_eq(&before, &kept(&mut scene)));
 }
 
-/// Two joints: the first stands, the second, a metre up, turns about z. The upper vertex hangs on
-/// the second one, the right one half on each.
+/// The first of two joints stands still; the second, a metre up, turns about z. The upper vertex
+/// follows the second joint, the right one each of them by half.
 #[test]
 fn skinned_vertices_follow_their_joints() {
     let mut w = Writer::default();
@@ -141,8 +141,8 @@ fn skinned_vertices_follow_their_joints() {
     let instance = &snapshot.instances[0];
     assert_eq!(instance.world_from_object, glam::Affine3A::IDENTITY);
     let v = instance.vertices(0);
-    // By hand: the tip turns (0, 2) about (0, 1) to (−1, 1); (1, 1) goes to (0, 2), half of it to
-    // (0.5, 1.5); the root moves all by z = 5.
+    // The tip turns (0, 2) about (0, 1) to (−1, 1). Half of the way from (1, 1) to (0, 2) is (0.5,
+    // 1.5). The root moves all by z = 5.
     let want = [Vec3::new(0., 0., 5.), Vec3::new(0.5, 1.5, 5.), Vec3::new(-1., 1., 5.)];
     for (got, want) in v.positions.iter().zip(want) {
         assert!((*got - want).length() < 1e-6, "{got} {want}");

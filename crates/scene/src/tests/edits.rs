@@ -1,4 +1,4 @@
-//! Edits: what they do, and what is refused.
+//! Edits: their effects, and refusals.
 
 use glam::{Quat, Vec3, Vec4};
 use serde_json::json;
@@ -9,8 +9,8 @@ use crate::{
     MaterialChange, MaterialId, MeshId, NodeId, Playback, PunctualLight, Scene, Transform,
 };
 
-/// A triangle (node 0), a lamp (1), a spot light (2), a group (3) with a triangle (4) in it; a masked
-/// material (0) and the default one (1).
+/// A triangle (node 0), a lamp (1), a spot light (2) and a group (3) with a triangle (4) in it. The
+/// triangles have a masked material (0) and the default one (1).
 fn scene() -> Scene {
     let mut w = triangle();
     w.light(json!({ "type": "point", "intensity": 2.0 }), json!({ "name": "lamp" }));
@@ -85,7 +85,7 @@ fn removing_a_node_removes_all_below_it() {
     assert_eq!(scene.snapshot().instances.len(), 1);
     let gone = Edit::MoveNode { node: NodeId(4), transform: at(Vec3::X) };
     assert_eq!(scene.apply(&gone).expect_err("gone").to_string(), "node 4 does not exist");
-    // What moved it has nothing to move any more.
+    // The animation's node is gone, so nothing moves.
     assert!(!scene.advance(0.5));
 }
 
@@ -199,7 +199,7 @@ fn factors_at_the_ends_of_their_ranges_are_taken() {
     }
 }
 
-/// Every edit that makes no sense, and a part of the reason that is to be given.
+/// Every kind of senseless edit, with a part of the expected reason.
 fn senseless() -> Vec<(Edit, &'static str)> {
     let (nan, inf) = (f32::NAN, f32::INFINITY);
     let go = |node: u32, transform| Edit::MoveNode { node: NodeId(node), transform };

@@ -1,4 +1,5 @@
-//! What exporters write besides plain glTF: instances, hidden nodes, many joints a vertex.
+//! Features that exporters write besides plain glTF: instances, hidden nodes, many joints for each
+//! vertex.
 
 use glam::{Affine3A, Quat, Vec3};
 use serde_json::{Value, json};
@@ -19,7 +20,7 @@ fn instanced(attributes: impl FnOnce(&mut Writer) -> Value) -> Writer {
     w
 }
 
-/// An accessor of integers.
+/// Adds an accessor of integers.
 fn integers(w: &mut Writer, code: u32, kind: &str, count: usize, bytes: &[u8]) -> usize {
     let view = w.view(bytes);
     let accessor = json!({
@@ -64,7 +65,7 @@ fn a_nodes_instances_stand_where_their_attributes_say() {
     assert!(snapshot.instances.iter().all(|i| i.node == NodeId(0)));
     assert!(scene.bounds().max.abs_diff_eq(Vec3::new(3.0, 7.0, 0.0), 1e-4));
 
-    // What moves the node, or one above it, moves them all; what removes it removes them.
+    // Moving the node or its parent moves all instances; removing it removes them.
     let joiner = scene.pristine(0.0);
     for (node, by) in [(NodeId(0), Vec3::new(0.0, 5.0, 1.0)), (NodeId(1), Vec3::X)] {
         let transform = Transform { translation: Some(by), ..Transform::default() };
@@ -120,7 +121,7 @@ fn instances_share_a_deformation() {
 fn faulty_instances_are_refused_by_name() {
     let here = "node 0: EXT_mesh_gpu_instancing: ";
     let of = |attributes: fn(&mut Writer) -> Value| {
-        // JSON has no NaN: the bounds have to go.
+        // JSON has no NaN, so the accessor's bounds are removed.
         fault_of(super::bad_input::without_bounds(instanced(attributes)))
     };
     for (attributes, reason) in [
@@ -152,7 +153,7 @@ fn faulty_instances_are_refused_by_name() {
     }
 }
 
-/// An accessor without a buffer costs no bytes, however many elements it says that it has.
+/// An accessor without a buffer costs no bytes, however many elements it declares.
 #[test]
 fn instances_are_counted() {
     let of = |count: usize| {
@@ -184,7 +185,8 @@ fn instances_are_counted() {
     scene.apply(&add).expect("there is room again");
 }
 
-/// A lamp (0) and a triangle (1) below a hidden group (2), with a camera (3); a triangle (4) beside.
+/// A lamp (0) and a triangle (1) below a hidden group (2), with a camera (3) and a triangle (4)
+/// beside it.
 fn hidden(visible: &Value) -> Writer {
     let mut w = Writer::default();
     w.light(json!({ "type": "point" }), json!({ "name": "lamp" }));
@@ -208,7 +210,7 @@ fn hidden_nodes_hide_what_is_below_them() {
     assert_eq!(scene.cameras().len(), 1, "a view shows nothing of itself");
     let drawn: Vec<_> = scene.drawn_nodes().map(|n| n.id).collect();
     assert_eq!(drawn, [NodeId(4)]);
-    // What edits hang below it is hidden as well.
+    // Nodes that edits add below it are hidden as well.
     let add = Edit::AddInstance {
         node: None,
         name: None,
@@ -231,7 +233,7 @@ fn a_scene_of_hidden_nodes_alone_is_refused() {
     assert!(fault_of(glb).contains("hidden nodes are not drawn"));
 }
 
-/// Of two scenes the one that the file names is shown: what only the other has is not.
+/// Only the scene that the file names is drawn; nodes of its other scene are not.
 #[test]
 fn nodes_of_another_scene_are_not_drawn() {
     let mut w = triangle();
@@ -241,8 +243,8 @@ fn nodes_of_another_scene_are_not_drawn() {
     assert_eq!((scene.nodes().count(), scene.drawn_nodes().count()), (2, 1));
 }
 
-/// A vertex that hangs on eight joints, each a metre farther up than the one before: by its weights it
-/// goes up 0.5 · 0 + 0.5 · (mean of 4 to 7) m.
+/// A vertex with eight joints, each a metre above the one before. Its weights move it up by half
+/// the mean height of joints 4 to 7.
 #[test]
 fn vertices_hang_on_all_their_joints() {
     let mut w = Writer::default();
@@ -280,7 +282,7 @@ fn vertices_hang_on_all_their_joints() {
     }
 }
 
-/// Numbers of joints are checked in every set.
+/// Joint indices are checked in every set.
 #[test]
 fn joints_of_later_sets_are_the_skins() {
     let mut w = Writer::default();
@@ -303,7 +305,8 @@ fn joints_of_later_sets_are_the_skins() {
     assert!(fault(w).contains("names joints that its skin 0 of 1 lacks"));
 }
 
-/// A quad's material may read any two sets; of three the last that it asks for is left out by name.
+/// A quad's material may read any two sets. Of three sets, the last is ignored with a warning that
+/// names it.
 #[test]
 fn later_texture_coordinates_are_read() {
     let of = |textures: &[(&str, usize)]| {
@@ -344,8 +347,8 @@ fn later_texture_coordinates_are_read() {
     assert_eq!(read(&scene, &scene.materials()[0].normal_texture), 4.0);
 }
 
-/// Specular and glossiness by what there is of metalness and roughness: where the picture's alpha is
-/// 102/255, a glossiness of 0.5 · 0.4.
+/// Specular-glossiness is expressed as metallic-roughness. Where the picture's alpha is 102/255,
+/// glossiness is 0.5 · 0.4.
 #[test]
 fn specular_glossiness_is_read() {
     let of = |gloss: Value| {
@@ -387,7 +390,7 @@ fn specular_glossiness_is_read() {
     assert_eq!(texel(&textured.specular_color_texture), Some([200, 100, 50, 102]));
     assert_eq!(texel(&textured.metallic_roughness_texture), Some([0, 204, 0, 255]));
     assert_eq!(textured.roughness, 1.0);
-    // Where alpha is 1 everywhere there is nothing to vary.
+    // Where alpha is 1 everywhere, no texture is needed.
     let even = of(json!({ "specularGlossinessTexture": { "index": 1 } }));
     assert!(even.metallic_roughness_texture.is_none() && even.roughness == 0.0);
 }

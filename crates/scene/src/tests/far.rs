@@ -1,4 +1,4 @@
-//! Scenes far from the world's origin keep their digits.
+//! Scenes far from the world's origin keep their precision.
 
 use glam::{Affine3A, DVec3, Vec3};
 use serde_json::{Value, json};
@@ -7,14 +7,14 @@ use super::{TRIANGLE, assert_same, load};
 use crate::builtin::writer::Writer;
 use crate::{Edit, NodeId, Scene, Snapshot, Transform};
 
-/// Where a point of an instance is in the world, with all digits.
+/// World position of a point of an instance, in double precision.
 fn place(snapshot: &Snapshot, instance: usize, point: Vec3) -> DVec3 {
     let Affine3A { matrix3, translation } = snapshot.instances[instance].world_from_object;
     let at = matrix3.as_dmat3() * point.as_dvec3() + translation.as_dvec3();
     at + snapshot.origin.as_dvec3()
 }
 
-/// A triangle under each of these nodes.
+/// A file with a triangle for each of these nodes.
 fn triangles(nodes: &[Value]) -> Writer {
     let mut w = Writer::default();
     let positions = w.floats("VEC3", &TRIANGLE);
@@ -44,7 +44,7 @@ fn what_is_near_the_origin_stays_as_it_is() {
     assert_eq!(scene.snapshot().origin, Vec3::ZERO);
 }
 
-/// Neighbours in map coordinates are as far from each other as the file says, to a micrometre.
+/// Neighbours in map coordinates keep their distance to a micrometre.
 #[test]
 fn places_keep_their_digits() {
     let far = DVec3::new(1e6 + 0.37, 120.2, -4.1e6 - 0.61);
@@ -68,13 +68,13 @@ fn places_keep_their_digits() {
         }
         let apart = place(&snapshot, 1, Vec3::ZERO) - place(&snapshot, 0, Vec3::ZERO);
         assert!(apart.distance(step) < 1e-4, "{apart}");
-        // Whatever else has a place has it in the world.
+        // Bounds are in world coordinates.
         let bounds = scene.bounds();
         assert!((bounds.min - far.as_vec3()).abs().max_element() <= 0.5, "{bounds:?}");
     }
 }
 
-/// A triangle as the instances of one node, which are these from it.
+/// A triangle shown as the instances of one node at `far`, displaced by `steps`.
 fn instanced(far: DVec3, steps: &[Vec3]) -> Writer {
     let mut w = Writer::default();
     let positions = w.floats("VEC3", &TRIANGLE);
@@ -86,7 +86,7 @@ fn instanced(far: DVec3, steps: &[Vec3]) -> Writer {
     w
 }
 
-/// Instances of a node in map coordinates are as far from each other as the file says.
+/// Instances of a node in map coordinates keep their distances.
 #[test]
 fn instances_keep_their_digits() {
     let steps = [Vec3::ZERO, Vec3::new(0.011, 0.0, 0.003), Vec3::new(-0.25, 7.013, 40.002)];
@@ -104,7 +104,7 @@ fn instances_keep_their_digits() {
     }
 }
 
-/// The origin is where a node's instances are, wherever the node is, and not where a hidden node is.
+/// The origin is near a node's instances, not its own position, and not near a hidden node.
 #[test]
 fn the_origin_is_about_what_is_shown() {
     let far = Vec3::X * 1e6;
@@ -119,7 +119,7 @@ fn the_origin_is_about_what_is_shown() {
     assert!(!scene.warnings().join("\n").contains("km"), "{:?}", scene.warnings());
 }
 
-/// Vertices that lie far from their mesh's origin are where the file has them.
+/// Vertices far from their mesh's origin keep their positions.
 #[test]
 fn vertices_keep_their_digits() {
     let far = Vec3::new(1_000_000.5, -3.0, 250_000.25);
@@ -144,7 +144,7 @@ fn vertices_keep_their_digits() {
     }
 }
 
-/// What little lies far from all else draws nothing away from where it is.
+/// A few distant strays do not move the origin away from the rest.
 #[test]
 fn strays_do_not_move_the_origin() {
     let near = [0.0, 1.0, 2.0].map(|x| at(DVec3::new(x, 0.0, 0.0)));
@@ -171,7 +171,7 @@ fn lost_digits_are_told_with_the_distance() {
     }
 }
 
-/// Copies of a scene that follow its edits have its places, and lights and cameras theirs.
+/// Copies of a scene that follow its edits have the same transforms, and so do lights and cameras.
 #[test]
 fn edits_and_copies_are_placed_alike() {
     let far = DVec3::new(-2e6, 0.0, 3e5);

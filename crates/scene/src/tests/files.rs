@@ -1,4 +1,4 @@
-//! Files around a scene: buffers, pictures, settings; and that none outside its folder is read.
+//! Files around a scene: buffers, pictures and settings. None outside its folder is read.
 
 use glam::{UVec3, Vec3};
 use lumencast_light::Order;
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::{Folder, TRIANGLE, triangle};
 use crate::{Edit, Environment, FileContents, InstanceSource, Scene, Transform};
 
-/// A .gltf whose buffer stands at a URI.
+/// A .gltf whose buffer is at a URI.
 fn gltf(uri: &str) -> String {
     json!({
         "asset": { "version": "2.0" },
@@ -25,7 +25,7 @@ fn triangle_bytes() -> Vec<u8> {
     TRIANGLE.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
-/// A Radiance picture of texels with a common exponent: 4 × 2, the first one L = (1, 2, 0.5).
+/// A Radiance picture of 4 × 2 texels with a common exponent, the first of which is (1, 2, 0.5).
 fn hdr() -> Vec<u8> {
     let mut file = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec();
     file.extend([64, 128, 32, 130]);
@@ -46,7 +46,7 @@ fn a_gltf_with_its_files() {
     assert_eq!(std::fs::read(on_disk).expect("readable"), triangle_bytes());
 }
 
-/// Each of these leads to the one file, and clients are told its one name.
+/// All these URIs lead to the same file, and clients get its one name.
 #[test]
 fn uris_as_programs_write_them() {
     let folder = Folder::new("uris");
@@ -68,7 +68,7 @@ fn uris_as_programs_write_them() {
     Scene::load(&folder.write("marked.gltf", marked)).expect("a byte-order mark");
 }
 
-/// What is wrong is the name, not where it leads.
+/// The name is at fault here, not where it leads.
 #[test]
 fn names_that_no_file_has() {
     let folder = Folder::new("names");
@@ -81,7 +81,7 @@ fn names_that_no_file_has() {
     }
 }
 
-/// The scene's own file may be called anything.
+/// The scene's own file may have any name.
 #[cfg(unix)]
 #[test]
 fn a_scene_whose_name_is_not_utf8() {
@@ -89,7 +89,7 @@ fn a_scene_whose_name_is_not_utf8() {
     let folder = Folder::new("latin");
     let path = folder.0.join(std::ffi::OsStr::from_bytes(b"caf\xE9.glb"));
     if std::fs::write(&path, triangle().finish(Value::Null)).is_err() {
-        // Some file systems take UTF-8 alone.
+        // Some file systems accept UTF-8 only.
         return;
     }
     let scene = Scene::load(&path).expect("the scene");
@@ -194,7 +194,7 @@ fn settings_in_extras_and_beside_the_scene() {
 fn an_environment_from_openexr() {
     let folder = Folder::new("exr");
     let path = folder.write("scene.glb", triangle().finish(Value::Null));
-    // Brighter than halves can say, and a texel that no light has.
+    // One texel is brighter than half floats can hold, and one is invalid.
     let texels = image::Rgb32FImage::from_fn(4, 2, |x, y| match (x, y) {
         (0, 0) => image::Rgb([100_000.0, 2.0, 1e-3]),
         (1, 0) => image::Rgb([f32::NAN, -1.0, 0.5]),
@@ -224,7 +224,7 @@ fn an_environment_from_openexr() {
 fn textures_in_every_format() {
     let texel = |x: u32, y: u32| image::Rgba([200 - 8 * x as u8, 40 + 8 * y as u8, 90, 255]);
     let picture = image::RgbaImage::from_fn(16, 16, texel);
-    // JPEG is lossy: a smooth picture comes back within a few steps.
+    // JPEG is lossy, so a smooth picture may differ by a few steps.
     for (format, kind, within) in [
         (image::ImageFormat::Png, "image/png", 0),
         (image::ImageFormat::WebP, "image/webp", 0),

@@ -7,12 +7,12 @@ use super::{TRIANGLE, fault, load, triangle};
 use crate::builtin::writer::Writer;
 use crate::{AlphaMode, Filter, Primitive, Wrap};
 
-/// The primitive of a file with one.
+/// The primitive of a file that has one.
 fn primitive(w: Writer) -> Primitive {
     load(w).meshes()[0].primitives[0].clone()
 }
 
-/// A mesh of one primitive, and a node that shows it.
+/// Adds a mesh of one primitive, and a node that shows it.
 fn show(w: &mut Writer, primitive: Value) {
     w.add("meshes", json!({ "name": "shape", "primitives": [primitive] }));
     w.node(json!({ "mesh": 0 }));
@@ -94,7 +94,7 @@ fn sparse_accessors_replace_elements() {
         }
         w.add("accessors", accessor)
     };
-    // Over a buffer, and over zeros: the latter as displacements.
+    // One accessor is sparse over a buffer. The other is sparse over zeros, for displacements.
     let (over_buffer, over_zeros) = (sparse(Some(0)), sparse(None));
     assert_eq!(positions, 0);
     let primitive_json = json!({
@@ -110,7 +110,8 @@ fn sparse_accessors_replace_elements() {
 #[test]
 fn quantised_and_interleaved_attributes() {
     let mut w = Writer::default();
-    // Position as i16 (padded to 8 bytes), then u16 texture coordinates normalised: 12 bytes each.
+    // Each vertex has 12 bytes: an i16 position padded to 8 bytes, then normalised u16 texture
+    // coordinates.
     let mut bytes = Vec::new();
     for ([x, y], [u, v]) in
         [([0i16, 0], [0u16, 0]), ([-3, 0], [65_535, 0]), ([0, -200], [0, 32_767])]
@@ -119,7 +120,7 @@ fn quantised_and_interleaved_attributes() {
         [u, v].iter().for_each(|c| bytes.extend(c.to_le_bytes()));
     }
     let view = w.view(&bytes);
-    // The writer's views have no stride; this one has.
+    // The writer's views have no stride; this view has one.
     let strided = json!({ "buffer": 0, "byteOffset": 0, "byteLength": 36, "byteStride": 12 });
     assert_eq!((view, w.add("bufferViews", strided)), (0, 1));
     let position = w.add(
@@ -151,17 +152,17 @@ fn normals_are_made_sound() {
     assert_eq!(primitive(w).vertices.normals, [Vec3::new(0.0, 0.6, 0.8), Vec3::Z, Vec3::Z]);
 }
 
-/// One texel of PNG, as a data URI.
+/// A PNG of one texel as a data URI.
 const TEXEL: &str = "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg==";
 
-/// Two quads side by side with a normal map, the second one's texture mirrored in u; they share an
-/// edge.
+/// Two adjacent quads with a normal map share an edge. The texture of the second one is mirrored in
+/// u.
 #[test]
 fn tangents_follow_the_texture_and_its_mirroring() {
     let mut w = Writer::default();
     let points = [[0., 0.], [1., 0.], [2., 0.], [0., 1.], [1., 1.], [2., 1.]];
     let positions: Vec<Vec3> = points.iter().map(|[x, y]| Vec3::new(*x, *y, 0.0)).collect();
-    // u grows to the middle and shrinks behind it; v grows downwards.
+    // u grows towards the middle and shrinks beyond it; v grows downwards.
     let uv: Vec<f32> =
         points.iter().flat_map(|[x, y]: &[f32; 2]| [1.0 - (x - 1.0).abs(), 1.0 - y]).collect();
     let attributes = json!({
@@ -179,14 +180,15 @@ fn tangents_follow_the_texture_and_its_mirroring() {
     for (triangle, tangent) in [(0, Vec4::new(1., 0., 0., 1.)), (3, Vec4::new(-1., 0., 0., -1.))] {
         for t in corner_tangents(triangle) {
             assert!((t - tangent).length() < 1e-5, "triangle {triangle}: {t}");
-            // The bitangent points up the image, which is up the shape.
+            // The bitangent points up the image, which is also up the shape.
             let bitangent = Vec3::Z.cross(t.truncate()) * t.w;
             assert!((bitangent - Vec3::Y).length() < 1e-5, "{bitangent}");
         }
     }
 }
 
-/// Primitives that share vertices have tangents of their own where their normal maps lie otherwise.
+/// Primitives that share vertices have their own tangents where their normal maps are placed
+/// differently.
 #[test]
 fn tangents_are_of_a_primitive_and_its_normal_map() {
     let mut w = Writer::default();
@@ -200,7 +202,7 @@ fn tangents_are_of_a_primitive_and_its_normal_map() {
     let half_pi = std::f32::consts::FRAC_PI_2;
     let transforms = [
         json!({}),
-        // The image is turned clockwise, its u down the shape.
+        // This image is rotated clockwise, so its u runs down the shape.
         json!({ "rotation": half_pi }),
         json!({ "scale": [-2.0, 2.0] }),
         json!({ "scale": [2.0, -2.0], "rotation": half_pi, "offset": [1e6, 3.0] }),
@@ -265,7 +267,7 @@ fn materials_with_their_extensions() {
     assert_eq!((texture.tex_coord, texture.filter), (1, Filter::Nearest));
     assert_eq!(texture.wrap, [Wrap::Clamp, Wrap::Mirror]);
     assert_eq!(texture.image.texels.len(), 1);
-    // KHR_texture_transform: offset + rotation · (scale · uv), counter-clockwise with v down.
+    // KHR_texture_transform is offset + rotation · (scale · uv), counter-clockwise with v down.
     let (sin, cos) = 0.5f32.sin_cos();
     let (u, v) = (2.0 * 0.3, 3.0 * 0.7);
     let want = Vec2::new(0.25 + cos * u + sin * v, 0.5 - sin * u + cos * v);

@@ -1,4 +1,4 @@
-//! Faults that do no harm: mended with a warning, as viewers pass over them.
+//! Harmless faults are repaired with a warning, where viewers ignore them.
 
 use glam::Vec3;
 use serde_json::{Value, json};
@@ -32,7 +32,7 @@ fn attributes_that_are_not_finite_are_passed_over() {
     }
 }
 
-/// A vertex that no triangle has may be anywhere; it does not widen the scene.
+/// A vertex of no triangle may be anywhere; it does not widen the scene.
 #[test]
 fn vertices_of_no_triangle_may_have_no_place() {
     let mut w = Writer::default();
@@ -47,7 +47,7 @@ fn vertices_of_no_triangle_may_have_no_place() {
     assert_eq!(scene.bounds().min, Vec3::splat(10.0));
 }
 
-/// Keys of one time are a jump: before it counts the first of them, from it on the last.
+/// Keys of the same time are a jump: the first of them counts before it, the last from it on.
 #[test]
 fn keys_of_one_time() {
     let mut w = triangle();

@@ -1,4 +1,4 @@
-//! Tests of the whole crate on small glTF files that are made here.
+//! Tests of the whole crate, on small glTF files made in code.
 
 mod bad_input;
 mod deforming;
@@ -33,7 +33,7 @@ fn load(writer: Writer) -> Scene {
     Scene::from_glb("test", writer.finish(Value::Null)).expect("a sound file")
 }
 
-/// What loading says is wrong.
+/// The fault that loading reports.
 fn fault(writer: Writer) -> String {
     fault_of(writer.finish(Value::Null))
 }
@@ -42,7 +42,7 @@ fn fault_of(glb: Vec<u8>) -> String {
     Scene::from_glb("test", glb).expect_err("a faulty file").to_string()
 }
 
-/// Scenes are the same: what is drawn and how it goes on.
+/// Asserts that two scenes draw the same and go on alike.
 fn assert_same(a: &mut Scene, b: &mut Scene) {
     let (sa, sb) = (a.snapshot(), b.snapshot());
     assert_eq!(by_node(&sa), by_node(&sb));
@@ -69,7 +69,7 @@ fn by_node(snapshot: &Snapshot) -> Vec<String> {
         .collect()
 }
 
-/// A folder that goes away with the test.
+/// A temporary folder, deleted with the test.
 struct Folder(std::path::PathBuf);
 
 impl Folder {

@@ -1,4 +1,4 @@
-//! Those who join late get the same scene.
+//! Clients that join late get the same scene.
 
 use glam::{Quat, Vec3, Vec4};
 use serde_json::json;
@@ -10,7 +10,8 @@ use crate::{
     MaterialId, MeshId, NodeId, NodeName, Playback, PunctualLight, Scene, Transform,
 };
 
-/// What a late joiner makes of the file and the edits; they go through JSON, as on the wire.
+/// The scene that a late joiner makes of the file and the edits. The edits go through JSON, as on
+/// the wire.
 fn joined(mut fresh: Scene, edited: &Scene) -> Scene {
     fresh.advance(edited.time());
     for edit in edited.edits_since_load() {
@@ -21,7 +22,7 @@ fn joined(mut fresh: Scene, edited: &Scene) -> Scene {
     fresh
 }
 
-/// Random numbers, the same each time.
+/// Random numbers with a fixed seed.
 struct Random(u64);
 
 impl Random {
@@ -143,8 +144,8 @@ fn file() -> Writer {
     w
 }
 
-/// A thousand random edits in each of several scenes, most of which make sense, with time passing in
-/// between: again and again a joiner sees the same as those who were there all the time.
+/// Several scenes get a thousand random edits each, most of them valid, with time passing between.
+/// At many points a joiner sees the same scene as those who were there all the time.
 #[test]
 fn late_joiners_see_the_same_scene() {
     let folder = Folder::new("replay");
@@ -194,7 +195,8 @@ fn the_list_is_short_when_little_is_different() {
     assert_eq!(scene.edits_since_load().len(), 1);
 }
 
-/// Materials of a file that has come and gone keep their numbers, and so do those of the next.
+/// Materials of a file that was added and removed keep their numbers, and so do those of the next
+/// file.
 #[test]
 fn numbers_hold_when_an_added_file_has_gone() {
     let folder = Folder::new("gone");

@@ -69,7 +69,7 @@ fn what_fails_is_read_again_once_it_has_changed() {
     scene.apply(&add("broken.glb")).expect("mended");
 }
 
-/// It has to be written to by somebody else before it can be opened.
+/// Opening a pipe would wait for somebody to write to it.
 #[cfg(unix)]
 #[test]
 fn a_pipe_is_no_file() {
@@ -81,7 +81,7 @@ fn a_pipe_is_no_file() {
     assert!(error.contains("not a regular file"), "{error}");
 }
 
-/// Edits whose sense does not depend on the file do not ask for it.
+/// Edits that make no sense whatever the file holds do not ask for it.
 #[test]
 fn senseless_edits_read_nothing() {
     let folder = Folder::new("senseless");
@@ -98,7 +98,7 @@ fn senseless_edits_read_nothing() {
     assert!(scene.file_to_read(&add("more.glb")).is_some());
 }
 
-/// Each is read once under all its names, and kept for as long as four others are not shown since.
+/// A picture is read once under all its names. It is kept until four others have been unused since.
 #[test]
 fn pictures_are_known_by_their_files() {
     let folder = Folder::new("pictures");
@@ -119,7 +119,7 @@ fn pictures_are_known_by_their_files() {
     assert!(!reads("b.hdr") && reads("a.hdr"));
 }
 
-/// Replicas number materials in the order in which files were added, whatever they knew of them.
+/// Replicas number materials in the order in which files were added, whatever they had read before.
 #[test]
 fn files_are_numbered_as_they_are_added() {
     let folder = Folder::new("numbers");
@@ -132,7 +132,7 @@ fn files_are_numbered_as_they_are_added() {
     for (scene, names) in [(&mut first, ["a.glb", "b.glb"]), (&mut other, ["b.glb", "a.glb"])] {
         names.iter().for_each(|name| drop(scene.apply(&add(name)).expect("added")));
     }
-    // A server that begins anew may have got them in another order.
+    // A server that restarts may have read the files in another order.
     let mut replica = first.pristine(0.0);
     other.edits_since_load().iter().for_each(|edit| replica.replay(edit).expect("replayed"));
     assert_same(&mut other, &mut replica);
