@@ -1,7 +1,7 @@
-//! Who may read and who may edit.
+//! Access: who may read and who may edit.
 //!
-//! Names are slash-separated paths. The server's broadcasts have one part (`sponza`); a client's
-//! own are called `<one part>/edits/<one part>`, and nothing else, whatever its token says.
+//! Names are slash-separated paths. The server's broadcasts have one part (`sponza`). A client may
+//! publish only `<one part>/edits/<one part>`, whatever its token says.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -15,26 +15,27 @@ use moq_relay::auth::{Admission, Admissions};
 use crate::refusals::{RefusalKind, Refusals};
 use crate::{Error, Result};
 
-/// What anyone may read: the server's own broadcasts.
+/// The names that anyone may read: the server's own broadcasts.
 const READABLE: &str = "*";
-/// What a client may publish at most.
+/// The names that clients may publish at most.
 const EDITABLE: &str = "*/edits/*";
 
-/// Who may read the server's broadcasts, and who may publish edits.
+/// Rules of who may read the server's broadcasts, and who may publish edits.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub enum Access {
-    /// Everyone on this machine may read and edit; the check of hosts and origins keeps foreign
-    /// web pages out. A server with this access listens on loopback only.
+    /// Everyone on this machine may read and edit. The check of hosts and origins keeps web pages
+    /// of others out. A server with this access listens on loopback only.
     #[default]
     Loopback,
-    /// Whoever reaches the server, from wherever, may read and edit.
+    /// Whoever reaches the server may read and edit.
     Open,
-    /// Publishing needs a token (a JWT in the URL's query, `?jwt=…`) signed by `key`.
+    /// Publishing needs a token signed by `key`: a JWT in the URL's query, `?jwt=…`.
     Token {
         /// The key that tokens must be signed with.
         key: Key,
-        /// Whether reading tracks needs one too; what the application answers over HTTP does not.
+        /// Whether reading tracks needs a token too. Answers of the application over HTTP need
+        /// none.
         to_read: bool,
     },
 }
@@ -50,13 +51,19 @@ impl std::fmt::Debug for Key {
 }
 
 impl Key {
-    /// A new random key.
+    /// Generates a random key.
+    ///
+    /// # Errors
+    /// [`Error::Key`] where no key can be made.
     pub fn generate() -> Result<Self> {
         let key = moq_auth::Key::generate(Algorithm::HS256, None).map_err(key_error)?;
         Ok(Self(Arc::new(key)))
     }
 
-    /// Reads a key from a file, as [`Key::write`] or `moq auth generate` wrote it.
+    /// Reads a key from a file that [`Key::write`] or `moq auth generate` wrote.
+    ///
+    /// # Errors
+    /// [`Error::Key`] where the file cannot be read or holds no key.
     pub fn read(path: &Path) -> Result<Self> {
         let key = moq_auth::Key::from_file(path)
             .map_err(|err| Error::Key(format!("{}: {err}", path.display())))?;
@@ -64,12 +71,18 @@ impl Key {
     }
 
     /// Writes the key to a file, which only its owner should be able to read.
+    ///
+    /// # Errors
+    /// [`Error::Key`] where the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         self.0.to_file(path).map_err(|err| Error::Key(format!("{}: {err}", path.display())))
     }
 
-    /// A token that lets its bearer read `scene` and publish edits to it, until `lifetime` has
-    /// passed (a session still open then is closed), or for good.
+    /// Issues a token whose bearer may read `scene` and publish edits to it. It expires after
+    /// `lifetime`, which also closes an open session; `None` means never.
+    ///
+    /// # Errors
+    /// [`Error::Key`] where `scene` is not a valid path, or signing fails.
     pub fn issue_token(&self, scene: &str, lifetime: Option<Duration>) -> Result<String> {
         let pattern =
             |text: &str| text.parse::<Pattern>().map_err(|err| Error::Key(err.to_string()));
@@ -86,7 +99,7 @@ fn key_error(err: impl std::fmt::Display) -> Error {
     Error::Key(err.to_string())
 }
 
-/// How many sessions are open, out of how many allowed, and who was refused.
+/// The number of open sessions, their limit, and refusals.
 #[derive(Debug, Clone)]
 pub(crate) struct Sessions {
     open: Arc<AtomicUsize>,
@@ -109,14 +122,14 @@ impl Sessions {
         self.count() >= self.limit
     }
 
-    /// What the names of a session are relative to that dialled this path: a broadcast of this server's,
-    /// or nothing, where the path is that of a proxy.
+    /// Root of the names of a session that dialled this path. It is a broadcast of this server, or
+    /// empty where a proxy has the server under another path.
     fn root_of(&self, path: &str) -> String {
         let scenes = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
         scenes.get(path.trim_matches('/')).cloned().unwrap_or_default()
     }
 
-    /// Counts one more session until the ticket is dropped; `None` if that would be too many.
+    /// Counts a session until the ticket is dropped; `None` where there are too many.
     fn admit(&self) -> Option<Ticket> {
         let below = |open| (open < self.limit).then_some(open + 1);
         let counted = self.open.fetch_update(Ordering::Relaxed, Ordering::Relaxed, below);
@@ -124,7 +137,7 @@ impl Sessions {
     }
 }
 
-/// One of those that are counted, until it is dropped.
+/// A counted session, until it is dropped.
 struct Ticket(Arc<AtomicUsize>);
 
 impl Drop for Ticket {
@@ -133,7 +146,7 @@ impl Drop for Ticket {
     }
 }
 
-/// Answers every session that asks to be let in, until the server stops.
+/// Answers all sessions that ask for admission, until the server stops.
 pub(crate) async fn decide(mut admissions: Admissions, access: Access, sessions: Sessions) {
     while let Some(admission) = admissions.next().await {
         answer(admission, &access, &sessions);
@@ -163,7 +176,7 @@ fn answer(admission: Admission, access: &Access, sessions: &Sessions) {
     });
 }
 
-/// What a session with the token in the query of its request may do, its names relative to `root`.
+/// Permissions of a session, by the token in its request's query. Its names are relative to `root`.
 fn grant(access: &Access, root: &str, request: &Request) -> Result<Grant, String> {
     let reader = Claims::default().with_subscribe([pattern(READABLE)]);
     let claims = match (access, token(request.query.as_deref())) {
@@ -181,7 +194,7 @@ fn grant(access: &Access, root: &str, request: &Request) -> Result<Grant, String
     Ok(grant)
 }
 
-/// The claims with absolute names, and of what they may publish only what any client may.
+/// The claims with absolute names, limited to what clients may publish.
 fn limited(claims: Claims) -> Result<Claims, String> {
     let absolute = |names: &Patterns| names.rooted(&claims.root).map_err(|err| err.to_string());
     let editable = Patterns::from(pattern(EDITABLE));
@@ -193,7 +206,7 @@ fn limited(claims: Claims) -> Result<Claims, String> {
         .with_expires(claims.expires))
 }
 
-/// The token in a URL's query, where the transport's own tools put it.
+/// The token in a URL's query, where the MoQ tools put it.
 fn token(query: Option<&str>) -> Option<&str> {
     query?.split('&').find_map(|pair| pair.strip_prefix("jwt=")).filter(|token| !token.is_empty())
 }
@@ -242,7 +255,7 @@ mod tests {
         assert!(grant.publish.matches("edits/a"));
         assert!(!grant.publish.matches(""));
         assert!(grant.subscribe.matches(""));
-        // Where a proxy has the server.
+        // A proxy has the server under this path.
         let grant = ask(&Access::Loopback, "/light/of/ours/", None).expect("granted");
         assert!(grant.publish.matches("sponza/edits/a") && grant.subscribe.matches("sponza"));
         assert_eq!(grant.root.as_deref(), Some(""));

@@ -1,4 +1,4 @@
-//! Writing: a broadcast, its tracks, and the frames and groups in them.
+//! Writers: a broadcast, its tracks, and their groups and frames.
 
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -8,7 +8,7 @@ use moq_net::{Timestamp, broadcast, group, origin, track};
 
 use crate::{Error, Result};
 
-/// A named set of tracks that this end publishes. Dropping it ends it for its readers.
+/// A named set of tracks that this end publishes. Dropping it ends the broadcast for its readers.
 pub struct Broadcast {
     path: Arc<str>,
     inner: broadcast::Producer,
@@ -27,8 +27,11 @@ impl Broadcast {
         &self.path
     }
 
-    /// Makes the broadcast known to readers. Add the tracks that they ask for first (a catalog)
-    /// before; others may follow at any time.
+    /// Announces the broadcast to readers. Tracks that readers ask for first, such as a catalog,
+    /// must be added before; others may follow at any time.
+    ///
+    /// # Errors
+    /// [`Error::Publish`].
     pub fn announce(&self) -> Result<()> {
         self.inner
             .announce(Default::default())
@@ -36,28 +39,28 @@ impl Broadcast {
     }
 
     /// Adds a track. Where two subscriptions of equal priority compete for a link, the track with
-    /// the higher `priority` here goes first.
+    /// the higher `priority` goes first.
     pub fn track(&self, name: &str, priority: u8) -> Result<TrackWriter> {
         let info = track::Info::default().with_priority(priority);
         let inner = self.inner.create_track(name, info).map_err(|err| track_error(name, &err))?;
         Ok(TrackWriter { name: name.into(), inner, group: None, next_group: first_group() })
     }
 
-    /// Ends the broadcast: its readers see the end of each track that has been finished.
+    /// Ends the broadcast. Readers see the end of each track that has been finished.
     pub fn close(self) {
         self.inner.close();
     }
 }
 
-/// The number of a track's first group: milliseconds since 1970. Groups are numbered upwards, and
-/// a reader drops those below what it has seen, so that a restarted server must not begin at zero;
-/// a track that starts less than a thousand groups a second never overtakes this clock.
+/// Number of a track's first group: milliseconds since 1970. Group numbers increase, and a reader
+/// ignores lower ones than it has seen, so a restarted server must not begin at zero. A track that
+/// starts fewer than a thousand groups a second never overtakes this clock.
 fn first_group() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |age| age.as_millis() as u64)
 }
 
-/// The writing end of a track: a sequence of groups, each a sequence of frames. A new reader
-/// starts at the newest group's first frame, and a reader that falls behind loses whole groups.
+/// The writing end of a track: a sequence of groups, each a sequence of frames. A new reader starts
+/// at the first frame of the newest group. A reader that falls behind misses whole groups.
 pub struct TrackWriter {
     name: Arc<str>,
     inner: track::Producer,
@@ -71,11 +74,11 @@ impl TrackWriter {
         &self.name
     }
 
-    /// Appends a frame, to the open group, or to a new one where `new_group` is set or none is
-    /// open. Never waits: what nobody has fetched stays in memory for some seconds.
+    /// Appends a frame to the open group, or to a new one where `new_group` is set or none is open.
+    /// It never waits: frames that nobody has fetched stay in memory for some seconds.
     ///
     /// # Errors
-    /// A group takes at most 8192 frames and 32 MiB, and its broadcast must not be closed.
+    /// The group has 8192 frames or 32 MiB already, or the broadcast is closed.
     pub fn write(&mut self, frame: Bytes, new_group: bool) -> Result<()> {
         if new_group || self.group.is_none() {
             self.finish_group();
@@ -92,13 +95,13 @@ impl TrackWriter {
         }
     }
 
-    /// Whether anyone reads this track now, here or through relays. What nobody reads need not be
-    /// computed.
+    /// Whether anyone reads this track now, directly or through relays. Tracks without readers need
+    /// not be computed.
     pub fn is_used(&self) -> bool {
         self.inner.is_used()
     }
 
-    /// Ends the track: its readers get all of it, then its end.
+    /// Ends the track. Readers get all frames, then the end.
     pub fn finish(mut self) -> Result<()> {
         self.finish_group();
         self.inner.finish().map_err(|err| track_error(&self.name, &err))
@@ -106,7 +109,7 @@ impl TrackWriter {
 
     fn finish_group(&mut self) {
         if let Some(group) = self.group.take() {
-            // It fails only if the track is closed, which the next write reports.
+            // This fails only if the track is closed, which the next write reports.
             let _ = group.finish();
         }
     }

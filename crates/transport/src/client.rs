@@ -1,4 +1,4 @@
-//! The client: one connection, made anew for as long as the client lives.
+//! The client: a connection to a server, restored for as long as the client lives.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -10,10 +10,10 @@ use url::Url;
 
 use crate::{Announcements, Broadcast, Error, ReadOptions, Result, TrackReader, tls};
 
-/// The shortest and the longest wait between two attempts to connect again.
+/// Shortest and longest wait between two attempts to connect.
 const BACKOFF: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(2));
 
-/// Which transport a client uses.
+/// The transport that a client uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Transport {
@@ -26,23 +26,23 @@ pub enum Transport {
     WebSocket,
 }
 
-/// How a client connects.
+/// Options for connecting.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ConnectOptions {
-    /// The token to publish, or read, with.
+    /// The token that allows to publish, or also to read.
     pub token: Option<String>,
-    /// The transport.
+    /// The transport to use.
     pub transport: Transport,
-    /// The fingerprint (SHA-256, hexadecimal) of the server's certificate, where that is not to be
-    /// trusted by its chain. With an `http://` address it is fetched from the server.
+    /// Fingerprint (SHA-256, hexadecimal) of the server's certificate, to trust it without its
+    /// chain. With an `http://` address it is fetched from the server.
     pub fingerprint: Option<String>,
-    /// How long the first connection may take, over all attempts.
+    /// Longest time until the first connection, over all attempts.
     pub timeout: Duration,
 }
 
 impl Default for ConnectOptions {
-    /// Without token, by any transport, within 10 seconds.
+    /// No token, any transport, and 10 seconds.
     fn default() -> Self {
         Self {
             token: None,
@@ -57,36 +57,37 @@ impl Default for ConnectOptions {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ConnectionState {
-    /// It is.
+    /// The client is connected.
     Connected,
-    /// It is not, and tries to be.
+    /// The client is not connected and keeps trying.
     Lost {
-        /// Why not, for people to read.
+        /// Why it is not connected, for display.
         reason: String,
     },
 }
 
-/// A connection to a server, which is made anew whenever it is lost. Dropping it ends it.
+/// A connection to a server, which is restored whenever it is lost. Dropping the client ends it.
 pub struct Client {
     scene: String,
-    /// What the server publishes.
+    /// Broadcasts of the server.
     remote: origin::Producer,
-    /// What this client publishes.
+    /// Broadcasts of this client.
     local: origin::Producer,
     state: watch::Receiver<ConnectionState>,
     bandwidth: Bandwidth,
     task: JoinHandle<()>,
 }
 
-/// The estimate of the connection that is there now.
+/// The bandwidth estimate of the current connection.
 type Bandwidth = Arc<Mutex<Option<bandwidth::Consumer>>>;
 
 impl Client {
-    /// Connects to `https://host[:port]/scene`, or with `http` to a server with a development
+    /// Connects to `https://host[:port]/scene`; `http` means a server with a development
     /// certificate. A reverse proxy may have the server under a path: `https://host/base/scene`.
     ///
     /// # Errors
-    /// An unusable address, a refusal, or no connection within the options' time.
+    /// The address is unusable, the server refuses, or there is no connection within the options'
+    /// time.
     pub async fn connect(url: &str, options: ConnectOptions) -> Result<Self> {
         tls::install_provider();
         let address = Address::parse(url, &options)?;
@@ -121,24 +122,28 @@ impl Client {
         }
     }
 
-    /// The name after the host in the address that was connected to: that of the scene, and of its
-    /// broadcast. May be empty.
+    /// The last part of the address's path: the name of the scene and of its broadcast. It may be
+    /// empty.
     pub fn scene(&self) -> &str {
         &self.scene
     }
 
-    /// Reads a track of a broadcast, through interruptions: see [`TrackReader::next`].
+    /// A reader of a broadcast's track that survives interruptions: see [`TrackReader::next`].
     pub fn subscribe(&self, path: &str, track: &str, options: ReadOptions) -> TrackReader {
         TrackReader::follow(self.remote.consume(), path, track, options)
     }
 
-    /// Publishes a broadcast, now and after each interruption. A server takes only those below
-    /// `<scene>/edits/`, and others see none of the rest.
+    /// Publishes a broadcast, now and after each interruption. A server accepts only paths below
+    /// `<scene>/edits/`; others see no other broadcast of a client.
+    ///
+    /// # Errors
+    /// [`Error::Publish`].
     pub fn publish(&self, path: &str) -> Result<Broadcast> {
         Broadcast::new(&self.local, path)
     }
 
-    /// The broadcasts that the server shows this client, as they come and go.
+    /// The broadcasts under `prefix` that the server announces to this client, as they appear and
+    /// go.
     pub fn announced(&self, prefix: &str) -> Result<Announcements> {
         Announcements::of_server(&self.remote.consume(), prefix)
     }
@@ -148,12 +153,12 @@ impl Client {
         self.state.borrow().clone()
     }
 
-    /// A watch on the state, to wait for its changes.
+    /// A receiver of the state, to wait for changes.
     pub fn watch_state(&self) -> watch::Receiver<ConnectionState> {
         self.state.clone()
     }
 
-    /// The rate at which the link from the server delivers, in bits a second, where it is known.
+    /// Bandwidth of the link from the server, bits per second; `None` where it is unknown.
     pub fn recv_bandwidth(&self) -> Option<u64> {
         let bandwidth = self.bandwidth.lock().unwrap_or_else(PoisonError::into_inner);
         bandwidth.as_ref().and_then(|estimate| estimate.peek()).map(|rate| rate.as_bps())
@@ -166,9 +171,9 @@ impl Drop for Client {
     }
 }
 
-/// A server's address, taken apart.
+/// A server's address, split into its parts.
 struct Address {
-    /// What is dialled: the root, or where a proxy has it.
+    /// The URL to dial: the server's root, or its path behind a proxy.
     dialled: Url,
     scene: String,
 }
@@ -195,7 +200,7 @@ impl Address {
         Ok(Self { dialled: url, scene })
     }
 
-    /// The address for messages: without the token in its query.
+    /// The address for messages, without the token in its query.
     fn shown(&self) -> String {
         let mut url = self.dialled.clone();
         url.set_query(None);
@@ -206,8 +211,8 @@ impl Address {
     }
 }
 
-/// Takes the scene off an address `…/base/scene`, so that `…/base/` is left; names of scenes have one
-/// part. It may be empty.
+/// Removes the scene from an address `…/base/scene` and returns it; `…/base/` remains. A scene's
+/// name is a single part of the path and may be empty.
 pub fn take_scene(url: &mut Url) -> String {
     let path = url.path().trim_end_matches('/').to_owned();
     let (base, scene) = path.rsplit_once('/').unwrap_or_default();
@@ -215,7 +220,7 @@ pub fn take_scene(url: &mut Url) -> String {
     scene.to_owned()
 }
 
-/// How long one attempt may take.
+/// Longest time for one attempt.
 const ATTEMPT: Duration = Duration::from_secs(5);
 
 fn dialler(options: &ConnectOptions) -> moq_tokio::Result<moq_tokio::Client> {
@@ -226,11 +231,11 @@ fn dialler(options: &ConnectOptions) -> moq_tokio::Result<moq_tokio::Client> {
     let mut quic = moq_tokio::quic::Config::default();
     quic.idle_timeout = crate::IDLE_TIMEOUT;
     quic.keep_alive = crate::KEEP_ALIVE;
-    // It connects once; the loop below does the rest, so that it can tell what goes on.
+    // The dialler connects once. The loop below reconnects, so that it can report the state.
     Ok(connect.init(quic)?.with_reconnect(false))
 }
 
-/// Connects again and again; tells `first` of the first success, or of a refusal before it.
+/// Keeps connecting; reports the first success, or a refusal before it, to `first`.
 async fn keep_connected(
     dialler: moq_tokio::Client,
     url: Url,
@@ -250,7 +255,7 @@ async fn keep_connected(
                 estimate(Some(connection.recv_bandwidth()));
                 state.send_replace(ConnectionState::Connected);
                 if let Some(first) = first.take() {
-                    // Nobody waits for it any more if the client was dropped.
+                    // Nobody waits for it if the client was dropped.
                     let _ = first.send(Ok(()));
                 }
                 let ended = connection.closed().await;
@@ -272,7 +277,7 @@ async fn keep_connected(
     }
 }
 
-/// An error's text without causes that its parts repeat one after the other.
+/// Text of an error in which consecutive parts that repeat each other occur once.
 fn said_once(error: &impl std::fmt::Display) -> String {
     let error = error.to_string();
     let mut parts: Vec<&str> = error.split(": ").collect();

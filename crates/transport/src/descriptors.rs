@@ -1,18 +1,18 @@
-//! How many file descriptors there are, and for what.
+//! File descriptors: how many there are, and what they are for.
 
 use std::io;
 
 use crate::ServerConfig;
 
-/// What else a process needs: its sockets, its log, files that it reads.
+/// Number of descriptors for everything else in the process: sockets, log, files that it reads.
 const OTHERS: usize = 64;
 
-/// What to do when they are used up.
+/// Advice for when descriptors are used up.
 pub(crate) const ADVICE: &str =
     "the process has as many files open as it may: raise the limit (ulimit -n)";
 
-/// How many connections a server may hold open for HTTP: as many as it is set to, and no more than
-/// leave descriptors for its sessions and the files that it sends.
+/// Number of connections that a server may hold open for HTTP. It is the configured number, reduced
+/// where its sessions and the files that it sends need the descriptors.
 pub(crate) fn connections(config: &ServerConfig) -> usize {
     let kept = OTHERS + config.max_sessions + config.max_requests;
     let most = limit().map_or(usize::MAX, |limit| limit.saturating_sub(kept));
@@ -22,13 +22,13 @@ pub(crate) fn connections(config: &ServerConfig) -> usize {
     config.max_connections.min(most)
 }
 
-/// Whether an error says that there are none left, in this process or on this machine.
+/// Whether an error means that the process or the machine has no descriptor left.
 pub(crate) fn are_used_up(error: &io::Error) -> bool {
-    // EMFILE and ENFILE, alike on all systems of the kind.
+    // ENFILE and EMFILE have the same numbers on all Unix systems.
     cfg!(unix) && matches!(error.raw_os_error(), Some(23 | 24))
 }
 
-/// Descriptors that this process may have.
+/// Number of descriptors that this process may have.
 #[cfg(unix)]
 fn limit() -> Option<usize> {
     let limit = rustix::process::getrlimit(rustix::process::Resource::Nofile).current?;

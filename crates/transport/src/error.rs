@@ -1,4 +1,4 @@
-//! What can go wrong between two ends of a connection.
+//! Errors between the two ends of a connection.
 
 use std::net::SocketAddr;
 
@@ -9,16 +9,16 @@ pub(crate) type Failure = Box<dyn std::error::Error + Send + Sync>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The server's address is taken or may not be used.
+    /// The server cannot listen on its address.
     #[error("cannot listen on {address} ({protocol}): {error}; {advice}")]
     Listen {
-        /// The address asked for.
+        /// The requested address.
         address: SocketAddr,
         /// `UDP` or `TCP`.
         protocol: &'static str,
-        /// What the system said.
+        /// The system's error.
         error: std::io::Error,
-        /// What to do about it.
+        /// What the user can do about it.
         advice: String,
     },
     /// The certificate or its key cannot be used.
@@ -27,15 +27,15 @@ pub enum Error {
     /// The QUIC endpoint or the relay in it cannot be set up.
     #[error("cannot set up the server: {0}")]
     Setup(String),
-    /// The address of a server is no `http(s)://host[:port]/name` URL.
+    /// The address of a server is not an `http(s)://host[:port]/name` URL.
     #[error("{url:?} is not the address of a server: {reason}")]
     Address {
-        /// What was given.
+        /// The address given.
         url: String,
         /// What is wrong with it.
         reason: String,
     },
-    /// No connection within the time given.
+    /// There was no connection within the time given.
     #[error("cannot connect to {url}: {reason}")]
     Connect {
         /// The server's address, without its token.
@@ -46,23 +46,23 @@ pub enum Error {
     /// The connection, server or broadcast has been closed for good.
     #[error("closed")]
     Closed,
-    /// A path that this end may not publish, or that is taken.
+    /// This end may not publish a path, or the path is taken.
     #[error("cannot publish {path:?}: {reason}")]
     Publish {
         /// The broadcast's path.
         path: String,
-        /// Why not.
+        /// Why it cannot be published.
         reason: String,
     },
-    /// A track that cannot be written to.
+    /// A track cannot be written to.
     #[error("track {track:?}: {reason}")]
     Track {
         /// The track's name.
         track: String,
-        /// Why not.
+        /// Why it cannot be written to.
         reason: String,
     },
-    /// A frame above the size that the reader accepts; the rest of its group is skipped.
+    /// A frame is larger than the reader accepts; the rest of its group is skipped.
     #[error("track {track:?}: a frame of {size} bytes, over the limit of {limit}")]
     FrameTooLarge {
         /// The track's name.
@@ -72,15 +72,15 @@ pub enum Error {
         /// The limit in bytes.
         limit: usize,
     },
-    /// A file that cannot be fetched.
+    /// A file cannot be fetched.
     #[error("cannot load {url}: {reason}")]
     Fetch {
-        /// Its address.
+        /// Address of the file.
         url: String,
-        /// Why not.
+        /// Why it cannot be fetched.
         reason: String,
     },
-    /// A signing key or token that cannot be made or read.
+    /// A signing key or token cannot be made or read.
     #[error("access key: {0}")]
     Key(String),
 }

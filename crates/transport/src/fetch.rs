@@ -1,4 +1,4 @@
-//! Files over HTTP, as clients ask servers for them.
+//! Fetches files over HTTP, for clients.
 
 use std::time::Duration;
 
@@ -6,18 +6,18 @@ use url::Url;
 
 use crate::{Error, Result, tls};
 
-/// How long a connection, and each part of an answer, may take.
+/// Longest time for connecting and for each part of an answer.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Asks for files, over connections that are kept.
+/// A client that fetches files and reuses its connections.
 #[derive(Clone, Debug)]
 pub struct Fetch(reqwest::Client);
 
 impl Fetch {
-    /// Ready to ask.
+    /// A new client.
     ///
     /// # Errors
-    /// Where the system's certificates cannot be read.
+    /// The system's certificates cannot be read.
     pub fn new() -> Result<Self> {
         tls::install_provider();
         let client = reqwest::Client::builder()
@@ -28,10 +28,10 @@ impl Fetch {
         Ok(Self(client))
     }
 
-    /// The file at an address.
+    /// Requests the file at an address.
     ///
     /// # Errors
-    /// A server that cannot be reached, or answers with anything but the file.
+    /// The server cannot be reached, or answers with an error status.
     pub async fn get(&self, url: &Url) -> Result<Fetched> {
         let sent = self.0.get(url.clone()).send().await;
         let answer = sent.and_then(reqwest::Response::error_for_status);
@@ -39,24 +39,24 @@ impl Fetch {
     }
 }
 
-/// A file that is coming in.
+/// A file that is being received.
 #[derive(Debug)]
 pub struct Fetched(reqwest::Response);
 
 impl Fetched {
-    /// Its next part; nothing at its end.
+    /// Waits for the next part; `None` at the end of the file.
     ///
     /// # Errors
-    /// A connection that is lost, or silent for ten seconds.
+    /// The connection is lost, or silent for ten seconds.
     pub async fn next(&mut self) -> Result<Option<bytes::Bytes>> {
         let url = self.0.url().clone();
         self.0.chunk().await.map_err(|error| failed(&url, &error))
     }
 
-    /// All that is left of it.
+    /// Receives the rest of the file.
     ///
     /// # Errors
-    /// As [`Fetched::next`]; more than `limit` bytes.
+    /// Those of [`Fetched::next`], and a file of more than `limit` bytes.
     pub async fn all(mut self, limit: usize) -> Result<Vec<u8>> {
         let mut all = Vec::new();
         while let Some(part) = self.next().await? {
@@ -74,7 +74,7 @@ fn failed(url: &Url, error: &reqwest::Error) -> Error {
     Error::Fetch { url: url.to_string(), reason: describe(error) }
 }
 
-/// What caused an error: the library's own text says only that something failed.
+/// The cause of an error; the library's own text says only that something failed.
 fn describe(error: &reqwest::Error) -> String {
     if let Some(status) = error.status() {
         return status.to_string();

@@ -1,15 +1,14 @@
-//! How many of something are there at once, in all and from one address.
+//! Counts of simultaneous users of a resource, in total and by address.
 
 use std::collections::HashMap;
 use std::net::{IpAddr, Ipv6Addr};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Counts those who are there, and lets in no more than there is room for: no address has more than a
-/// half of it.
+/// Admits users of a resource up to a limit. One address may have at most half of it.
 #[derive(Debug)]
 pub(crate) struct Guests {
     most: usize,
-    /// Whether this machine's own addresses may have all the room there is.
+    /// Whether loopback addresses may use the whole limit.
     at_home: bool,
     there: Mutex<There>,
 }
@@ -21,13 +20,13 @@ struct There {
 }
 
 impl Guests {
-    /// Room for so many, at least two.
+    /// A limit of `most` users, at least two.
     pub(crate) fn new(most: usize) -> Arc<Self> {
         Arc::new(Self { most: most.max(2), at_home: false, there: Mutex::default() })
     }
 
-    /// Room for so many, of which a loopback address may take all: behind it may be a proxy, and with
-    /// it the world. Others may take at least eight.
+    /// A limit of `most` users. A loopback address may use all of it, since it may be a proxy for
+    /// many. Other addresses may use half, and at least eight.
     pub(crate) fn with_proxies(most: usize) -> Arc<Self> {
         Arc::new(Self { most, at_home: true, there: Mutex::default() })
     }
@@ -40,7 +39,7 @@ impl Guests {
         }
     }
 
-    /// One more from an address, until it is dropped; `None` where there is no room.
+    /// Admits one user from an address until the guest is dropped; `None` where there is no room.
     pub(crate) fn enter(self: &Arc<Self>, address: IpAddr) -> Option<Guest> {
         let network = network(address);
         let mut there = self.there();
@@ -62,7 +61,7 @@ impl Guests {
     }
 }
 
-/// One of those who are there.
+/// An admitted user.
 #[derive(Debug)]
 pub(crate) struct Guest {
     guests: Arc<Guests>,
@@ -80,7 +79,8 @@ impl Drop for Guest {
     }
 }
 
-/// What counts as one address: of IPv6 the network, of which one machine holds all addresses.
+/// The key by which addresses are counted: an IPv4 address, or an IPv6 network of 64 bits, since
+/// one machine may hold all addresses of it.
 fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(ip) => {

@@ -1,5 +1,5 @@
-//! What is answered on HTTP: WebSocket sessions, the certificate's fingerprint, and whatever the
-//! application serves; all behind the check of hosts and origins.
+//! HTTP answers: WebSocket sessions, the certificate's fingerprint, and the application. The check
+//! of hosts and origins comes before all of them.
 
 use std::sync::Arc;
 
@@ -18,24 +18,24 @@ use crate::session::Backend;
 use crate::tls::Fingerprint;
 use crate::websocket;
 
-/// Where the fingerprint of the development certificate is served, as the MoQ clients expect it.
+/// Path at which the fingerprint of the development certificate is served, as MoQ clients expect.
 const FINGERPRINT: &str = "/certificate.sha256";
 
-/// The first to see a request.
+/// The first handler of every request.
 #[derive(Clone)]
 pub(crate) struct Front {
     pub(crate) backend: Backend,
     pub(crate) fingerprint: Fingerprint,
     pub(crate) application: Router,
-    /// TCP connections that are open for HTTP.
+    /// TCP connections open for HTTP.
     pub(crate) connections: Arc<Guests>,
-    /// Requests that are being answered.
+    /// Requests being answered.
     pub(crate) requests: Arc<Guests>,
     pub(crate) patience: Patience,
 }
 
 impl Front {
-    /// Answers a request of a connection.
+    /// Answers one request of a connection.
     pub(crate) async fn answer(
         self,
         request: Request,
@@ -61,7 +61,7 @@ impl Front {
         if websocket::is_upgrade(request.headers()) {
             return websocket::upgrade(request, peer, self.backend).await;
         }
-        // The origin has been checked, so its pages may read the answer.
+        // The origin has passed the check, so its pages may read the answer.
         let origin = request.headers().get(header::ORIGIN).cloned();
         let mut response = match request.uri().path() {
             FINGERPRINT => self.fingerprint(),
@@ -91,8 +91,8 @@ fn checked(check: &OriginCheck, request: &Request) -> Result<(), Refusal> {
     };
     let origin = single(headers, header::ORIGIN)?;
     check.check(host, origin)?;
-    // Browsers send no `Origin` with images, scripts and the like, but say that a page of another
-    // site wants them. Following a link is no harm.
+    // Browsers send no `Origin` with requests for images or scripts. They mark those from pages of
+    // other sites as cross-site. Following a link from another site is harmless.
     let fetch = |name: &str| headers.get(name).map(|value| value.as_bytes());
     let cross_site = fetch("sec-fetch-site") == Some(b"cross-site");
     if origin.is_none() && cross_site && fetch("sec-fetch-mode") != Some(b"navigate") {
@@ -101,7 +101,7 @@ fn checked(check: &OriginCheck, request: &Request) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// The value of a header that may occur once.
+/// Value of a header that may occur at most once.
 fn single(headers: &HeaderMap, name: header::HeaderName) -> Result<Option<&str>, Refusal> {
     let mut values = headers.get_all(&name).iter();
     let value = values.next().map(|value| value.to_str());

@@ -1,9 +1,9 @@
 //! Streams that write in the order of their priorities.
 //!
-//! A WebSocket session of `qmux` sends what is queued by priority, but its queue is short: the least
-//! important frames fill it, and who waits for a place waits in the order of arrival. On a link that
-//! is too slow light of far regions would so hold up near light and the scene's state. Here writers
-//! wait, the most important one first, and the next one writes when the socket has taken something.
+//! A WebSocket session of `qmux` sends queued frames by priority, but its queue is short.
+//! Unimportant frames fill it, and writers wait for room in the order of arrival. On a slow link,
+//! light of far regions would thus delay near light and the scene's state. So here writers wait in
+//! a line, the most important one first. The next one writes when the socket has taken something.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -19,14 +19,14 @@ use moq_net::web_transport_trait;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::sync::{oneshot, watch};
 
-/// How long a writer may keep the others waiting. It takes that long only where its reader gives its
-/// stream no credit, which is no reason to hold up the rest.
+/// Longest time that a writer may keep others waiting. It takes that long only where its reader
+/// gives its stream no credit, which should not delay the rest.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Priority of requests and answers, the highest: without them there are no streams of light.
+/// Priority of requests and answers, the highest: there are no streams of light without them.
 const CONTROL: u8 = u8::MAX;
 
-/// A session of which one stream writes at a time.
+/// A session in which one stream writes at a time.
 #[derive(Clone)]
 pub(crate) struct Session<S> {
     inner: S,
@@ -34,7 +34,7 @@ pub(crate) struct Session<S> {
 }
 
 impl<S> Session<S> {
-    /// `taken` counts what the socket below the session takes.
+    /// A session over a socket whose messages `taken` counts.
     pub(crate) fn new(inner: S, taken: Taken) -> Self {
         Self { inner, line: Line { waiting: Arc::default(), taken } }
     }
@@ -97,7 +97,7 @@ impl<S: web_transport_trait::Session> web_transport_trait::Session for Session<S
     }
 }
 
-/// The writing end of a stream.
+/// The sending half of a stream.
 pub(crate) struct Stream<S> {
     inner: S,
     priority: u8,
@@ -133,10 +133,10 @@ impl<S: web_transport_trait::SendStream> web_transport_trait::SendStream for Str
     }
 }
 
-/// Grows with each message that a socket has taken.
+/// Number of messages that a socket has taken.
 pub(crate) type Taken = watch::Receiver<u64>;
 
-/// A socket that counts what it takes.
+/// A socket that counts the messages it takes.
 pub(crate) struct Socket<I> {
     inner: I,
     /// Whether something was written since the last flush.
@@ -185,7 +185,7 @@ impl<I: AsyncWrite + Unpin> AsyncWrite for Socket<I> {
     }
 }
 
-/// A waiting line: the highest priority first, among equals who came first.
+/// A line of waiting writers: the highest priority first, equal ones in the order of arrival.
 #[derive(Clone)]
 struct Line {
     waiting: Arc<Mutex<Waiting>>,
@@ -199,22 +199,22 @@ struct Waiting {
     writers: BTreeMap<(Reverse<u8>, u64), oneshot::Sender<Permit>>,
 }
 
-/// The right to write; dropping it hands it on.
+/// The right to write; dropping it passes it to the next writer.
 struct Permit {
     line: Line,
-    /// Whether it is still this one's to hand on.
+    /// Whether dropping it passes it on.
     held: bool,
 }
 
 impl Line {
-    /// Carries out a write when its turn comes.
+    /// Executes a write when its turn comes.
     async fn pass<T>(&self, priority: u8, write: impl Future<Output = T>) -> T {
         let permit = self.enter(priority).await;
         let mut taken = self.taken.clone();
         taken.mark_unchanged();
         let mut write = pin!(write);
         if let Ok(done) = tokio::time::timeout(PATIENCE, &mut write).await {
-            // The next one writes when this has left.
+            // The next writer may start when the socket has taken this write.
             tokio::spawn(async move {
                 let _ = tokio::time::timeout(PATIENCE, taken.changed()).await;
                 drop(permit);
@@ -237,7 +237,7 @@ impl Line {
             waiting.writers.insert(place, sender);
             turn
         };
-        // The sender stays in line until it is used, so there is always an answer.
+        // The sender stays in the line until it is used, so there is always an answer.
         turn.await.ok()
     }
 
@@ -261,7 +261,7 @@ impl Drop for Permit {
             let Some((_, writer)) = next else { return };
             match writer.send(Permit { line: self.line.clone(), held: true }) {
                 Ok(()) => return,
-                // That writer has given up; this permit goes to the next.
+                // That writer has given up, so the loop passes the permit to the next one.
                 Err(mut refused) => refused.held = false,
             }
         }
@@ -272,7 +272,7 @@ impl Drop for Permit {
 mod tests {
     use super::*;
 
-    /// A line before a socket that takes everything at once.
+    /// A line for a socket that takes everything at once.
     fn line() -> Line {
         let (sender, taken) = watch::channel(0);
         tokio::spawn(async move {
@@ -297,7 +297,7 @@ mod tests {
         };
         let writers = [3, 9, 200, 9, 1].map(write);
         tokio::task::yield_now().await;
-        // One that gives up is passed over.
+        // A writer that gives up is skipped.
         writers[1].abort();
         tokio::task::yield_now().await;
         drop(first);

@@ -1,14 +1,18 @@
-//! Frames of bytes over Media over QUIC: a server, clients, and nothing about what they carry.
+//! Frames of bytes over Media over QUIC: a server and clients. The crate knows nothing of the
+//! content.
 //!
-//! This is the only crate with sockets, and the only one that knows the MoQ crates, whose
-//! interfaces still move. A server holds an embedded relay; stock relays may stand in front of it.
+//! It is the only crate with sockets. It is also the only one that uses the MoQ crates, whose
+//! interfaces still change. A server holds an embedded relay; stock relays may stand in front of
+//! it.
 //!
-//! What is sent has four levels. A *broadcast* has a path (`sponza`) and holds *tracks*, each named
-//! and read on its own. A track is a sequence of *groups*, a group a sequence of *frames*. Frames of
-//! a group arrive whole, in order and without gaps; groups may be skipped. So a group begins with
-//! what can be understood without the past. A group that is being sent gives way to a newer one:
-//! with one frame a group, a link slower than the stream would carry almost nothing whole. About ten
-//! frames a group, several tracks with graded priorities and fewer tracks on a slower link do.
+//! Data has four levels. A *broadcast* has a path (`sponza`) and holds *tracks*, each with a name
+//! and readers of its own. A track is a sequence of *groups*, a group a sequence of *frames*.
+//! Frames of a group arrive whole, in order and without gaps. Readers may skip groups, so a group
+//! must be understandable without earlier ones.
+//!
+//! A newer group interrupts one that is being sent. With one frame a group, a link slower than the
+//! stream would carry almost no group whole. The remedies are about ten frames a group, several
+//! tracks with graded priorities, and fewer tracks on a slower link.
 //!
 //! ```
 //! use lumencast_transport::{Client, ConnectOptions, ReadOptions, Server, ServerConfig};
@@ -72,9 +76,10 @@ pub use refusals::{RefusalKind, Refusals};
 pub use server::{Server, ServerConfig};
 pub use tls::Tls;
 
-/// A QUIC connection that is silent for so long is dead. With [`KEEP_ALIVE`], a client knows of its
-/// server's death within five seconds, also through a relay (13.6 s with the usual 30 and 10).
+/// A QUIC connection that is silent for this long is dead. With [`KEEP_ALIVE`] a client learns of
+/// its server's death within five seconds, also through a relay. With the usual 30 and 10 seconds
+/// it takes 13.6.
 const IDLE_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// How often a connection with nothing to say shows that it lives.
+/// Interval at which an idle connection shows that it is alive.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);

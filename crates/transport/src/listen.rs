@@ -1,4 +1,4 @@
-//! The sockets: UDP and TCP on one port.
+//! Sockets: UDP and TCP on the same port.
 
 use std::io;
 use std::net::{Ipv6Addr, SocketAddr, UdpSocket};
@@ -7,14 +7,15 @@ use tokio::net::TcpListener;
 
 use crate::{Error, Result, descriptors};
 
-/// Attempts to find a port that is free for both protocols, where the caller leaves the choice.
+/// Number of attempts to find a port that is free for both protocols, where the caller leaves the
+/// choice.
 const PORT_ATTEMPTS: usize = 16;
 
-/// What a server listens on.
+/// The sockets of a server.
 pub(crate) struct Sockets {
     pub(crate) udp: Vec<UdpSocket>,
     pub(crate) tcp: Vec<TcpListener>,
-    /// The address asked for, with the port that was chosen.
+    /// The requested address with the port that was chosen.
     pub(crate) address: SocketAddr,
 }
 
@@ -51,8 +52,9 @@ fn bind(address: SocketAddr) -> Result<(UdpSocket, TcpListener)> {
     Ok((udp, tcp.map_err(|err| listen_error(address, "TCP", err))?))
 }
 
-/// `localhost` is `::1` before it is `127.0.0.1`. Over TCP clients try both, but browsers dial QUIC
-/// to the first only; so a server on IPv4 that `localhost` means listens there too, if it can.
+/// The IPv6 loopback address for a server that `localhost` means on IPv4. `localhost` resolves to
+/// `::1` first. Over TCP clients try both addresses, but browsers dial QUIC to the first only. So
+/// the server listens there too, if it can.
 fn other_loopback(address: SocketAddr) -> Option<SocketAddr> {
     let ip = address.ip();
     let local = ip.is_ipv4() && (ip.is_loopback() || ip.is_unspecified());

@@ -1,4 +1,4 @@
-//! The names that sessions publish under, each session in a part of the origin of its own.
+//! Names that sessions publish under; each session has its own part of the origin.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,20 +8,21 @@ use moq_relay::auth;
 
 use crate::error::Failure;
 
-/// Bytes of a name, with the scene's.
+/// Largest size of a name in bytes, including the scene's.
 const LONGEST: usize = 256;
 
-/// Where sessions publish: each under its own number, so that none comes in the way of another.
+/// The origin for sessions. Each publishes under its own number, so that none interferes with
+/// another.
 #[derive(Clone)]
 pub(crate) struct Names {
     origin: origin::Producer,
     next: Arc<AtomicU64>,
-    /// How many names a session may have at a time.
+    /// Greatest number of names of a session at a time.
     most: usize,
 }
 
 impl Names {
-    /// An origin beside that of the server's own broadcasts, with which it shares its cache.
+    /// An origin beside that of the server's own broadcasts; the two share a cache.
     pub(crate) fn beside(own: &origin::Producer, most: usize) -> Self {
         let origin = moq_tokio::origin::spawn_config(own.config());
         Self { origin, next: Arc::default(), most }
@@ -31,14 +32,15 @@ impl Names {
         self.origin.consume()
     }
 
-    /// Where one session publishes what its token allows; `None` where that is nothing.
+    /// The part of the origin for one session, limited to what its token allows; `None` where that
+    /// is nothing.
     pub(crate) fn of_session(&self, token: &auth::Token) -> Option<origin::Producer> {
         let number = self.next.fetch_add(1, Ordering::Relaxed).to_string();
         let root = moq_net::Path::new(&number).join(&token.root).to_owned();
         self.origin.scope(root, &token.publish).ok()
     }
 
-    /// Counts what a session announces; ends with the reason for closing it.
+    /// Counts the names of a session; returns the reason for closing the session when there is one.
     pub(crate) async fn watch(&self, published: &origin::Producer) -> Failure {
         let mut announced = published.consume().announced();
         let mut count = 0;

@@ -1,10 +1,10 @@
-//! Which hosts and web origins a request may name.
+//! Checks which hosts and web origins a request names.
 //!
 //! Any web page may open a connection to `localhost`, and any name may resolve to it (DNS
-//! rebinding). So every request on HTTP, WebSocket and WebTransport has to name a host that is
-//! this server's, and, where a browser says which page asks (`Origin`), a page of this server or, on
-//! loopback, of another one on this machine, as development servers are.
-//! Native clients send no `Origin`; they are judged by the host and by [`Access`](crate::Access).
+//! rebinding). So every request on HTTP, WebSocket and WebTransport must name a host of this
+//! server. Where a browser says which page asks (`Origin`), the page must be of this server. A
+//! server on loopback also accepts other pages of this machine, such as those of development
+//! servers. Native clients send no `Origin`; the host and [`Access`](crate::Access) judge them.
 
 use std::net::{IpAddr, SocketAddr};
 
@@ -12,7 +12,7 @@ use axum::http::header::{self, HeaderName};
 
 use crate::refusals::RefusalKind;
 
-/// Why a request is refused; the text is sent to its sender, with status 403.
+/// Why a request is refused. Its sender gets the text with status 403.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Refusal {
     #[error("the request names no host")]
@@ -41,10 +41,10 @@ impl Refusal {
     }
 }
 
-/// The hosts and origins that one server answers to.
+/// The hosts and origins of one server.
 #[derive(Debug, Clone)]
 pub(crate) struct OriginCheck {
-    /// Nobody but this machine reaches the server.
+    /// Whether only this machine reaches the server.
     is_local: bool,
     port: u16,
     hosts: Vec<String>,
@@ -52,15 +52,15 @@ pub(crate) struct OriginCheck {
 }
 
 impl OriginCheck {
-    /// A check for a server at `address`, which also answers to `hosts` (names without port) and
-    /// to pages of `origins` (`scheme://host[:port]`).
+    /// A check for a server at `address`. It also accepts `hosts` (names without port) and pages of
+    /// `origins` (`scheme://host[:port]`).
     pub(crate) fn new(address: SocketAddr, hosts: &[String], origins: &[String]) -> Self {
         let lower = |list: &[String]| list.iter().map(|item| item.to_ascii_lowercase()).collect();
         let (is_local, port) = (address.ip().is_loopback(), address.port());
         Self { is_local, port, hosts: lower(hosts), origins: lower(origins) }
     }
 
-    /// Checks one request by its `Host` (or `:authority`) and its `Origin`, where it has one.
+    /// Checks a request by its `Host` (or `:authority`) and by its `Origin` where there is one.
     pub(crate) fn check(&self, host: Option<&str>, origin: Option<&str>) -> Result<(), Refusal> {
         let authority = host.ok_or(Refusal::NoHost)?.to_ascii_lowercase();
         if !self.is_own_host(host_of(&authority)) {
@@ -74,16 +74,17 @@ impl OriginCheck {
         }
     }
 
-    /// Whether a name cannot be an attacker's. An address literal is not resolved, so that it
-    /// cannot be rebound; of names, only the loopback ones and those that were configured count.
+    /// Whether a host name is safe from rebinding. Address literals are not resolved, so they are.
+    /// Of other names only loopback names and configured ones are accepted.
     fn is_own_host(&self, host: &str) -> bool {
         is_loopback_name(host)
             || literal(host).is_some()
             || self.hosts.iter().any(|own| own == host)
     }
 
-    /// A page is our own if it came from the very authority it now asks, or from this machine's
-    /// loopback: at our port, which nobody else can hold, or at any where the server is this machine's.
+    /// Whether a page is of this server or a trusted one. It is if it came from the authority that
+    /// it asks, or from loopback at the server's port, which nobody else can hold. Where the server
+    /// is on loopback, any port of loopback will do.
     fn is_own_origin(&self, origin: &str, authority: &str) -> bool {
         if self.origins.iter().any(|allowed| allowed == origin) {
             return true;
@@ -100,7 +101,7 @@ impl OriginCheck {
     }
 }
 
-/// The host in `host[:port]`, an IPv6 literal without its brackets.
+/// The host in `host[:port]`, with an IPv6 literal's brackets removed.
 fn host_of(authority: &str) -> &str {
     if let Some(rest) = authority.strip_prefix('[') {
         return rest.split(']').next().unwrap_or(rest);
@@ -121,8 +122,8 @@ fn is_loopback_name(host: &str) -> bool {
     host == "localhost" || host.ends_with(".localhost")
 }
 
-/// Whether an origin without its scheme is `localhost` or the address that this stands for, and nothing
-/// else: of 127.0.0.2 and the like the same port may be somebody else's.
+/// Whether an origin without its scheme is `localhost`, `127.0.0.1` or `[::1]`, with or without
+/// port. On other addresses such as 127.0.0.2 the same port may be somebody else's.
 fn is_loopback_origin(rest: &str) -> bool {
     let host = host_of(rest);
     let port = port_of(rest).map_or(String::new(), |port| format!(":{port}"));

@@ -1,15 +1,15 @@
-//! Who is at the other end of a TCP connection.
+//! Peers of TCP connections.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
 
 use tokio::net::TcpStream;
 
-/// Who is at the other end of a TCP connection.
+/// The peer of a TCP connection.
 #[derive(Clone)]
 pub(crate) struct Peer {
     pub(crate) remote: SocketAddr,
-    /// What the kernel knows of the connection, for the estimate of its bandwidth.
+    /// The kernel's statistics of the connection, from which its bandwidth is estimated.
     pub(crate) stats: Option<qmux::SharedSocketStats>,
 }
 

@@ -1,5 +1,5 @@
-//! Whether a connection gets on: one that does not is closed, so that nobody holds a server's memory
-//! and descriptors for nothing.
+//! Closes TCP connections that stand still, so that nobody holds a server's memory and descriptors
+//! for nothing.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -12,15 +12,15 @@ use http_body::{Frame, SizeHint};
 
 use crate::guests::Guest;
 
-/// How long a TCP connection may stand still.
+/// Times that a TCP connection may stand still.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub struct Patience {
-    /// Until its first request is there.
+    /// Until its first request has arrived.
     pub first_request: Duration,
     /// Between two requests.
     pub idle: Duration,
-    /// While a reader takes nothing of the answers that it has asked for.
+    /// While its client takes nothing of the answers that it has asked for.
     pub stalled: Duration,
 }
 
@@ -32,7 +32,7 @@ impl Default for Patience {
     }
 }
 
-/// How a connection gets on.
+/// The progress of a connection.
 #[derive(Debug)]
 pub(crate) struct Progress {
     patience: Patience,
@@ -41,10 +41,10 @@ pub(crate) struct Progress {
 
 #[derive(Debug)]
 struct State {
-    /// When something happened last.
+    /// When something last happened.
     last: Instant,
     asked: bool,
-    /// Answers that are not at their end.
+    /// Number of answers that have not ended.
     answers: usize,
 }
 
@@ -54,7 +54,7 @@ impl Progress {
         Arc::new(Self { patience, state: Mutex::new(state) })
     }
 
-    /// A request has come.
+    /// Notes a request.
     pub(crate) fn request(self: &Arc<Self>) -> Answering {
         self.happened(|state| {
             state.asked = true;
@@ -63,20 +63,21 @@ impl Progress {
         Answering(self.clone())
     }
 
-    /// Comes back when it has stood still for too long.
+    /// Returns when the connection has stood still for too long.
     pub(crate) async fn stalled(&self) {
         loop {
             let rest = self.rest();
             if rest.is_zero() {
                 return;
             }
-            // What it waits for may change meanwhile, to the least of the three.
+            // Meanwhile the state may change, and with it the patience; the least of the three
+            // bounds the wait.
             let Patience { first_request, idle, stalled } = self.patience;
             tokio::time::sleep(rest.min(first_request).min(idle).min(stalled)).await;
         }
     }
 
-    /// How long it may still stand still.
+    /// The time that the connection may still stand still.
     fn rest(&self) -> Duration {
         let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let patience = match *state {
@@ -104,17 +105,18 @@ impl Drop for Answering {
     }
 }
 
-/// An answer that counts as under way until its end, or until its reader has gone.
+/// An answer that counts until its end, or until its client has gone.
 pub(crate) fn under_way(answer: Response, answering: Answering, guest: Guest) -> Response {
     answer.map(|body| Body::new(UnderWay { body, rest: Bytes::new(), answering, _guest: guest }))
 }
 
-/// Bytes that are handed on at once: what is taken in pieces shows whether its reader gets on.
+/// Greatest number of bytes that are handed on at once. Small pieces show whether the client takes
+/// any.
 const PIECE: usize = 32 << 10;
 
 struct UnderWay {
     body: Body,
-    /// What the body has given and is not handed on.
+    /// Bytes that the body has given and that are not yet handed on.
     rest: Bytes,
     answering: Answering,
     _guest: Guest,
@@ -124,7 +126,7 @@ impl http_body::Body for UnderWay {
     type Data = Bytes;
     type Error = axum::Error;
 
-    /// Is called when there is room for more: the reader has taken what came before.
+    /// This is called when there is room for more, so the client has taken earlier pieces.
     fn poll_frame(
         mut self: Pin<&mut Self>,
         cx: &mut Context<'_>,

@@ -1,8 +1,8 @@
 //! The UDP side of the server: WebTransport sessions.
 //!
-//! The relay's own listener answers a CONNECT before anyone can see its `Origin`, and hands none of
-//! its headers on. So this accept loop is our own: it checks host, origin and access, and only then
-//! answers.
+//! The relay's own listener answers a CONNECT before anyone can check its `Origin`, and does not
+//! pass on its headers. So this accept loop replaces it: it checks host, origin and access before
+//! it answers.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -13,7 +13,7 @@ use web_transport_moq::{Request, noq, proto};
 use crate::error::Failure;
 use crate::session::{Admitted, Ask, Backend, HANDSHAKE};
 
-/// How long a refused client may take to hear so.
+/// Longest time that a refused client may take to receive the answer.
 const ANSWER: Duration = Duration::from_secs(1);
 
 /// Accepts connections until the endpoint is closed.
@@ -29,7 +29,7 @@ pub(crate) async fn serve(endpoint: noq::Endpoint, backend: Backend) {
     }
 }
 
-/// One connection, from its first packet to its end.
+/// Serves one connection, from its first packet to its end.
 async fn connection(incoming: noq::Incoming, backend: Backend) -> Result<(), Failure> {
     let remote = incoming.remote_address();
     let request = tokio::time::timeout(HANDSHAKE, async {
@@ -57,7 +57,7 @@ async fn connection(incoming: noq::Incoming, backend: Backend) -> Result<(), Fai
     backend.serve(transport, admitted).await
 }
 
-/// Checks who asks and for what; a refusal comes with its status and reason.
+/// Checks a session's request; a refusal has a status and a reason.
 async fn admit(
     request: &Request,
     remote: SocketAddr,

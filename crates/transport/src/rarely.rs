@@ -1,11 +1,11 @@
-//! Messages that may come often and must not flood a log.
+//! Limits messages that may come often, so that they do not flood a log.
 
 use std::time::{Duration, Instant};
 
-/// The least time from one message to the next of its kind.
+/// Least time between two messages of a kind.
 const PAUSE: Duration = Duration::from_secs(10);
 
-/// Counts what happens and tells it every ten seconds at most.
+/// Counts events and reports them at most every ten seconds.
 #[derive(Debug, Default)]
 pub struct Rarely {
     told: Option<Instant>,
@@ -13,7 +13,8 @@ pub struct Rarely {
 }
 
 impl Rarely {
-    /// Something has happened: how often it has since it was told last, if it is to be told now.
+    /// Counts an event. Returns the number of events since the last report if a report is due, else
+    /// `None`.
     pub fn now(&mut self) -> Option<u64> {
         self.times += 1;
         if self.told.is_some_and(|told| told.elapsed() < PAUSE) {

@@ -1,4 +1,4 @@
-//! Reading: announcements, broadcasts of others, and the frames of their tracks.
+//! Readers: announcements, broadcasts of others, and the frames of their tracks.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,20 +8,21 @@ use moq_net::{Pattern, Patterns, announce, broadcast, group, origin, track};
 
 use crate::{Error, Result};
 
-/// How long to wait before asking again for a track that its broadcast does not have (yet).
+/// Wait before the next attempt where a broadcast does not have the track (yet).
 const RETRY: Duration = Duration::from_millis(200);
 
-/// What a reader asks of a track.
+/// Options for reading a track.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub struct ReadOptions {
-    /// Where a link is too slow for all, tracks of higher priority go first.
+    /// Priority from 0 to 255. Where a link is too slow for all tracks, those of higher priority go
+    /// first.
     pub priority: u8,
-    /// How far behind the newest group an unfinished one may fall before it is skipped; at most
-    /// five seconds. Zero suits light, whose newest state is all that counts; a track whose every
-    /// frame matters needs more.
+    /// How far an unfinished group may fall behind the newest before it is skipped; at most five
+    /// seconds. Zero suits light, of which only the newest state counts. A track whose every frame
+    /// matters needs more.
     pub max_age: Duration,
-    /// The largest frame accepted, in bytes.
+    /// Largest frame accepted, in bytes.
     pub max_frame: usize,
 }
 
@@ -33,19 +34,19 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
-    /// For a track read at this priority.
+    /// Sets the priority.
     pub fn with_priority(mut self, priority: u8) -> Self {
         self.priority = priority;
         self
     }
 
-    /// For a track of which groups up to `max_age` behind the newest still count.
+    /// Sets how far behind the newest group others still count.
     pub fn with_max_age(mut self, max_age: Duration) -> Self {
         self.max_age = max_age;
         self
     }
 
-    /// For a track whose frames have at most `bytes`.
+    /// Sets the largest frame accepted, in bytes.
     pub fn with_max_frame(mut self, bytes: usize) -> Self {
         self.max_frame = bytes;
         self
@@ -56,21 +57,21 @@ impl ReadOptions {
     }
 }
 
-/// A frame as its writer wrote it.
+/// A frame as it was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Frame {
-    /// The number of its group: higher for each newer group of the track.
+    /// Number of its group, which increases with each newer group of the track.
     pub group: u64,
-    /// Its place in the group, from 0.
+    /// Its index in the group, from 0.
     pub index: u64,
     /// Its content.
     pub bytes: Bytes,
 }
 
-/// Where a reader finds its broadcast.
+/// The broadcast that a reader reads.
 enum Source {
-    /// Whatever is published under this path, now or later.
+    /// Any broadcast under this path, now or later.
     Path { origin: origin::Consumer, path: Arc<str> },
     /// One broadcast, until it ends.
     Broadcast(broadcast::Consumer),
@@ -83,12 +84,13 @@ pub struct TrackReader {
     options: ReadOptions,
     subscription: Option<track::Ordered>,
     group: Option<group::Consumer>,
-    /// The last subscription failed or ended: wait a moment before the next.
+    /// Whether to pause before the next subscription, since the last one failed or ended.
     pause: bool,
 }
 
 impl TrackReader {
-    /// A reader of whatever `path` names; it waits for it, and after an end for its return.
+    /// A reader of any broadcast under `path`. It waits for the broadcast, and after its end for
+    /// its return.
     pub(crate) fn follow(
         origin: origin::Consumer,
         path: &str,
@@ -107,26 +109,26 @@ impl TrackReader {
         &self.track
     }
 
-    /// Changes the priority of what has not been sent yet.
+    /// Changes the priority of frames that are not sent yet.
     pub fn set_priority(&mut self, priority: u8) {
         self.options.priority = priority;
         if let Some(subscription) = &mut self.subscription {
-            // It fails only on a closed track, which the next read deals with.
+            // This fails only on a closed track, which the next read handles.
             let _ = subscription.update(self.options.subscription());
         }
     }
 
-    /// The next frame. The first is that of the newest group; a group that has become stale is
-    /// left unfinished and reading goes on with a newer one, which shows in [`Frame::group`].
+    /// Waits for the next frame. The first one is the first of the newest group. A group that has
+    /// become stale is left unfinished and a newer one follows, as [`Frame::group`] shows.
     ///
-    /// A reader got from a [`Client`](crate::Client) waits while there is no connection, broadcast
-    /// or track, and goes on where the server does, from the beginning of its newest group (which
-    /// may repeat frames). `None` says that the broadcast has ended, or the client was closed.
+    /// A reader from a [`Client`](crate::Client) waits while there is no connection, broadcast or
+    /// track. It then continues with the server's newest group from its beginning, which may repeat
+    /// frames. `None` means that the broadcast has ended or the client was closed.
     ///
     /// Dropping the future loses nothing.
     ///
     /// # Errors
-    /// [`Error::FrameTooLarge`], after which reading may go on with the next frame.
+    /// [`Error::FrameTooLarge`], after which reading may continue with the next frame.
     pub async fn next(&mut self) -> Result<Option<Frame>> {
         loop {
             if self.group.is_some() {
@@ -159,7 +161,7 @@ impl TrackReader {
         matches!(self.source, Source::Path { .. })
     }
 
-    /// The next frame of the open group; `None`, and no open group, at its end.
+    /// The next frame of the open group. At the group's end it closes the group and returns `None`.
     async fn next_in_group(&mut self) -> Result<Option<Frame>> {
         let Some(group) = &mut self.group else { return Ok(None) };
         let (sequence, index) = (group.sequence, group.index());
@@ -183,7 +185,7 @@ impl TrackReader {
         Ok(Some(Frame { group: sequence, index, bytes }))
     }
 
-    /// Subscribes; false if there is nothing left to subscribe to.
+    /// Subscribes; returns false where there is nothing left to subscribe to.
     async fn subscribe(&mut self) -> bool {
         let broadcast = match &self.source {
             Source::Broadcast(broadcast) => Ok(broadcast.clone()),
@@ -233,17 +235,17 @@ impl RemoteBroadcast {
         self.session
     }
 
-    /// Reads a track until the broadcast ends.
+    /// A reader of a track, until the broadcast ends.
     pub fn subscribe(&self, track: &str, options: ReadOptions) -> TrackReader {
         TrackReader::new(Source::Broadcast(self.inner.clone()), track, options)
     }
 }
 
-/// A broadcast has appeared or gone.
+/// An announcement: a broadcast has appeared or gone.
 pub enum Announcement {
-    /// Somebody publishes this.
+    /// Somebody publishes this broadcast.
     Appeared(RemoteBroadcast),
-    /// The session does not publish this path any more.
+    /// The session has stopped publishing this path.
     Gone {
         /// As [`RemoteBroadcast::session`].
         session: u64,
@@ -252,22 +254,23 @@ pub enum Announcement {
     },
 }
 
-/// The broadcasts of others under a path, as they appear and go. First come those already there.
+/// The broadcasts of others under a path, as they appear and go. Those that exist already come
+/// first.
 pub struct Announcements {
     origin: origin::Consumer,
     updates: announce::Consumer,
     appearing: Option<String>,
-    /// Paths begin with the number of a session.
+    /// Whether paths begin with the number of a session.
     numbered: bool,
 }
 
 impl Announcements {
-    /// What a server shows its client.
+    /// Broadcasts that a server announces to its client.
     pub(crate) fn of_server(origin: &origin::Consumer, prefix: &str) -> Result<Self> {
         Self::new(origin, prefix, Pattern::subtree(prefix), false)
     }
 
-    /// What sessions publish, each under its number.
+    /// Broadcasts that sessions publish, each under its session's number.
     pub(crate) fn of_sessions(origin: &origin::Consumer, prefix: &str) -> Result<Self> {
         let pattern = ["*", prefix, "**"].into_iter().filter(|part| !part.is_empty());
         Self::new(origin, prefix, pattern.collect::<Vec<_>>().join("/").parse(), true)
@@ -287,8 +290,8 @@ impl Announcements {
         Ok(Self { origin, updates, appearing: None, numbered })
     }
 
-    /// The next change; `None` once the server or client is closed. Dropping the future loses
-    /// nothing.
+    /// Waits for the next change; `None` once the server or client is closed. Dropping the future
+    /// loses nothing.
     pub async fn next(&mut self) -> Option<Announcement> {
         loop {
             if let Some(full) = &self.appearing {
@@ -317,7 +320,7 @@ impl Announcements {
         }
     }
 
-    /// The session and the path in what is announced.
+    /// Splits an announced path into session and path.
     fn apart<'a>(&self, full: &'a str) -> (u64, &'a str) {
         let apart = full.split_once('/').filter(|_| self.numbered);
         let numbered = apart.and_then(|(number, path)| Some((number.parse().ok()?, path)));

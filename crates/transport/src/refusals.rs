@@ -1,4 +1,4 @@
-//! Who was refused, counted by why.
+//! Counts of refusals by reason.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -6,24 +6,24 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Why a connection, a request or a session was refused, or a session closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RefusalKind {
-    /// A host that is not the server's.
+    /// The host is not the server's.
     Host,
-    /// A page of an origin that is not the server's, or of none.
+    /// The page's origin is not allowed, or is missing.
     Origin,
-    /// A token that is missing, wrong or expired.
+    /// The token is missing, wrong or expired.
     Token,
-    /// Too many TCP connections.
+    /// There are too many TCP connections.
     Connections,
-    /// Too many requests under way.
+    /// There are too many requests being answered.
     Requests,
-    /// Too many sessions.
+    /// There are too many sessions.
     Sessions,
-    /// A session with too many names, or too long ones.
+    /// A session has too many names, or a name that is too long.
     Names,
 }
 
 impl RefusalKind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 7] = [
         Self::Host,
         Self::Origin,
@@ -34,7 +34,7 @@ impl RefusalKind {
         Self::Names,
     ];
 
-    /// A word for it.
+    /// A word for the kind, for logs and metrics.
     pub fn name(self) -> &'static str {
         match self {
             Self::Host => "host",
@@ -48,7 +48,7 @@ impl RefusalKind {
     }
 }
 
-/// Counts since the start; copies count together.
+/// Counts of refusals since the start; clones share them.
 #[derive(Clone, Debug, Default)]
 pub struct Refusals(Arc<[AtomicU64; RefusalKind::ALL.len()]>);
 
@@ -57,7 +57,7 @@ impl Refusals {
         self.0[kind as usize].fetch_add(1, Ordering::Relaxed);
     }
 
-    /// How often somebody was refused for this.
+    /// Number of refusals of this kind.
     pub fn of(&self, kind: RefusalKind) -> u64 {
         self.0[kind as usize].load(Ordering::Relaxed)
     }

@@ -1,4 +1,4 @@
-//! The server: an embedded relay on one port, QUIC on UDP and HTTP with WebSocket on TCP.
+//! The server: an embedded relay on one port, with QUIC on UDP, and HTTP and WebSocket on TCP.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::sync::{Arc, PoisonError, RwLock};
@@ -23,42 +23,43 @@ use crate::session::Backend;
 use crate::tls::{self, Fingerprint, Identified, Tls};
 use crate::{Announcements, Broadcast, Error, Result, descriptors, listen, quic, tcp};
 
-/// Bytes of past groups kept for late readers, over all tracks; above it, the oldest go first.
+/// Size of past groups kept for late readers, over all tracks; the oldest are dropped first.
 const CACHE: &str = "512MiB";
 
-/// How a server is set up.
+/// Configuration of a server.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ServerConfig {
-    /// The address for UDP and TCP alike; with port 0 a port is chosen that is free for both.
+    /// Address for UDP and TCP; with port 0 the server chooses a port that is free for both.
     pub listen: SocketAddr,
     /// The certificate.
     pub tls: Tls,
-    /// Who may read and edit.
+    /// Who may read and who may edit.
     pub access: Access,
-    /// Names, without port, under which the server is reached, besides `localhost` and addresses.
+    /// Host names, without port, under which the server is reached. `localhost` and address
+    /// literals are always allowed.
     pub allowed_hosts: Vec<String>,
     /// Origins (`scheme://host[:port]`) of pages that may connect, besides the server's own.
     pub allowed_origins: Vec<String>,
-    /// Sessions open at once, at most, and half of them (at least eight) from one address that is not this
-    /// machine's; a further one is refused with status 503.
+    /// Greatest number of open sessions. An address outside this machine may have half of them, and
+    /// at least eight. Further sessions are refused with status 503.
     pub max_sessions: usize,
-    /// Names that one session may publish edits under at a time; one that has more is closed. A page
-    /// needs one, a relay one for each of its editors.
+    /// Greatest number of names that one session may publish edits under at a time; a session with
+    /// more is closed. A page needs one, a relay one for each of its editors.
     pub max_names: usize,
-    /// TCP connections open at once for HTTP, at most, and half of them from one address; a further one is
-    /// closed. There are fewer where the system allows fewer descriptors.
+    /// Greatest number of TCP connections open for HTTP. One address may have half of them. Further
+    /// ones are closed. There are fewer where the system allows fewer descriptors.
     pub max_connections: usize,
-    /// HTTP requests answered at once, at most, and half of them from one address; a further one is
-    /// refused with status 503.
+    /// Greatest number of HTTP requests answered at once. One address may have half of them.
+    /// Further ones are refused with status 503.
     pub max_requests: usize,
-    /// How long a TCP connection may stand still.
+    /// Times that a TCP connection may stand still.
     pub patience: Patience,
 }
 
 impl ServerConfig {
-    /// A server at this address with a development certificate, for this machine only, for at most
-    /// 256 sessions.
+    /// A server at this address with a development certificate, for clients on this machine only,
+    /// and at most 256 sessions.
     pub fn new(listen: SocketAddr) -> Self {
         Self {
             listen,
@@ -75,13 +76,14 @@ impl ServerConfig {
     }
 }
 
-/// A running server. Dropping it stops it at once; [`Server::shutdown`] waits for that.
+/// A running server. Dropping it stops it at once; [`Server::shutdown`] also waits until it has
+/// stopped.
 pub struct Server {
     address: SocketAddr,
     origin: origin::Producer,
     names: Names,
     sessions: Sessions,
-    /// TCP connections that are open for HTTP.
+    /// Open TCP connections for HTTP.
     connections: Arc<Guests>,
     shutdown: shutdown::Trigger,
     endpoints: Vec<noq::Endpoint>,
@@ -91,18 +93,20 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts a server. `application` answers HTTP requests on the same TCP port, after the check
-    /// of hosts and origins; WebSocket upgrades and `/certificate.sha256` do not reach it.
+    /// Starts a server. `application` answers HTTP requests on the same TCP port that pass the
+    /// check of hosts and origins. WebSocket upgrades and `/certificate.sha256` do not reach it.
     ///
     /// # Errors
-    /// A port in use, an unusable certificate, or [`Access::Loopback`] on another address.
+    /// The port is in use, the certificate is unusable, or [`Access::Loopback`] is used on another
+    /// address.
     pub async fn bind(config: ServerConfig, application: Router) -> Result<Self> {
         tls::install_provider();
         if matches!(config.access, Access::Loopback) && !config.listen.ip().is_loopback() {
             let reason = "it is not a loopback address: give a key for tokens, or open it to all";
             return Err(Error::Setup(format!("{}: {reason}", config.listen)));
         }
-        // No time to leave: a client has nothing to finish before it looks for the next server.
+        // Clients get no time to leave: they have nothing to finish before they look for the next
+        // server.
         let (shutdown, observer) = shutdown::Observer::new(Duration::ZERO);
         let (auth, admissions) = auth::Auth::embedded("lumencast");
         let cluster = cluster().map_err(setup_error)?;
@@ -164,43 +168,47 @@ impl Server {
         })
     }
 
-    /// The address, with the port that was chosen.
+    /// The address with the port that was chosen.
     pub fn local_addr(&self) -> SocketAddr {
         self.address
     }
 
-    /// How many sessions are open.
+    /// Number of open sessions.
     pub fn sessions(&self) -> usize {
         self.sessions.count()
     }
 
-    /// How many TCP connections are open for HTTP; those of WebSocket sessions are not among them.
+    /// Number of TCP connections open for HTTP, without those of WebSocket sessions.
     pub fn connections(&self) -> usize {
         self.connections.count()
     }
 
-    /// Who has been refused since the start.
+    /// Numbers of refusals since the start.
     pub fn refusals(&self) -> Refusals {
         self.sessions.refusals.clone()
     }
 
-    /// Makes a broadcast under this path, the name of a scene. It is known to readers once it is
+    /// Creates a broadcast under this path, the name of a scene. Readers see it once it is
     /// [announced](Broadcast::announce).
+    ///
+    /// # Errors
+    /// [`Error::Publish`].
     pub fn publish(&self, path: &str) -> Result<Broadcast> {
         let mut scenes = self.sessions.scenes.lock().unwrap_or_else(PoisonError::into_inner);
         scenes.insert(path.to_owned());
         Broadcast::new(&self.origin, path)
     }
 
-    /// The broadcasts of sessions under this path, such as `sponza/edits`, as they come and go. Two
-    /// sessions may publish the same path; [`RemoteBroadcast::session`](crate::RemoteBroadcast::session)
-    /// tells them apart.
+    /// The broadcasts of sessions under this path, such as `sponza/edits`, as they appear and go.
+    /// Two sessions may publish the same path;
+    /// [`RemoteBroadcast::session`](crate::RemoteBroadcast::session) tells them apart.
     pub fn announced(&self, prefix: &str) -> Result<Announcements> {
         Announcements::of_sessions(&self.names.consume(), prefix)
     }
 
-    /// Closes every session, so that clients know at once, lets answers over HTTP that have begun be
-    /// read to their end, and stops; takes at most `grace`. After that the port is free again.
+    /// Closes every session, so that clients know at once, and stops the server. HTTP answers that
+    /// have begun are sent to their end. It takes at most `grace`. After that the port is free
+    /// again.
     pub async fn shutdown(self, grace: Duration) {
         let address = self.address;
         let closed = async {
@@ -213,7 +221,7 @@ impl Server {
                 endpoint.wait_idle().await;
             }
             drop(self);
-            // The endpoint's own task lets go of the socket when it next runs.
+            // The endpoint's own task releases the socket when it next runs.
             while UdpSocket::bind(address).is_err() {
                 tokio::time::sleep(POLL).await;
             }
@@ -224,7 +232,7 @@ impl Server {
     }
 }
 
-/// How often a shutdown looks whether it is done.
+/// Interval at which a shutdown checks whether it is done.
 const POLL: Duration = Duration::from_millis(5);
 
 impl Drop for Server {
@@ -251,7 +259,8 @@ fn endpoint(udp: UdpSocket, config: &noq::ServerConfig) -> Result<noq::Endpoint,
     Ok(noq::Endpoint::new(noq::EndpointConfig::default(), Some(config.clone()), udp, runtime)?)
 }
 
-/// Replaces a development certificate before it expires; files are watched by `identified`.
+/// Replaces a development certificate before it expires. Certificate files are watched by
+/// `identified`.
 async fn renew(
     tls: Tls,
     mut identified: Identified,

@@ -1,4 +1,4 @@
-//! What WebTransport and WebSocket sessions share: how one is let in and how it is served.
+//! Admission and service of sessions, for both WebTransport and WebSocket.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,28 +16,28 @@ use crate::origin_check::OriginCheck;
 use crate::rarely::Rarely;
 use crate::refusals::RefusalKind;
 
-/// How long a client may take for each step from its first packet to its session.
+/// Longest time for each step from a client's first packet to its session.
 pub(crate) const HANDSHAKE: Duration = Duration::from_secs(10);
 
-/// Streams that a client may have open at once, of each kind: every subscription holds one, and
-/// every group on its way another.
+/// Greatest number of streams of each kind that a client may have open. Every subscription holds
+/// one, and every group being sent another.
 pub(crate) const MAX_STREAMS: u32 = 1024;
 
-/// What sessions are checked by and served from.
+/// The services that sessions are checked by and served from.
 #[derive(Clone)]
 pub(crate) struct Backend {
     pub(crate) auth: auth::Auth,
     pub(crate) cluster: cluster::Cluster,
     pub(crate) check: Arc<OriginCheck>,
     pub(crate) sessions: Sessions,
-    /// The addresses of sessions.
+    /// Open sessions by address.
     pub(crate) visitors: Arc<Guests>,
     pub(crate) names: Names,
     pub(crate) shutdown: shutdown::Observer,
     pub(crate) told: Arc<Mutex<Rarely>>,
 }
 
-/// What a client asks for.
+/// A client's request for a session.
 pub(crate) struct Ask<'a> {
     pub(crate) transport: moq_auth::Transport,
     pub(crate) path: &'a str,
@@ -45,7 +45,7 @@ pub(crate) struct Ask<'a> {
     pub(crate) remote: SocketAddr,
 }
 
-/// A session that has been let in.
+/// An admitted session.
 pub(crate) struct Admitted {
     lease: auth::Lease,
     remote: SocketAddr,
@@ -53,7 +53,7 @@ pub(crate) struct Admitted {
 }
 
 impl Backend {
-    /// Counts a refusal and tells it.
+    /// Counts a refusal and logs it, though not too often.
     pub(crate) fn refuse(&self, kind: RefusalKind, remote: SocketAddr, reason: &str) {
         self.sessions.refusals.count(kind);
         let told = self.told.lock().unwrap_or_else(PoisonError::into_inner).now();
@@ -62,7 +62,7 @@ impl Backend {
         }
     }
 
-    /// Lets a session in; a refusal comes with its status and reason.
+    /// Admits a session; a refusal has a status and a reason.
     pub(crate) async fn admit(&self, ask: Ask<'_>) -> Result<Admitted, (StatusCode, String)> {
         let full = |reason: &str| {
             self.sessions.refusals.count(RefusalKind::Sessions);
@@ -84,14 +84,15 @@ impl Backend {
         Ok(Admitted { lease, remote: ask.remote, _visitor: visitor })
     }
 
-    /// Serves a session that has been let in, until it ends.
+    /// Serves an admitted session until it ends.
     pub(crate) async fn serve<S>(self, transport: S, admitted: Admitted) -> Result<(), Failure>
     where
         S: web_transport_trait::Session,
     {
         let Admitted { lease, remote, _visitor } = admitted;
         let token = lease.token();
-        // What the client may subscribe to is what we publish to it, and the other way round.
+        // The server publishes what the client may subscribe to, and subscribes to what the client
+        // publishes.
         let mut server = moq_net::Server::new();
         if let Some(readable) = self.cluster.subscriber(token) {
             server = server.with_publisher(&readable);

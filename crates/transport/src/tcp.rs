@@ -1,4 +1,4 @@
-//! The TCP side of the server: HTTP, with TLS where there are certificate files.
+//! The TCP side of the server: HTTP, or HTTPS where there are certificate files.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -21,17 +21,16 @@ use crate::session::HANDSHAKE;
 #[cfg(target_os = "linux")]
 use crate::unsent;
 
-/// How long to wait after a connection could not be accepted, which is usually for want of file
-/// descriptors.
+/// Wait after a connection could not be accepted, usually for lack of file descriptors.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Bytes that a connection holds, at most, of what its client has not taken yet.
+/// Greatest number of bytes that a connection buffers for its client.
 const HTTP1_BUFFER: usize = 128 << 10;
-/// The same of each stream, and how many of them there are.
+/// The same for each HTTP/2 stream, and the greatest number of streams.
 const HTTP2_BUFFER: usize = 64 << 10;
 const HTTP2_STREAMS: u32 = 32;
 
-/// Accepts connections until it is dropped.
+/// Accepts connections until the future is dropped.
 pub(crate) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, front: Front) {
     let (mut failed, mut full) = (Rarely::default(), Rarely::default());
     loop {
@@ -68,7 +67,7 @@ async fn connection(
     tls: Option<TlsAcceptor>,
     front: Front,
 ) -> Result<(), Failure> {
-    // Else the end of each frame waits until the client has acknowledged its beginning.
+    // Otherwise the end of each frame would wait until the client has acknowledged its beginning.
     stream.set_nodelay(true)?;
     let peer = Peer { remote, stats: stats(&stream) };
     #[cfg(target_os = "linux")]

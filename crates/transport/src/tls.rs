@@ -1,4 +1,4 @@
-//! The server's certificate: from files, or made for development.
+//! The server's certificate: from files, or generated for development.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Once, RwLock};
@@ -11,17 +11,17 @@ use web_transport_moq::noq;
 
 use crate::{Error, Result};
 
-/// Where the server's certificate comes from.
+/// Source of the server's certificate.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub enum Tls {
-    /// A certificate made at the start, and anew every week, for development. Browsers accept it
-    /// for WebTransport by its fingerprint, served at `/certificate.sha256`; HTTP and WebSocket
-    /// stay unencrypted.
+    /// A certificate for development, generated at the start and renewed every week. Browsers
+    /// accept it for WebTransport by its fingerprint, which is served at `/certificate.sha256`.
+    /// HTTP and WebSocket stay unencrypted.
     #[default]
     SelfSigned,
-    /// A certificate chain and its key, as PEM files; also for HTTPS and WebSocket. They are read
-    /// again when they change.
+    /// A certificate chain and its key, as PEM files; also for HTTPS and WebSocket. The files are
+    /// read again when they change.
     Files {
         /// The chain, the server's own certificate first.
         cert: PathBuf,
@@ -30,33 +30,34 @@ pub enum Tls {
     },
 }
 
-/// How often a development certificate is replaced. Browsers accept by fingerprint only what is
-/// valid for at most 14 days.
+/// Interval at which a development certificate is replaced. Browsers accept by fingerprint only
+/// certificates that are valid for at most 14 days.
 pub(crate) const RENEWAL: Duration = Duration::from_secs(7 * 24 * 3600);
 
-/// What the QUIC endpoint is configured with.
+/// Configuration of the QUIC endpoint's certificate.
 pub(crate) struct Identified {
     config: Arc<RustlsConfig>,
-    /// SHA-256 of a development certificate, in hexadecimal; others are trusted by their chain.
+    /// SHA-256 of a development certificate, in hexadecimal; `None` for one that clients trust by
+    /// its chain.
     pub(crate) fingerprint: Option<String>,
-    /// Watches the certificate's files for as long as it lives.
+    /// Watches the certificate's files while it exists.
     _reloading: Option<ReloadingServerConfig>,
 }
 
-/// The fingerprint served now; it changes with the certificate.
+/// The fingerprint that is served; it changes with the certificate.
 pub(crate) type Fingerprint = Arc<RwLock<Option<String>>>;
 
-/// Chooses the cryptography for every connection of the process, unless it is chosen already.
+/// Chooses the cryptography of the process, unless the program has chosen it.
 pub(crate) fn install_provider() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        // It fails only if the program chose first, which is as good.
+        // This fails only if the program has chosen first, which is fine.
         let _ = moq_tokio::rustls::crypto::aws_lc_rs::default_provider().install_default();
     });
 }
 
 impl Tls {
-    /// The configuration for QUIC. Call inside a Tokio runtime.
+    /// The configuration for QUIC. It must be called inside a Tokio runtime.
     pub(crate) fn for_quic(&self) -> Result<Identified> {
         let alpn = vec![web_transport_moq::ALPN.as_bytes().to_vec()];
         match self {
@@ -76,8 +77,8 @@ impl Tls {
         }
     }
 
-    /// The configuration of the TCP side: HTTPS with files, else none, for plain HTTP. The second
-    /// part watches the files for as long as it lives.
+    /// The configuration of the TCP side: HTTPS with certificate files, otherwise `None` for plain
+    /// HTTP. The second part watches the files while it exists.
     pub(crate) fn for_http(&self) -> Result<Option<(TlsAcceptor, ReloadingServerConfig)>> {
         let Self::Files { cert, key } = self else { return Ok(None) };
         let alpn = vec![b"h2".to_vec(), b"http/1.1".to_vec()];
@@ -86,7 +87,7 @@ impl Tls {
     }
 }
 
-/// A configuration that follows its files.
+/// A configuration that is reloaded when its files change.
 fn reloading(cert: &Path, key: &Path, alpn: Vec<Vec<u8>>) -> Result<ReloadingServerConfig> {
     let mut listen = Listen::default();
     listen.cert = vec![cert.to_owned()];
@@ -96,8 +97,8 @@ fn reloading(cert: &Path, key: &Path, alpn: Vec<Vec<u8>>) -> Result<ReloadingSer
     })
 }
 
-/// A QUIC configuration that closes a silent connection after three seconds, so that both ends
-/// soon know.
+/// A QUIC configuration that closes a silent connection after three seconds, so that both ends soon
+/// know.
 pub(crate) fn quic_config(identified: &Identified) -> Result<noq::ServerConfig> {
     let crypto = noq::crypto::rustls::QuicServerConfig::try_from(identified.config.clone())
         .map_err(tls_error)?;
@@ -109,7 +110,7 @@ pub(crate) fn quic_config(identified: &Identified) -> Result<noq::ServerConfig> 
     transport.max_concurrent_bidi_streams(streams);
     transport.max_concurrent_uni_streams(streams);
     transport.receive_window(noq::VarInt::from_u32(RECEIVE_WINDOW));
-    // Controlled by delay, not loss: light is of use only while it is new.
+    // BBR reacts to delay rather than loss; light is only useful while it is new.
     let congestion = noq::congestion::Bbr3Config::default();
     transport.congestion_controller_factory(Arc::new(congestion));
     let mut config = noq::ServerConfig::with_crypto(Arc::new(crypto));
@@ -117,7 +118,7 @@ pub(crate) fn quic_config(identified: &Identified) -> Result<noq::ServerConfig> 
     Ok(config)
 }
 
-/// Bytes that a client may have on the way, over all its streams.
+/// Greatest number of unread bytes from a client, over all its streams.
 const RECEIVE_WINDOW: u32 = 8 << 20;
 
 fn tls_error(err: impl std::fmt::Display) -> Error {

@@ -1,8 +1,8 @@
-//! TCP connections that leave little unsent in the kernel.
+//! TCP connections that leave little unsent data in the kernel.
 //!
-//! No priority overtakes what the kernel has taken, and left to itself it takes megabytes. Its limit for
-//! what is not sent yet counts only where a new buffer begins, and one buffer takes 64 KB of writes: so
-//! each write is marked as the end of its buffer.
+//! No priority can overtake data that the kernel has taken, and by default it takes megabytes. Its
+//! limit on unsent data is checked only where a new buffer begins, and one buffer holds 64 KB of
+//! writes. So each write is marked as the end of its buffer.
 
 use std::io;
 use std::pin::Pin;
@@ -12,13 +12,13 @@ use socket2::SockRef;
 use tokio::io::{AsyncRead, AsyncWrite, Interest, ReadBuf};
 use tokio::net::TcpStream;
 
-/// Bytes, at most, that the kernel takes ahead: at 1 Mbit/s these are 30 ms of old light.
+/// Greatest number of unsent bytes that the kernel takes: at 1 Mbit/s they are 30 ms of old light.
 const UNSENT: u32 = 4 * 1024;
 
-/// `MSG_EOR` of Linux: nothing is added to the buffer that this write fills.
+/// `MSG_EOR` of Linux: later writes do not join this write's buffer.
 const END_OF_RECORD: i32 = 0x80;
 
-/// A connection with that limit.
+/// A connection whose unsent data is limited to [`UNSENT`].
 pub(crate) struct Limited(TcpStream);
 
 impl Limited {

@@ -1,4 +1,4 @@
-//! WebSocket sessions: the same streams as over QUIC, multiplexed on one TCP connection.
+//! WebSocket sessions: the same streams as over QUIC, multiplexed over one TCP connection.
 
 use axum::body::Body;
 use axum::extract::Request;
@@ -15,9 +15,9 @@ use crate::in_order;
 use crate::peer::Peer;
 use crate::session::{Admitted, Ask, Backend, MAX_STREAMS};
 
-/// The largest message, bytes: of one record or frame of 16 KiB, with its head.
+/// Largest message, bytes: a record or frame of 16 KiB with its header.
 const MESSAGE: usize = 17 << 10;
-/// Bytes that each session takes to read into.
+/// Size of each session's read buffer, bytes.
 const READ_BUFFER: usize = 16 << 10;
 
 /// Whether a request asks for a WebSocket.
@@ -26,8 +26,8 @@ pub(crate) fn is_upgrade(headers: &HeaderMap) -> bool {
     upgrade.is_some_and(|value| value.eq_ignore_ascii_case("websocket"))
 }
 
-/// Answers a request for a WebSocket that has passed the check of hosts and origins, and serves its
-/// session.
+/// Answers a request for a WebSocket and serves its session. The request must have passed the check
+/// of hosts and origins.
 pub(crate) async fn upgrade(mut request: Request, peer: Peer, backend: Backend) -> Response {
     let Some(protocol) = protocol(request.headers()) else {
         return refuse(StatusCode::BAD_REQUEST, "no protocol in common");
@@ -84,7 +84,8 @@ async fn session(
     let mut upgraded = qmux::ws::Upgraded::new(socket)
         .with_alpn(&protocol)
         .with_session_config(config)
-        // A peer that vanishes sends no end, which QUIC's idle timeout would notice.
+        // A peer that vanishes sends no end. QUIC has an idle timeout for this; here keep-alives
+        // detect it.
         .with_keep_alive(qmux::ws::KeepAlive::default());
     if let Some(stats) = peer.stats {
         upgraded = upgraded.with_socket_stats(stats);
@@ -92,8 +93,8 @@ async fn session(
     backend.serve(in_order::Session::new(upgraded.accept(), taken), admitted).await
 }
 
-/// The first protocol of ours that the client offers: a MoQ version, by the framing it rides on.
-/// Other than moq-lite, MoQ rides on the newer framing only.
+/// The first of the server's protocols that the client offers: a MoQ version with a framing.
+/// Versions other than moq-lite use the newer framing only.
 fn protocol(headers: &HeaderMap) -> Option<String> {
     let offers = headers.get_all(header::SEC_WEBSOCKET_PROTOCOL).iter();
     let offers: Vec<&str> = offers
