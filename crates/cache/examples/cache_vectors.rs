@@ -306,7 +306,7 @@ fn saved() -> Value {
         let scene = server.catalog.scene.clone();
         let field = server.volume.clone().into();
         let info = UpdateInfo { time: 2.5, ..UpdateInfo::default() };
-        let file = LightFile::of_fields(Epoch(0), scene, 1.0, "baked", [&field], info);
+        let file = LightFile::of_fields(scene, "baked", [&field], info);
         steps.push(0.0, json!({ "load": hex(&file.write()) }));
         steps.push(0.0, json!({ "shows": { "fields": [], "age": null } }));
         steps.shows_all(0.0, 4.0);

@@ -478,9 +478,7 @@ fn a_saved_field_shows_until_a_server_s_light_comes() {
     server.shine(4.0);
     let scene = server.catalog.scene.clone();
     let file = LightFile::of_fields(
-        Epoch(9),
         scene,
-        TICK,
         "",
         [&server.volume.clone().into()],
         UpdateInfo::default(),

@@ -58,10 +58,10 @@ impl Bake {
         let options = self.gather.options(BlendSettings::default(), self.gather.reading.baked());
         let bar = output::share_bar("Computing light");
         let effort = self.effort.with(self.samples);
-        let baked =
-            lumencast_solve::bake(&snapshot, &volumes, &mut *gatherer, effort, options, |done| {
-                light_source::show(&bar, done);
-            });
+        let wanted = lumencast_solve::Bake { scene: &snapshot, volumes: &volumes, effort, options };
+        let baked = lumencast_solve::bake(wanted, &mut *gatherer, |done| {
+            light_source::show(&bar, done);
+        });
         bar.finish_and_clear();
         let Baked { fields, samples, noise } = baked?;
 
@@ -72,7 +72,7 @@ impl Bake {
             ..UpdateInfo::default()
         };
         let source = format!("{}, baked, {samples} samples", source(&options));
-        let mut file = LightFile::of_fields(Epoch(0), info, 1.0, &source, &fields, at);
+        let mut file = LightFile::of_fields(info, &source, &fields, at);
         file.edits = scene.edits_since_load();
         file.files = named_files(&scene)?;
         let bytes = file.write();

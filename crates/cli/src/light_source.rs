@@ -10,7 +10,7 @@ use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::Field;
 use lumencast_scene::{Edit, Scene, Snapshot, VolumeSpec};
 use lumencast_solve::blend::BlendSettings;
-use lumencast_solve::{Baked, Done, Effort};
+use lumencast_solve::{Bake, Baked, Done, Effort, bake};
 
 use crate::arguments::Reading;
 use crate::output::{self, tell};
@@ -94,9 +94,8 @@ impl Computed {
     ) -> Result<Baked> {
         let gather = self.reading.gathered(self.bounces, self.clamp, BlendSettings::default());
         let bar = output::share_bar("Computing light");
-        let light = lumencast_solve::bake(scene, volumes, tracer, self.effort, gather, |done| {
-            show(&bar, done);
-        });
+        let wanted = Bake { scene, volumes, effort: self.effort, options: gather };
+        let light = bake(wanted, tracer, |done| show(&bar, done));
         bar.finish_and_clear();
         Ok(light?)
     }

@@ -62,9 +62,7 @@ impl LightFile {
     /// Encodes fields; `source` says what computed them ([`crate::FieldInfo::source`]), `info` when and from
     /// which scene (its `update` becomes 0).
     pub fn of_fields<'a>(
-        epoch: Epoch,
         scene: SceneInfo,
-        tick_seconds: f64,
         source: &str,
         fields: impl IntoIterator<Item = &'a Field>,
         info: UpdateInfo,
@@ -82,6 +80,8 @@ impl LightFile {
                 bytes: frame.bytes,
             }));
         }
+        // No server runs, and nothing ticks.
+        let (epoch, tick_seconds) = (Epoch(0), 1.0);
         let catalog = Catalog { epoch, scene, tick_seconds, fields: infos, unknown: Vec::new() };
         Self { catalog, edits: Vec::new(), files: Vec::new(), frames }
     }
@@ -240,8 +240,7 @@ mod tests {
             .collect();
         let scene = SceneInfo { name: "a".into(), root: "a.glb".into() };
         let fields: Vec<Field> = volumes.iter().cloned().map(Field::from).collect();
-        let file =
-            LightFile::of_fields(Epoch(1), scene, 0.04, "a test", &fields, UpdateInfo::default());
+        let file = LightFile::of_fields(scene, "a test", &fields, UpdateInfo::default());
         (volumes, file)
     }
 

@@ -269,9 +269,7 @@ fn no_bytes_make_a_decoder_panic() {
         decoder.decode(&frames[u as usize]).unwrap();
     }
     let file = LightFile::of_fields(
-        lumencast_codec::Epoch(1),
         lumencast_codec::SceneInfo { name: "a".into(), root: "b".into() },
-        0.04,
         "a test",
         [&volume.clone().into()],
         UpdateInfo::default(),

@@ -11,7 +11,7 @@ use lumencast_codec::{
 use lumencast_gather::Gather;
 use lumencast_light::{FieldId, Light};
 use lumencast_scene::{Edit, FileRead, Scene, Script, Snapshot, VolumeSpec};
-use lumencast_solve::{FitEffort, GatherOptions, Solver, volumes};
+use lumencast_solve::{FitEffort, GatherOptions, Solver, Turn, volumes};
 
 use crate::error::ServerError;
 use crate::gathering::{Brought, Gathering, Patience};
@@ -370,9 +370,9 @@ impl Tick {
         light.extend(more);
 
         let previous = self.options.feedback.then(|| Arc::new(self.light().clone()));
-        let (samples, pass) = (self.budget.samples(), self.number);
+        let turn = Turn { previous, samples: self.budget.samples(), pass: self.number };
         for id in self.idle() {
-            if let Some(job) = self.solver.job(id, scene, previous.clone(), samples, pass) {
+            if let Some(job) = self.solver.job(id, scene, turn.clone()) {
                 self.looked.retain(|looked| *looked != id);
                 self.gathering.submit(job, moment);
             }

@@ -8,7 +8,7 @@ use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Field, ProbeVolume};
 use lumencast_scene::{Edit, LightSpec, NodeId, Scene, Transform, VolumeSpec};
 use lumencast_server::{Mail, Outlet, Received, SampleRange, Tick, TickOptions};
-use lumencast_solve::{Effort, FitOptions, GatherOptions, bake};
+use lumencast_solve::{Bake, Effort, FitOptions, GatherOptions, bake};
 
 const FIT: FitOptions = FitOptions { points: 16 };
 
@@ -45,7 +45,9 @@ fn gather(fit: Option<FitOptions>) -> GatherOptions {
 fn baked(scene: &mut Scene, fit: Option<FitOptions>) -> ProbeVolume {
     let snapshot: Arc<_> = scene.snapshot();
     let effort = Effort::of_samples(4096);
-    let light = bake(&snapshot, &volumes(), &mut tracer(), effort, gather(fit), |_| ());
+    let (volumes, options) = (volumes(), gather(fit));
+    let wanted = Bake { scene: &snapshot, volumes: &volumes, effort, options };
+    let light = bake(wanted, &mut tracer(), |_| ());
     let Field::Volume(volume) = light.expect("a volume").fields.remove(0);
     volume
 }

@@ -8,7 +8,7 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use lumencast_gather::Gather;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_scene::Scene;
-use lumencast_solve::{Asked, FitEffort, FitOptions, GatherOptions, Request, Solver};
+use lumencast_solve::{Asked, FitEffort, FitOptions, GatherOptions, Request, Solver, Turn};
 
 /// What a server's tick does.
 const EFFORT: FitEffort = FitEffort { rounds: 1, steps: 4 };
@@ -33,7 +33,8 @@ fn solver(fit: Option<FitOptions>) -> (Solver, Vec<(Asked, lumencast_gather::Gat
     for (asked, found) in gather(looks) {
         solver.take(&asked, &found);
     }
-    let jobs = ids.iter().filter_map(|id| solver.job(*id, &snapshot, None, SAMPLES, 0)).collect();
+    let turn = Turn { previous: None, samples: SAMPLES, pass: 0 };
+    let jobs = ids.iter().filter_map(|id| solver.job(*id, &snapshot, turn.clone())).collect();
     let brought = gather(jobs);
     (solver, brought)
 }

@@ -13,7 +13,7 @@ use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Grid, Light, Offset, Order};
 use lumencast_scene::{LightKind, Material, PunctualLight, Snapshot, VolumeSpec};
 use lumencast_solve::blend::BlendSettings;
-use lumencast_solve::{Effort, FitOptions, GatherOptions, bake};
+use lumencast_solve::{Bake, Effort, FitOptions, GatherOptions, bake};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 /// Sides of each of the two rooms, metres.
@@ -65,7 +65,8 @@ fn main() {
             let blend = BlendSettings::default();
             let options = GatherOptions { blend, fit, offset, ..GatherOptions::default() };
             let effort = Effort::of_samples(16_384);
-            let baked = bake(&scene, &[volume], tracer, effort, options, |_| ()).expect("light");
+            let wanted = Bake { scene: &scene, volumes: &[volume], effort, options };
+            let baked = bake(wanted, tracer, |_| ()).expect("light");
             let light = Light::new(baked.fields);
             100.0 * floor(&light, wall, 1.0) / floor(&light, wall, -1.0)
         };

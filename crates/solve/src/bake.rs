@@ -11,7 +11,7 @@ use crate::blend::BlendSettings;
 use crate::error::SolveError;
 use crate::noise;
 use crate::options::GatherOptions;
-use crate::request::Request;
+use crate::request::{Request, Turn};
 use crate::solver::{FitEffort, Solver};
 
 /// Samples of a probe in one job: enough to spread directions well, few enough to show progress.
@@ -67,9 +67,21 @@ pub struct Baked {
     pub noise: Option<f32>,
 }
 
-/// Gathers light for every probe of `volumes`, and as many samples for the surfaces about it where
-/// probes are fitted, and averages it; `options.blend` plays no part. `progress` is told after every
-/// pass how far it is.
+/// Light to compute once.
+#[derive(Clone, Copy, Debug)]
+pub struct Bake<'a> {
+    /// The scene.
+    pub scene: &'a Arc<Snapshot>,
+    /// Where probes are to be.
+    pub volumes: &'a [VolumeSpec],
+    /// How long it is computed.
+    pub effort: Effort,
+    /// How light is gathered; `blend` plays no part.
+    pub options: GatherOptions,
+}
+
+/// Gathers light for every probe, and as many samples for the surfaces about it where probes are
+/// fitted, and averages it. `progress` is told after every pass how far it is.
 ///
 /// The noise falls with the root of the samples. It is known from a half of them: as the mean of two
 /// independent halves differs from either by half of what they differ by, what is fitted to one half
@@ -78,13 +90,11 @@ pub struct Baked {
 /// # Errors
 /// A volume that makes no sense: nothing is gathered then. A gatherer that gave up.
 pub fn bake(
-    scene: &Arc<Snapshot>,
-    volumes: &[VolumeSpec],
+    wanted: Bake<'_>,
     gatherer: &mut dyn Gather,
-    effort: Effort,
-    options: GatherOptions,
     mut progress: impl FnMut(Done),
 ) -> Result<Baked, SolveError> {
+    let Bake { scene, volumes, effort, options } = wanted;
     let mean = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
     let mut all = Solver::new(volumes, GatherOptions { blend: mean, ..options })?;
     let ids: Vec<FieldId> = all.ids().collect();
@@ -103,9 +113,8 @@ pub fn bake(
     while samples < most {
         let now = SAMPLES_A_PASS.min(most - samples);
         for id in &ids {
-            let Some(Request { job, asked }) = all.job(*id, scene, None, now, pass) else {
-                continue;
-            };
+            let turn = Turn { previous: None, samples: now, pass };
+            let Some(Request { job, asked }) = all.job(*id, scene, turn) else { continue };
             let ticket = gatherer.submit(job);
             let gathered = gatherer.wait(ticket).ok_or(SolveError::Gather)?;
             all.take(&asked, &gathered);

@@ -8,13 +8,14 @@
 //! use lumencast_gather::path_trace::{CpuPathTracer, Options};
 //! use lumencast_light::Light;
 //! use lumencast_scene::Scene;
-//! use lumencast_solve::{Effort, GatherOptions, bake, volumes};
+//! use lumencast_solve::{Bake, Effort, GatherOptions, bake, volumes};
 //!
 //! let mut scene = Scene::open("cornell")?;
 //! let mut tracer = CpuPathTracer::new(Options::default())?;
 //! let volumes = volumes(&mut scene, &mut tracer)?;
 //! let (effort, options) = (Effort::of_samples(1024), GatherOptions::default());
-//! let baked = bake(&scene.snapshot(), &volumes, &mut tracer, effort, options, |_| ())?;
+//! let wanted = Bake { scene: &scene.snapshot(), volumes: &volumes, effort, options };
+//! let baked = bake(wanted, &mut tracer, |_| ())?;
 //! let light = Light::new(baked.fields);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -36,9 +37,9 @@ mod surfaces;
 mod volume;
 mod walls;
 
-pub use bake::{Baked, Done, Effort, bake};
+pub use bake::{Bake, Baked, Done, Effort, bake};
 pub use error::SolveError;
 pub use options::{FitOptions, GatherOptions};
 pub use placement::{Survey, default_volume, survey, volumes};
-pub use request::{Asked, Request};
+pub use request::{Asked, Request, Turn};
 pub use solver::{FitEffort, Solver};

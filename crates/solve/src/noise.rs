@@ -1,7 +1,7 @@
 //! How noisy light is, as it is shown.
 
 use glam::Vec3;
-use lumencast_light::Light;
+use lumencast_light::{Light, Place};
 
 use crate::solver::Solver;
 
@@ -18,7 +18,7 @@ pub(crate) fn shown(one: &Solver, other: &Solver) -> f32 {
     let step = places.len().div_ceil(PLACES).max(1);
     let read = |light: &Light| -> Vec<Vec3> {
         let irradiance =
-            |&(at, normal): &(Vec3, Vec3)| light.irradiance(at, normal).max(Vec3::ZERO);
+            |place: &Place| light.irradiance(place.position, place.normal).max(Vec3::ZERO);
         places.iter().step_by(step).map(irradiance).collect()
     };
     let [one, other] = [one, other].map(|solver| read(solver.light()));

@@ -1,7 +1,9 @@
 //! What a solver asks a gatherer for.
 
+use std::sync::Arc;
+
 use lumencast_gather::{Budget, Job};
-use lumencast_light::FieldId;
+use lumencast_light::{FieldId, Light};
 
 /// A job for a gatherer. Its sums go back to the solver with what was asked.
 #[derive(Clone, Debug)]
@@ -10,6 +12,17 @@ pub struct Request {
     pub job: Job,
     /// What the sums will belong to.
     pub asked: Asked,
+}
+
+/// What a job is for.
+#[derive(Clone, Debug)]
+pub struct Turn {
+    /// The light of before, for paths to go on in ([`Job::previous`]).
+    pub previous: Option<Arc<Light>>,
+    /// Samples a receiver.
+    pub samples: u32,
+    /// Gives other directions each time.
+    pub pass: u64,
 }
 
 /// What sums belong to.

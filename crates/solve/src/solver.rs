@@ -2,15 +2,14 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
-use lumencast_gather::Gathered;
-use lumencast_light::{Field, FieldId, Light};
+use lumencast_gather::{Gathered, Job};
+use lumencast_light::{Field, FieldId, Light, Place};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::SolveError;
 use crate::fit::{FitSettings, Part, fit};
 use crate::options::GatherOptions;
-use crate::request::{Asked, Request, What};
+use crate::request::{Asked, Request, Turn, What};
 use crate::surfaces::Surfaces;
 use crate::volume::VolumeSolver;
 
@@ -118,22 +117,15 @@ impl Solver {
         Some(Request { job, asked: Asked { field, what: What::Surfaces } })
     }
 
-    /// What to gather for a field, `samples` a probe; nothing where there is none of this number. `pass`
-    /// gives other directions each time.
-    pub fn job(
-        &mut self,
-        field: FieldId,
-        scene: &Arc<Snapshot>,
-        previous: Option<Arc<Light>>,
-        samples: u32,
-        pass: u64,
-    ) -> Option<Request> {
-        let options = self.options;
+    /// What to gather for a field; nothing where there is none of this number.
+    pub fn job(&mut self, field: FieldId, scene: &Arc<Snapshot>, turn: Turn) -> Option<Request> {
+        let GatherOptions { bounces, clamp, .. } = self.options;
         // Numbers of fields beyond a byte stand above those of passes.
         let (low, high) = (u64::from(field.0 & 0xff), u64::from(field.0 >> 8));
-        let seed = (pass << 8 | low) ^ (high << 40);
+        let seed = (turn.pass << 8 | low) ^ (high << 40);
         let volume = self.volume_mut(field)?;
-        let job = volume.job(scene.clone(), previous, samples, &options, seed);
+        let job = volume.job(scene.clone(), turn.samples);
+        let job = Job { previous: turn.previous, bounces, clamp, seed, ..job };
         let what = What::Light { budgets: job.budgets.clone(), probes: volume.probe_count() };
         Some(Request { job, asked: Asked { field, what } })
     }
@@ -184,7 +176,7 @@ impl Solver {
     }
 
     /// Where light matters: see [`VolumeSolver::places`].
-    pub(crate) fn places(&self) -> Vec<(Vec3, Vec3)> {
+    pub(crate) fn places(&self) -> Vec<Place> {
         self.volumes().flat_map(VolumeSolver::places).collect()
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{IVec3, Vec3};
 use lumencast_gather::{Budget, Job, Receiver, Sums, SumsAt, SurfacePoint};
-use lumencast_light::Grid;
+use lumencast_light::{Grid, Place};
 use lumencast_scene::Snapshot;
 
 use crate::blend::{BlendSettings, History};
@@ -128,11 +128,11 @@ impl Surfaces {
     /// The points that count, with their normals: those that probes see, where there are any, and else
     /// those that are seen from about the volume. The outsides of a closed room, as dark as they may be,
     /// are nobody's business.
-    pub(crate) fn places(&self) -> Vec<(Vec3, Vec3)> {
-        let counting = |points: Range<usize>| -> Vec<(Vec3, Vec3)> {
+    pub(crate) fn places(&self) -> Vec<Place> {
+        let counting = |points: Range<usize>| -> Vec<Place> {
             let points = points.filter(|number| self.around.counts(*number));
             let places = points.filter_map(|number| self.around.points()[number]);
-            places.map(|at| (at.position, at.normal)).collect()
+            places.map(|at| Place::on_surface(at.position, at.normal)).collect()
         };
         let all = self.around.points().len();
         let own = (self.probes * self.points_a_lookout as usize).min(all);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use lumencast_gather::{Budget, Gathered, Job, Receiver};
-use lumencast_light::{FieldId, Light, ProbeVolume};
+use lumencast_light::{FieldId, Place, ProbeVolume};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::blend::History;
@@ -66,13 +66,13 @@ impl VolumeSolver {
 
     /// Where its light matters: points of the surfaces that it knows, with their normals, or all
     /// directions along the axes at probes that are not inside walls.
-    pub(crate) fn places(&self) -> Vec<(Vec3, Vec3)> {
+    pub(crate) fn places(&self) -> Vec<Place> {
         if let Some(surfaces) = &self.surfaces {
             return surfaces.places();
         }
         let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
         let open = self.arriving.grid.positions().zip(self.buried.open()).filter(|(_, open)| *open);
-        open.flat_map(|(position, _)| axes.map(|axis| (position, axis))).collect()
+        open.flat_map(|(position, _)| axes.map(|axis| Place::on_surface(position, axis))).collect()
     }
 
     /// What to ask for so that it knows of the surfaces: only where probes are fitted, and the scene is
@@ -92,23 +92,14 @@ impl VolumeSolver {
     }
 
     /// What to gather for every probe and, where they are fitted, for the surfaces about them.
-    pub(crate) fn job(
-        &mut self,
-        scene: Arc<Snapshot>,
-        previous: Option<Arc<Light>>,
-        samples: u32,
-        options: &GatherOptions,
-        seed: u64,
-    ) -> Job {
+    pub(crate) fn job(&mut self, scene: Arc<Snapshot>, samples: u32) -> Job {
         let probes = self.probe_count() as u32;
         let at_probes = (0..probes).map(|receiver| Budget { receiver, samples });
         let at_points = self.surfaces.iter_mut().flat_map(|surfaces| surfaces.budgets(samples));
         let at_points = at_points.map(|b| Budget { receiver: probes + b.receiver, ..b });
         let budgets = at_probes.chain(at_points).collect();
-        let GatherOptions { bounces, clamp, .. } = *options;
-        let (order, receivers) = (self.arriving.order, self.receivers.clone());
-        let job = Job::with_budgets(scene, receivers, budgets);
-        Job { previous, order, bounces, clamp, seed, ..job }
+        let job = Job::with_budgets(scene, self.receivers.clone(), budgets);
+        Job { order: self.arriving.order, ..job }
     }
 
     /// The scene was edited: light may be another from now on.

@@ -6,7 +6,7 @@ use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Field, Grid, Order};
 use lumencast_scene::{Environment, Material, Scene, VolumeSpec};
-use lumencast_solve::{Done, Effort, FitOptions, GatherOptions, bake};
+use lumencast_solve::{Bake, Done, Effort, FitOptions, GatherOptions, bake};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 const FIT: FitOptions = FitOptions { points: 16 };
@@ -37,8 +37,9 @@ fn baking_ends_by_its_noise() {
     for fit in [None, Some(FIT)] {
         let light = |effort: Effort, told: &mut Vec<Done>| {
             let progress = |done| told.push(done);
-            bake(&snapshot, &volumes(), &mut tracer(), effort, gather(fit), progress)
-                .expect("light")
+            let (volumes, options) = (volumes(), gather(fit));
+            let wanted = Bake { scene: &snapshot, volumes: &volumes, effort, options };
+            bake(wanted, &mut tracer(), progress).expect("light")
         };
         let mut told = Vec::new();
         let rough = light(Effort { samples: 1 << 20, noise: Some(4.0) }, &mut told);
@@ -51,9 +52,9 @@ fn baking_ends_by_its_noise() {
         let ratio = noise(1024) / noise(16_384);
         assert!(ratio > 2.0, "16 times the samples, a quarter of the noise at most: {ratio}");
     }
-    let off =
-        bake(&snapshot, &volumes(), &mut tracer(), Effort::of_samples(300), gather(None), |_| ())
-            .expect("light");
+    let (volumes, effort, options) = (volumes(), Effort::of_samples(300), gather(None));
+    let wanted = Bake { scene: &snapshot, volumes: &volumes, effort, options };
+    let off = bake(wanted, &mut tracer(), |_| ()).expect("light");
     assert_eq!((off.samples, off.noise), (300, None));
 }
 
@@ -70,8 +71,9 @@ fn what_stands_on_the_border_is_lit_from_outside() {
         let (size, resolution) = (Vec3::splat(2.0), UVec3::splat(4));
         let grid = Grid { center: Vec3::ZERO, rotation: Quat::IDENTITY, size, resolution };
         let volume = VolumeSpec { grid, order: Order::L2 };
-        let (effort, gather) = (Effort::of_samples(1024), gather(Some(FIT)));
-        let light = bake(&stage.snapshot(), &[volume], &mut tracer(), effort, gather, |_| ());
+        let (effort, options) = (Effort::of_samples(1024), gather(Some(FIT)));
+        let wanted = Bake { scene: &stage.snapshot(), volumes: &[volume], effort, options };
+        let light = bake(wanted, &mut tracer(), |_| ());
         let Field::Volume(light) = light.expect("a volume").fields.remove(0);
         for normal in Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
             let (u, v) = normal.any_orthonormal_pair();

@@ -13,7 +13,7 @@ use lumencast_scene::{
     Environment, LightKind, Material, PunctualLight, Scene, Snapshot, View, VolumeSpec,
 };
 use lumencast_shade::{Materials, Settings, Shading, Shadows};
-use lumencast_solve::{Effort, GatherOptions, bake};
+use lumencast_solve::{Bake, Effort, GatherOptions, bake};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 /// Mean FLIP that adapters may differ by: rounding, and samples at other places.
@@ -88,7 +88,8 @@ fn cornell() -> Drawn {
     let snapshot = scene.snapshot();
     let options = GatherOptions::default();
     let effort = Effort::of_samples(1024);
-    let light = bake(&snapshot, &[volume], &mut tracer, effort, options, |_| ()).unwrap();
+    let wanted = Bake { scene: &snapshot, volumes: &[volume], effort, options };
+    let light = bake(wanted, &mut tracer, |_| ()).unwrap();
     Drawn { scene: snapshot, light: Light::new(light.fields), view, exposure: 2.0 }
 }
 

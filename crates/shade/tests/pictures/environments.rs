@@ -10,7 +10,7 @@ use lumencast_gather::reference::Parts;
 use lumencast_light::{Grid, Light, Order};
 use lumencast_scene::{Environment, HdrImage, Projection, Snapshot, View, VolumeSpec};
 use lumencast_shade::{Lighting, Settings};
-use lumencast_solve::{Effort, GatherOptions, bake};
+use lumencast_solve::{Bake, Effort, GatherOptions, bake};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 /// A turn that is no symmetry of the picture.
@@ -118,7 +118,9 @@ fn light_is_turned_as_the_tracers() {
         let mut tracer = CpuPathTracer::new(Options::default()).unwrap();
         let alone = scene(environment, false);
         let effort = Effort::of_samples(16_384);
-        let light = bake(&alone, &[volume], &mut tracer, effort, GatherOptions::default(), |_| ());
+        let options = GatherOptions::default();
+        let wanted = Bake { scene: &alone, volumes: &[volume], effort, options };
+        let light = bake(wanted, &mut tracer, |_| ());
         let scene = scene(alone.environment.clone(), true);
         let mut renderer = renderer(&scene, &settings);
         renderer.set_light(&Light::new(light.unwrap().fields)).unwrap();
