@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
+use lumencast_light::{OnTriangle, SurfaceId};
 use lumencast_scene::{AlphaMode, Instance, Material, PlacedLight, Snapshot};
 
 use crate::accel::{
@@ -258,6 +259,14 @@ impl World {
     pub(crate) fn material(&self, instance: u32, primitive: u32) -> &Material {
         let id = self.part(instance, primitive).material as usize;
         self.snapshot.materials.get(id).unwrap_or(&self.fallback)
+    }
+
+    /// Which point of the scene a hit is, on the front or the back by winding.
+    pub(crate) fn on_triangle(&self, hit: &Hit, back: bool) -> OnTriangle {
+        let Instance { node, copy, .. } = *self.instance(hit.instance);
+        let (triangle, weights) = (hit.triangle, hit.weights());
+        let surface = SurfaceId { node: node.0, copy, primitive: hit.primitive, back };
+        OnTriangle { surface, triangle, weights }
     }
 
     fn instance(&self, index: u32) -> &Instance {

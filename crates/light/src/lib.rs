@@ -10,6 +10,7 @@
 mod field;
 mod field_id;
 mod light;
+mod lightmap;
 mod luminance;
 mod place;
 mod scale;
@@ -20,6 +21,7 @@ pub mod zh;
 pub use field::Field;
 pub use field_id::FieldId;
 pub use light::Light;
+pub use lightmap::{ChartVertex, Charts, Layout, Lightmap, Rectangle, Surface, SurfaceId};
 pub use luminance::luminance;
 pub use place::{OnTriangle, Place};
 pub use scale::ScaleRule;

@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use crate::lightmap::SurfaceId;
+
 /// A place that light is asked for at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {
@@ -16,10 +18,8 @@ pub struct Place {
 /// A point of a triangle of the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OnTriangle {
-    /// Index into the snapshot's instances.
-    pub instance: u32,
-    /// Index into the mesh's primitives.
-    pub primitive: u32,
+    /// The surface that it is a part of, on the side that is asked for.
+    pub surface: SurfaceId,
     /// Index into the primitive's triangles.
     pub triangle: u32,
     /// Barycentric weights of its vertices; together 1.

@@ -32,6 +32,9 @@ pub(crate) const PROBES: u64 = 65_536;
 pub(crate) const VOLUME_DEPTH: u32 = 34;
 /// Number of volumes of a scene.
 pub(crate) const VOLUMES: usize = 64;
+/// Number of lumels along a page's side: below, there is no room for padding; above, devices have no
+/// such textures.
+pub(crate) const PAGE_SIZES: std::ops::RangeInclusive<u32> = 64..=4096;
 /// Largest radiance (cd/m²), luminous intensity (cd) and illuminance (lx); the sun's disc has 2·10⁹
 /// cd/m².
 pub(crate) const LIGHT: f32 = 1e12;

@@ -1,4 +1,4 @@
-//! Settings of a scene for Lumencast: its environment and its probe volumes.
+//! Settings of a scene for Lumencast: its environment, its probe volumes, and how densely lumels lie.
 //!
 //! They are `extras.lumencast` of the glTF's scene, or a TOML file beside it named
 //! `<stem>.lumencast.toml`. The file has precedence:
@@ -15,6 +15,9 @@
 //! size = [2.0, 2.0, 2.0]
 //! resolution = [8, 8, 8]
 //! order = 2
+//!
+//! [lightmap]
+//! texel = 0.1
 //! ```
 
 use std::path::{Path, PathBuf};
@@ -23,6 +26,7 @@ use serde::Deserialize;
 
 use crate::error::{At, Fault, invalid};
 use crate::gltf::source::read_file;
+use crate::lightmap::LightmapSpec;
 use crate::limits;
 use crate::volume::VolumeSpec;
 use crate::{Environment, SceneError};
@@ -34,6 +38,7 @@ pub(crate) struct Settings {
     pub(crate) environment: Option<Environment>,
     #[serde(rename = "volumes", alias = "volume")]
     pub(crate) volumes: Vec<VolumeSpec>,
+    pub(crate) lightmap: Option<LightmapSpec>,
 }
 
 impl Settings {
@@ -43,6 +48,9 @@ impl Settings {
         }
         if self.volumes.len() > limits::VOLUMES {
             return Err(Fault::TooLarge { what: "volumes".into(), limit: limits::VOLUMES as u64 });
+        }
+        if let Some(lightmap) = &self.lightmap {
+            lightmap.check().map_err(invalid).at(|| "lightmap".into())?;
         }
         for (index, volume) in self.volumes.iter().enumerate() {
             volume.check().map_err(invalid).at(|| format!("volume {index}"))?;

@@ -34,6 +34,11 @@ pub struct Instance {
     /// The node that carries it. The instances of one node (EXT_mesh_gpu_instancing) share the node
     /// and its deformation.
     pub node: NodeId,
+    /// Number among the node's instances; 0 where the node has no list of them.
+    pub copy: u32,
+    /// Whether only edits change the instance: nothing deforms it, and no animation moves it or a
+    /// node above it, not even a paused one.
+    pub still: bool,
     /// Id of the mesh. Equal ids have equal `mesh` pointers, so acceleration structures can be
     /// kept.
     pub mesh_id: MeshId,

@@ -81,7 +81,16 @@ impl Stage {
         world_from_object: Affine3A,
     ) -> &mut Self {
         let node = NodeId(self.instances.len() as u32);
-        self.instances.push(Instance { node, mesh_id, mesh, deformation: None, world_from_object });
+        let (copy, still, deformation) = (0, true, None);
+        self.instances.push(Instance {
+            node,
+            copy,
+            still,
+            mesh_id,
+            mesh,
+            deformation,
+            world_from_object,
+        });
         self
     }
 

@@ -4,7 +4,7 @@
 //! vertex by vertex. Then a vectorised loop over the group computes it.
 
 use glam::Vec3;
-use lumencast_light::{Light, OnTriangle, Place};
+use lumencast_light::{Light, Place};
 
 use super::beam::{Found, Lit};
 use super::columns::{Columns, GROUP};
@@ -490,9 +490,12 @@ impl Shader<'_, '_> {
             }
             let vertices = &self.group.vertices;
             let normal = Vec3::from(vertices.normals.get(vertex));
-            let side = normal * 1.0f32.copysign(normal.dot(direction));
-            let at = vertices.place(vertex).position + self.world.origin();
-            let place = Place { position: at, normal: side, on: Some(on_triangle(&hit)) };
+            let leaves = normal.dot(direction) >= 0.0;
+            let side = if leaves { normal } else { -normal };
+            let met = vertices.place(vertex);
+            let at = met.position + self.world.origin();
+            let on = self.world.on_triangle(&hit, leaves != met.is_front());
+            let place = Place { position: at, normal: side, on: Some(on) };
             let Some(arriving) = light.sample(&place) else { continue };
             let path = &self.paths[index as usize];
             let scattered = path.throughput * (weight * arriving.radiance(direction));
@@ -545,12 +548,6 @@ impl Shader<'_, '_> {
             light * (self.limits.clamp / y)
         }
     }
-}
-
-/// The place of a hit on the scene's triangles.
-fn on_triangle(hit: &Hit) -> OnTriangle {
-    let Hit { instance, primitive, triangle, .. } = *hit;
-    OnTriangle { instance, primitive, triangle, weights: hit.weights() }
 }
 
 #[cfg(test)]

@@ -62,7 +62,7 @@ pub(super) fn glb() -> Vec<u8> {
     let volume = json!({
         "center": [0.0, 1.0, 0.0], "size": [2.0, 2.0, 2.0], "resolution": [8, 8, 8], "order": 2,
     });
-    w.finish(json!({ "lumencast": { "volumes": [volume] } }))
+    w.finish(json!({ "lumencast": { "volumes": [volume], "lightmap": { "size": 256 } } }))
 }
 
 /// Position of the sphere on its path, for `round` from 0 to 1.

@@ -52,7 +52,7 @@ pub(super) fn glb() -> Vec<u8> {
         })
     };
     let volumes = [volume(-DEPTH / 2.0), volume(DEPTH / 2.0)];
-    w.finish(json!({ "lumencast": { "volumes": volumes } }))
+    w.finish(json!({ "lumencast": { "volumes": volumes, "lightmap": { "size": 512 } } }))
 }
 
 fn placed(name: &str, mesh: usize, at: Vec3, turned: Quat) -> Value {

@@ -69,7 +69,7 @@ pub(super) fn glb() -> Vec<u8> {
         "size": [2.0 * HALF.x, HEIGHT, 2.0 * HALF.z],
         "resolution": [10, 5, 12], "order": 2,
     });
-    w.finish(json!({ "lumencast": { "volumes": [volume] } }))
+    w.finish(json!({ "lumencast": { "volumes": [volume], "lightmap": { "size": 1024 } } }))
 }
 
 /// The rotation that turns −Z at one point towards another.

@@ -1,6 +1,6 @@
 //! Captures the scene at one moment, flattened to instances and lights.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use glam::{Affine3A, DAffine3, Mat3A, Vec3, Vec3A};
@@ -59,8 +59,18 @@ impl Scene {
 
     pub(super) fn instances(&self, deformations: &mut Deformations) -> Vec<Instance> {
         let mut instances = Vec::new();
+        let mut moving = BTreeSet::new();
         for (id, node, place) in self.nodes.shown() {
-            let of_place = |place| self.instance(id, node, &place, deformations);
+            // Parents come first.
+            if node.animated || node.parent.is_some_and(|parent| moving.contains(&parent)) {
+                moving.insert(id);
+            }
+            let still = !moving.contains(&id);
+            let of_place = |place| {
+                let mut instance = self.instance(id, node, place, deformations)?;
+                instance.still &= still;
+                Some(instance)
+            };
             instances.extend(node.places(&place).filter_map(of_place));
         }
         instances
@@ -71,13 +81,13 @@ impl Scene {
         &self,
         id: NodeId,
         node: &Node,
-        place: &DAffine3,
+        (copy, place): (u32, DAffine3),
         deformations: &mut Deformations,
     ) -> Option<Instance> {
         let mesh_id = node.mesh?;
         let mesh = self.meshes.get(mesh_id.0 as usize).filter(|m| m.triangle_count() > 0)?.clone();
         let origin = DAffine3::from_translation(mesh.origin.as_dvec3());
-        let world_from_node = (*place * origin).as_affine3a();
+        let world_from_node = (place * origin).as_affine3a();
         let world_from_rest =
             node.skin.as_ref().map(|skin| self.world_from_rest(skin, world_from_node));
         if let Some(joints) = &world_from_rest {
@@ -102,7 +112,8 @@ impl Scene {
             });
             deformations.of(id, &mesh, &node.weights, pose)
         });
-        Some(Instance { node: id, mesh_id, mesh, deformation, world_from_object })
+        let still = deformation.is_none();
+        Some(Instance { node: id, copy, still, mesh_id, mesh, deformation, world_from_object })
     }
 
     fn world_from_rest(&self, placed: &PlacedSkin, world_from_node: Affine3A) -> Vec<Affine3A> {

@@ -1,6 +1,6 @@
 //! Loads scenes from files.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -106,7 +106,7 @@ impl Scene {
     ) -> Self {
         let asset = Arc::new(asset);
         let mut scene = Self::empty(name, folder);
-        let mut said = std::collections::BTreeSet::new();
+        let mut said = BTreeSet::new();
         let warnings = asset.warnings.iter().filter(|warning| said.insert(*warning));
         scene.warnings = warnings.cloned().collect();
         scene.register(file, FoundModel { asset: asset.clone(), taken }, None);
@@ -117,6 +117,7 @@ impl Scene {
         let settings = asset.settings.clone();
         scene.environment = settings.environment.unwrap_or_default();
         scene.volumes = settings.volumes;
+        scene.lightmap = settings.lightmap;
         scene.play();
         scene.choose_origin();
         scene
@@ -136,7 +137,7 @@ impl Scene {
                 Some(skin) => self.lump_of_joints(skin),
             };
             let triangles = mesh.triangle_count();
-            let placed = node.places(&place).map(|place| Lump { triangles, ..lump(place) });
+            let placed = node.places(&place).map(|(_, place)| Lump { triangles, ..lump(place) });
             lumps.extend(placed.filter(|lump| lump.min.is_finite() && lump.max.is_finite()));
         }
         let origin = origin::of_scene(&lumps);
@@ -155,6 +156,7 @@ impl Scene {
             name,
             folder,
             volumes: Vec::new(),
+            lightmap: None,
             warnings: Vec::new(),
             models: Vec::new(),
             library: BTreeMap::new(),
@@ -190,6 +192,7 @@ impl Scene {
         if !settings.volumes.is_empty() {
             self.volumes = settings.volumes;
         }
+        self.lightmap = settings.lightmap.or(self.lightmap);
         Ok(())
     }
 
@@ -247,6 +250,8 @@ impl Scene {
     pub(super) fn place(&mut self, model: usize, first: u32) {
         self.models[model].copies.push(first);
         let Model { asset, first_mesh, .. } = &self.models[model];
+        let channels = asset.animations.iter().flat_map(|animation| &animation.channels);
+        let animated: BTreeSet<u32> = channels.map(|channel| channel.node).collect();
         for (index, json) in (0..).zip(&asset.nodes) {
             let skin = json.skin.map(|skin| asset.skins[skin as usize].clone());
             let node = Node {
@@ -262,6 +267,7 @@ impl Scene {
                 light: json.light,
                 camera: json.camera.map(|camera| (model, camera)),
                 hidden: json.hidden,
+                animated: animated.contains(&index),
                 weights: weights(asset, json),
             };
             self.nodes.insert(NodeId(first + index), node);
@@ -309,6 +315,7 @@ impl Scene {
         // this one.
         scene.environment = scene.with_picture(environment.clone()).unwrap_or(environment);
         scene.volumes.clone_from(&self.volumes);
+        scene.lightmap = self.lightmap;
         scene.nodes.set_origin(self.nodes.origin());
         scene.time = time;
         scene.play();

@@ -26,7 +26,7 @@ use crate::gltf::source::Folder;
 use crate::limits::Taken;
 use crate::trs::Trs;
 use crate::{
-    Aabb, AnimationId, Environment, FileContents, Material, Mesh, MeshId, NamedView, NodeId,
+    Aabb, AnimationId, Environment, FileContents, LightmapSpec, Material, Mesh, MeshId, NamedView, NodeId,
     PunctualLight, Snapshot, Transform, View, VolumeSpec,
 };
 
@@ -37,6 +37,7 @@ pub struct Scene {
     /// The scene's folder; absent for built-in scenes.
     folder: Option<Folder>,
     volumes: Vec<VolumeSpec>,
+    lightmap: Option<LightmapSpec>,
     warnings: Vec<String>,
     /// The scene's own file, then the files that edits have added, in order.
     models: Vec<Model>,
@@ -192,6 +193,11 @@ impl Scene {
     /// The volumes that the scene asks for; empty where it leaves the choice to others.
     pub fn volumes(&self) -> Vec<VolumeSpec> {
         self.volumes.clone()
+    }
+
+    /// How densely lumels lie on the scene's surfaces; absent where the scene leaves that to others.
+    pub fn lightmap(&self) -> Option<LightmapSpec> {
+        self.lightmap
     }
 
     /// The files that clients need to draw the scene, including those that edits have added.

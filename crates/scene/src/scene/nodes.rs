@@ -26,6 +26,8 @@ pub(crate) struct Node {
     pub(crate) camera: Option<(usize, u32)>,
     /// Whether the node and all below it are hidden: neither drawn nor giving light.
     pub(crate) hidden: bool,
+    /// Whether an animation of its file moves it.
+    pub(crate) animated: bool,
     /// Morph weights, one for each target of the mesh.
     pub(crate) weights: Vec<f32>,
 }
@@ -57,13 +59,13 @@ impl Node {
         self.instances.as_ref().map_or(0, |instances| instances.len())
     }
 
-    /// Transforms at which the mesh is shown, given the node's: one, or one for each instance whose
-    /// transform is within the world.
-    pub(crate) fn places(&self, node: &DAffine3) -> impl Iterator<Item = DAffine3> {
-        let once = self.instances.is_none().then_some(*node);
+    /// Numbers and transforms at which the mesh is shown, given the node's: one, or one for each
+    /// instance whose transform is within the world.
+    pub(crate) fn places(&self, node: &DAffine3) -> impl Iterator<Item = (u32, DAffine3)> {
+        let once = self.instances.is_none().then_some((0, *node));
         let instances = self.instances.as_deref().unwrap_or_default();
-        let placed = instances.iter().map(move |place| *node * *place);
-        once.into_iter().chain(placed.filter(|place| is_in_world(&place.as_affine3a())))
+        let placed = (0..).zip(instances).map(move |(copy, place)| (copy, *node * *place));
+        once.into_iter().chain(placed.filter(|(_, place)| is_in_world(&place.as_affine3a())))
     }
 }
 

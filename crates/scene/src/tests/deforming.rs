@@ -91,6 +91,7 @@ fn morph_targets_displace_by_their_weights() {
     scene.advance(0.5);
     let moved = scene.snapshot();
     let instance = &moved.instances[0];
+    assert!(!instance.still, "it deforms");
     assert_eq!(instance.world_from_object.translation.z, 10.0);
     let vertices = instance.vertices(0);
     let want = [Vec3::new(0.5, 0.0, 0.5), Vec3::new(1.0, 0.0, 0.5), Vec3::new(0.0, 1.0, 0.5)];
@@ -200,6 +201,28 @@ fn the_later_animation_of_a_node_wins() {
     scene.apply(&edit).expect("paused");
     scene.advance(0.1);
     assert_eq!(translation(&scene, 0).x, 1.0, "the one that runs moves it");
+}
+
+/// What an animation moves is not still, with all below it, while it runs and while it stands; what
+/// stands beside it is.
+#[test]
+fn what_may_move_is_not_still() {
+    let mut w = triangle();
+    let beside = w.node(json!({ "mesh": 0 }));
+    let below = w.node(json!({ "mesh": 0 }));
+    let between = w.node(json!({ "children": [below] }));
+    let group = w.node(json!({ "children": [between] }));
+    animate(&mut w, group, "translation", "STEP", "VEC3", &[1., 0., 0., 1., 0., 0.]);
+    let mut scene = load(w);
+    let stills = |scene: &mut Scene| -> Vec<(u32, bool)> {
+        scene.snapshot().instances.iter().map(|i| (i.node.0, i.still)).collect()
+    };
+    let expected = [(0, true), (beside as u32, true), (below as u32, false)];
+    assert_eq!(stills(&mut scene), expected);
+    let pause = Playback { playing: Some(false), ..Playback::default() };
+    let edit = Edit::SetAnimation { animation: crate::AnimationId(0), playback: pause };
+    scene.apply(&edit).expect("paused");
+    assert_eq!(stills(&mut scene), expected);
 }
 
 #[test]

@@ -63,6 +63,7 @@ fn a_nodes_instances_stand_where_their_attributes_say() {
     let snapshot = scene.snapshot();
     assert_near(&places(&snapshot), &expected);
     assert!(snapshot.instances.iter().all(|i| i.node == NodeId(0)));
+    assert_eq!(snapshot.instances.iter().map(|i| i.copy).collect::<Vec<_>>(), [0, 1, 2]);
     assert!(scene.bounds().max.abs_diff_eq(Vec3::new(3.0, 7.0, 0.0), 1e-4));
 
     // Moving the node or its parent moves all instances; removing it removes them.

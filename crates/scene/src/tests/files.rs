@@ -5,7 +5,7 @@ use lumencast_light::Order;
 use serde_json::{Value, json};
 
 use super::{Folder, TRIANGLE, triangle};
-use crate::{Edit, Environment, FileContents, InstanceSource, Scene, Transform};
+use crate::{Edit, Environment, FileContents, InstanceSource, LightmapSpec, Scene, Transform};
 
 /// A .gltf whose buffer is at a URI.
 fn gltf(uri: &str) -> String {
@@ -162,12 +162,15 @@ fn settings_in_extras_and_beside_the_scene() {
     let extras = json!({ "lumencast": {
         "environment": { "type": "constant", "radiance": [1.0, 2.0, 3.0] },
         "volumes": [{ "center": [0, 0, 0], "size": [1, 2, 3], "resolution": [4, 5, 6], "order": 3 }],
+        "lightmap": { "size": 512 },
     }});
     let path = folder.write("scene.glb", triangle().finish(extras));
     let scene = Scene::load(&path).expect("the scene");
     let volume = scene.volumes()[0];
     assert_eq!((volume.grid.resolution, volume.order), (UVec3::new(4, 5, 6), Order::L3));
     assert_eq!(*scene.environment(), Environment::Constant { radiance: Vec3::new(1., 2., 3.) });
+    assert_eq!(scene.lightmap(), Some(LightmapSpec::Size(512)));
+    assert_eq!(scene.pristine(0.0).lightmap(), scene.lightmap());
     assert!(scene.edits_since_load().is_empty(), "clients read the extras themselves");
 
     folder.write("light/sky.hdr", hdr());
@@ -180,6 +183,7 @@ fn settings_in_extras_and_beside_the_scene() {
         (scene.volumes()[0].grid.resolution, scene.volumes()[0].order),
         (UVec3::splat(8), Order::L2)
     );
+    assert_eq!(scene.lightmap(), Some(LightmapSpec::Size(512)), "what the file says stays");
     let Environment::Image { image: Some(image), intensity, .. } = scene.environment() else {
         panic!("no picture: {:?}", scene.environment())
     };
@@ -275,6 +279,10 @@ fn senseless_settings_name_their_file() {
         ("[environment]\ntype = \"image\"\nuri = \"none.hdr\"", "none.hdr"),
         ("[environment]\ntype = \"image\"\nuri = \"scene.glb\"", ".hdr or .exr"),
         ("[environment", "TOML"),
+        ("[lightmap]\nsize = 500", "a multiple of 16"),
+        ("[lightmap]\nsize = 1048576", "64 to 4096"),
+        ("[lightmap]\ntexel = 0.0", "more than 0"),
+        ("[lightmap]\ncells = 4", "TOML"),
     ] {
         folder.write("scene.lumencast.toml", toml);
         let error = Scene::load(&path).expect_err(reason).to_string();
