@@ -1,0 +1,202 @@
+//! Surfaces cut into charts and flattened, by `uvunwrap`.
+//!
+//! The library is young: what it returns is checked, and a panic in it is an error.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use bytemuck::{Pod, Zeroable};
+use glam::{UVec2, Vec2, Vec3};
+use lumencast_light::{ChartVertex, Charts};
+use uvunwrap::{Atlas, Density, Error, MeshInput, Options, OutputMesh, Packing, Progress, Stage};
+
+use crate::error::ChartError;
+
+/// Charts of a primitive, at most: what has more is a cloud of splinters that fills pages with padding.
+pub(crate) const MOST_CHARTS: u32 = 1 << 16;
+/// Empty lumels about each chart. Filtering reads one beyond a chart's border, and chroma of half the
+/// resolution another.
+pub(crate) const PADDING: u32 = 2;
+/// Charts begin half a lumel further in, so that borders along the axes go through lumels' middles.
+const INSET: Vec2 = Vec2::splat(0.5);
+/// Lumels that charts are laid out on first. They are laid out anew at the density that is asked for:
+/// here they only need to be told apart.
+const FIRST_LUMELS: f64 = 65_536.0;
+
+/// A surface to cut.
+#[derive(Clone, Debug)]
+pub(crate) struct Shape<'a> {
+    /// Metres: the object's, scaled as its instance is.
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) triangles: &'a [[u32; 3]],
+    /// Coordinates that cut it already, one a vertex.
+    pub(crate) uv: Option<&'a [Vec2]>,
+}
+
+/// A surface cut into charts, each flat and free of overlaps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Cut {
+    /// Vertices; where charts part, a vertex of the surface has several.
+    pub(crate) vertices: Vec<CutVertex>,
+    /// As many as the surface has, in its order; [`Charts::NOWHERE`] where it has no chart.
+    pub(crate) triangles: Vec<[u32; 3]>,
+    /// Number of charts.
+    pub(crate) charts: u32,
+}
+
+/// A vertex of a chart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct CutVertex {
+    /// The surface's vertex.
+    pub(crate) source: u32,
+    pub(crate) chart: u32,
+    /// Metres. Charts lie apart from each other, in no order.
+    pub(crate) at: Vec2,
+}
+
+/// Told how many triangles are done; answers whether to go on.
+pub(crate) type Watch<'a> = &'a (dyn Fn(usize) -> bool + Sync);
+
+impl Shape<'_> {
+    /// Square metres.
+    pub(crate) fn area(&self) -> f64 {
+        let area = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|vertex| self.positions[vertex as usize].as_dvec3());
+            0.5 * (b - a).cross(c - a).length()
+        };
+        self.triangles.iter().map(area).sum()
+    }
+}
+
+/// Cuts a surface into charts.
+pub(crate) fn cut(shape: &Shape<'_>, watch: Watch<'_>) -> Result<Cut, ChartError> {
+    let area = shape.area();
+    if !(area > 0.0 && area.is_finite()) {
+        return Err(ChartError::NoArea);
+    }
+    let texels_per_unit = (FIRST_LUMELS / area).sqrt() as f32;
+    let density = Density::Fixed { texels_per_unit, page_size: None };
+    let options = Options { density, packing: Packing::Fast, padding: 1, ..Options::default() };
+    let uv: Option<&[[f32; 2]]> = shape.uv.map(bytemuck::cast_slice);
+    let input = MeshInput {
+        existing_uvs: uv,
+        ..MeshInput::new(
+            bytemuck::cast_slice(&shape.positions),
+            shape.triangles.as_flattened(),
+        )
+    };
+    let atlas = generate(input, &options, watch)?;
+    if atlas.chart_count > MOST_CHARTS {
+        return Err(ChartError::TooManyCharts { charts: atlas.chart_count });
+    }
+    let metres = UVec2::new(atlas.width, atlas.height).as_vec2() / atlas.texels_per_unit;
+    let mesh = checked(&atlas, shape.triangles)?;
+    let vertices = mesh.vertices.iter().map(|vertex| CutVertex {
+        source: vertex.xref,
+        chart: vertex.chart.unwrap_or(u32::MAX),
+        at: Vec2::from(vertex.uv) * metres,
+    });
+    let vertices: Vec<CutVertex> = vertices.collect();
+    let triangles = mesh.indices.as_chunks::<3>().0.iter().map(|triangle| {
+        let has_chart = triangle.iter().all(|v| vertices[*v as usize].chart < atlas.chart_count);
+        if has_chart { *triangle } else { Charts::NOWHERE }
+    });
+    Ok(Cut { triangles: triangles.collect(), vertices, charts: atlas.chart_count })
+}
+
+/// Lays the charts of a surface out at a density, those that `keep` names. They share one rectangle as
+/// long as no side of it is longer than `most` lumels.
+pub(crate) fn lay_out(
+    cut: &Cut,
+    shape: &Shape<'_>,
+    keep: &dyn Fn(u32) -> bool,
+    lumels_a_metre: f32,
+    most: u32,
+) -> Result<Charts, ChartError> {
+    let positions: Vec<Vec3> =
+        cut.vertices.iter().map(|v| shape.positions[v.source as usize]).collect();
+    let uv: Vec<[f32; 2]> = cut.vertices.iter().map(|v| v.at.to_array()).collect();
+    let kept = |triangle: &[u32; 3]| {
+        *triangle != Charts::NOWHERE && keep(cut.vertices[triangle[0] as usize].chart)
+    };
+    let (kept, triangles): (Vec<usize>, Vec<[u32; 3]>) =
+        cut.triangles.iter().copied().enumerate().filter(|(_, t)| kept(t)).unzip();
+    if triangles.is_empty() {
+        return Err(ChartError::NoArea);
+    }
+    let input = MeshInput {
+        existing_uvs: Some(&uv),
+        ..MeshInput::new(bytemuck::cast_slice(&positions), triangles.as_flattened())
+    };
+    let pack = |page_size| {
+        let density = Density::Fixed { texels_per_unit: lumels_a_metre, page_size };
+        let options = Options { density, packing: Packing::Fast, padding: PADDING, ..Options::default() };
+        generate(input, &options, &|_| true)
+    };
+    let mut atlas = pack(None)?;
+    if atlas.width.max(atlas.height) > most {
+        atlas = pack(Some(most))?;
+    }
+    let mesh = checked(&atlas, &triangles)?;
+    let page = Vec2::new(atlas.width as f32, atlas.height as f32);
+    let vertices = mesh.vertices.iter().map(|vertex| ChartVertex {
+        source: cut.vertices[vertex.xref as usize].source,
+        rectangle: vertex.page.unwrap_or(0),
+        at: Vec2::from(vertex.uv) * page + INSET,
+    });
+    let vertices: Vec<ChartVertex> = vertices.collect();
+    // Pages are as large as they may be, whatever lies on them.
+    let mut sizes = vec![UVec2::ZERO; atlas.page_count.max(1) as usize];
+    for vertex in &vertices {
+        let size = &mut sizes[vertex.rectangle as usize];
+        *size = size.max(vertex.at.ceil().as_uvec2() + PADDING);
+    }
+    let mut placed = vec![Charts::NOWHERE; cut.triangles.len()];
+    for (own, triangle) in kept.into_iter().zip(mesh.indices.as_chunks::<3>().0) {
+        placed[own] = *triangle;
+    }
+    Ok(Charts {
+        sizes,
+        vertices,
+        triangles: placed,
+    })
+}
+
+/// Calls the library.
+fn generate(input: MeshInput<'_>, options: &Options, watch: Watch<'_>) -> Result<Atlas, ChartError> {
+    let progress = |progress: Progress| {
+        watch(if progress.stage == Stage::Parameterizing { progress.done } else { 0 })
+    };
+    let run = || uvunwrap::generate_with_progress(&[input], options, progress);
+    match catch_unwind(AssertUnwindSafe(run)) {
+        Ok(Ok(atlas)) => Ok(atlas),
+        Ok(Err(Error::Cancelled)) => Err(ChartError::Interrupted),
+        Ok(Err(Error::ChartTooLarge { .. } | Error::AtlasTooLarge { .. })) => {
+            Err(ChartError::NoRoom)
+        }
+        Ok(Err(error)) => Err(ChartError::Unwrap(error.to_string())),
+        Err(_) => Err(ChartError::Unwrap("the unwrapper panicked".into())),
+    }
+}
+
+/// The only mesh of an atlas, if it has the triangles that were asked for, in their order.
+fn checked<'a>(atlas: &'a Atlas, triangles: &[[u32; 3]]) -> Result<&'a OutputMesh, ChartError> {
+    let wrong = |what: &str| ChartError::Unwrap(format!("the unwrapper returned {what}"));
+    let [mesh] = &atlas.meshes[..] else { return Err(wrong("no mesh")) };
+    if mesh.indices.len() != 3 * triangles.len() {
+        return Err(wrong("another number of triangles"));
+    }
+    let source = |index: &u32| mesh.vertices.get(*index as usize).map(|vertex| vertex.xref);
+    if !mesh.indices.iter().map(source).eq(triangles.as_flattened().iter().map(|v| Some(*v))) {
+        return Err(wrong("other triangles"));
+    }
+    let is_sound = |vertex: &uvunwrap::OutputVertex| {
+        vertex.uv.iter().all(|c| (0.0..=1.0).contains(c))
+            && vertex.page.unwrap_or(0) < atlas.page_count.max(1)
+            && vertex.chart.is_none_or(|chart| chart < atlas.chart_count)
+    };
+    if !mesh.vertices.iter().all(is_sound) {
+        return Err(wrong("coordinates out of range"));
+    }
+    Ok(mesh)
+}

@@ -1,0 +1,94 @@
+//! Where the lumels of charts lie on the surface.
+
+use glam::{UVec2, Vec2, Vec3};
+use lumencast_light::Charts;
+
+use crate::raster::shares;
+
+/// A lumel that a chart covers a part of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lumel {
+    /// Index into [`Charts::sizes`].
+    pub rectangle: u32,
+    /// Its place in the rectangle.
+    pub at: UVec2,
+    /// The primitive's triangle that it lies on.
+    pub triangle: u32,
+    /// Barycentric weights of its point: of its middle where a triangle holds that, or else of the
+    /// middle of the largest share that a triangle has of it.
+    pub weights: Vec3,
+    /// Its middle lies in the triangle.
+    pub holds_middle: bool,
+}
+
+/// The lumels that charts cover, whole or in part, row by row.
+pub fn lumels(charts: &Charts) -> Vec<Lumel> {
+    let mut best = Best::new(&charts.sizes);
+    for triangle in 0..charts.triangles.len() as u32 {
+        let Some(corners) = charts.corners(triangle) else { continue };
+        let rectangle = corners[0].rectangle;
+        let size = charts.sizes[rectangle as usize];
+        for share in shares(corners.map(|corner| corner.at), size) {
+            let lumel = Lumel {
+                rectangle,
+                at: share.lumel,
+                triangle,
+                weights: share.weights,
+                holds_middle: share.holds_middle,
+            };
+            best.offer(lumel, share.area);
+        }
+    }
+    best.lumels()
+}
+
+/// The number of lumels whose middles lie well within two triangles that share no edge: 0 unless charts
+/// overlap. `corners` are those of triangles, in lumels.
+pub(crate) fn overlaps(corners: impl Iterator<Item = [Vec2; 3]>, size: UVec2) -> usize {
+    /// A middle nearer to an edge than this share of the triangle is left to its neighbour.
+    const WITHIN: f32 = 1e-2;
+    let mut taken = vec![false; size.element_product() as usize];
+    let mut count = 0;
+    for triangle in corners {
+        for share in shares(triangle, size) {
+            if share.holds_middle && share.weights.min_element() > WITHIN {
+                let at = (share.lumel.y * size.x + share.lumel.x) as usize;
+                count += usize::from(std::mem::replace(&mut taken[at], true));
+            }
+        }
+    }
+    count
+}
+
+/// The best offer for each lumel.
+struct Best {
+    rectangles: Vec<Vec<Option<(Lumel, f32)>>>,
+    widths: Vec<u32>,
+}
+
+impl Best {
+    fn new(sizes: &[UVec2]) -> Self {
+        let empty = |size: &UVec2| vec![None; size.element_product() as usize];
+        Self {
+            rectangles: sizes.iter().map(empty).collect(),
+            widths: sizes.iter().map(|size| size.x).collect(),
+        }
+    }
+
+    fn offer(&mut self, lumel: Lumel, area: f32) {
+        let rectangle = lumel.rectangle as usize;
+        let at = (lumel.at.y * self.widths[rectangle] + lumel.at.x) as usize;
+        let place = &mut self.rectangles[rectangle][at];
+        let rank = |lumel: &Lumel, area| (lumel.holds_middle, area);
+        if place.as_ref().is_none_or(|(held, held_area)| {
+            rank(held, *held_area) < rank(&lumel, area)
+        }) {
+            *place = Some((lumel, area));
+        }
+    }
+
+    fn lumels(self) -> Vec<Lumel> {
+        let all = self.rectangles.into_iter().flatten();
+        all.flatten().map(|(lumel, _)| lumel).collect()
+    }
+}

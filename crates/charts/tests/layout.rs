@@ -1,0 +1,341 @@
+//! Surfaces on pages: each point has one place, nothing overlaps, equal things are equal.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::{Affine3A, Quat, UVec2, Vec2, Vec3};
+use lumencast_charts::{ChartError, LaidOut, MOST_PAGES, PAGE, Sheets, laid_out, lumels, sheets};
+use lumencast_light::{Charts, Surface};
+use lumencast_scene::{
+    BUILTINS, LightmapSpec, Material, Mesh, MeshId, Primitive, Scene, Snapshot, Vertices,
+};
+use lumencast_testkit::scenes::{Stage, lambert};
+
+fn cut(scene: &Snapshot) -> Sheets {
+    sheets(scene, None, &|_| true).unwrap()
+}
+
+fn grey() -> Material {
+    lambert(Vec3::splat(0.5), Vec3::ZERO)
+}
+
+/// The lumel that a point of a page lies in.
+fn page_lumel(surface: &Surface, rectangle: u32, at: UVec2) -> (u32, UVec2) {
+    let place = surface.rectangles[rectangle as usize];
+    (place.page, place.corner + at)
+}
+
+/// Checks what everyone relies on: rectangles lie on pages, and a lumel belongs to one surface and to
+/// one part of it.
+fn check(scene: &Snapshot, LaidOut { layout, texel, .. }: &LaidOut) {
+    let mut owners = HashMap::new();
+    for (number, surface) in layout.surfaces().iter().enumerate() {
+        let of_node = |i: &&lumencast_scene::Instance| i.node.0 == surface.id.node;
+        let instance = scene.instances.iter().find(of_node).unwrap();
+        let primitive = &instance.mesh.primitives[surface.id.primitive as usize];
+        let world = |v: u32| {
+            instance.world_from_object.transform_point3(primitive.vertices.positions[v as usize])
+        };
+        assert_eq!(surface.charts.triangles.len(), primitive.triangles.len());
+        for (rectangle, size) in surface.rectangles.iter().zip(&surface.charts.sizes) {
+            assert!(rectangle.page < layout.pages);
+            assert!((rectangle.corner + *size).max_element() <= layout.page_size);
+        }
+        let (mut flat, mut curved) = (0.0, 0.0);
+        for (number, own) in (0..).zip(&primitive.triangles) {
+            let corners = surface.charts.corners(number).expect("every triangle has a place");
+            assert_eq!(&corners.map(|corner| corner.source), own);
+            assert!(corners.iter().all(|corner| corner.rectangle == corners[0].rectangle));
+            let [a, b, c] = corners.map(|corner| corner.at);
+            flat += 0.5 * (b - a).perp_dot(c - a).abs();
+            let [a, b, c] = own.map(world);
+            curved += 0.5 * (b - a).cross(c - a).length();
+        }
+        let share = flat * texel * texel / curved;
+        assert!((0.9..1.1).contains(&share), "{:?}: lumels for {share} of its area", surface.id);
+        for lumel in lumels(&surface.charts) {
+            assert!(lumel.weights.min_element() >= 0.0);
+            assert!((lumel.weights.element_sum() - 1.0).abs() < 1e-5);
+            let before = owners.insert(page_lumel(surface, lumel.rectangle, lumel.at), number);
+            assert_eq!(before, None, "a lumel of two surfaces");
+            let (_, at) = surface.charts.at(lumel.triangle, lumel.weights).unwrap();
+            let off = (at - lumel.at.as_vec2() - 0.5).abs().max_element();
+            assert!(off <= if lumel.holds_middle { 1e-2 } else { 0.501 }, "{lumel:?}: {off}");
+        }
+    }
+}
+
+#[test]
+fn built_in_scenes_fill_one_page_of_their_own_size() {
+    for name in BUILTINS {
+        let mut scene = Scene::open(name).unwrap();
+        let snapshot = scene.snapshot();
+        let Sheets { sheets, notes } = cut(&snapshot);
+        assert_eq!(notes, Vec::<String>::new());
+        let spec = scene.lightmap().unwrap();
+        let laid_out = laid_out(&sheets, spec).unwrap();
+        check(&snapshot, &laid_out);
+        assert_eq!(laid_out.layout.pages, 1);
+        assert_eq!(spec, LightmapSpec::Size(laid_out.layout.page_size));
+        let covered: usize = laid_out.layout.surfaces().iter().map(|s| lumels(&s.charts).len()).sum();
+        let share = covered as f32 / laid_out.layout.page_size.pow(2) as f32;
+        assert!(share > 0.5, "{name}: {share} of the page is covered");
+    }
+}
+
+/// What moves has no lumels.
+#[test]
+fn still_surfaces_alone_have_lumels() {
+    let mut scene = Scene::open("cornell").unwrap();
+    let names: HashMap<u32, String> =
+        scene.nodes().map(|node| (node.id.0, node.name.to_owned())).collect();
+    let mut found: Vec<&str> =
+        cut(&scene.snapshot()).sheets.iter().map(|s| names[&s.id.node].as_str()).collect();
+    found.dedup();
+    assert_eq!(found, ["room", "tall box"], "not the sphere, which moves, nor the lamp, which is black");
+}
+
+#[test]
+fn a_texel_is_as_large_as_it_is_asked_to_be() {
+    let mut stage = Stage::default();
+    let material = stage.material(grey());
+    stage.quad(Vec3::ZERO, 4.0 * Vec3::X, 2.0 * Vec3::Y, material);
+    let snapshot = stage.snapshot();
+    let laid_out = laid_out(&cut(&snapshot).sheets, LightmapSpec::Texel(0.1)).unwrap();
+    assert_eq!((laid_out.texel, laid_out.coarser), (0.1, false));
+    check(&snapshot, &laid_out);
+    let [surface] = laid_out.layout.surfaces() else { panic!("one surface") };
+    let [size] = surface.charts.sizes[..] else { panic!("one rectangle") };
+    // Its own 40 by 20, half a lumel in, and padding.
+    assert!(size.max_element() <= 40 + 5 && size.min_element() <= 20 + 5, "{size}");
+    // The middle of its first lumels lies on its border, and it goes on straight.
+    let at = |x: f32, y: f32| {
+        let [v, w] = [Vec2::new(4.0, 0.0), Vec2::new(4.0, 2.0)];
+        let w_ = y / w.y;
+        let v_ = (x - w_ * w.x) / v.x;
+        surface.charts.at(0, Vec3::new(1.0 - v_ - w_, v_, w_)).unwrap().1
+    };
+    let origin = at(0.0, 0.0);
+    assert!((origin.fract() - 0.5).abs().max_element() < 1e-3, "{origin}");
+    assert!(((at(2.0, 0.5) - at(1.0, 0.5)).length() - 10.0).abs() < 1e-3);
+}
+
+/// A surface of 150 × 150 m: nine pages at a decimetre.
+#[test]
+fn lumels_grow_where_pages_end() {
+    let mut stage = Stage::default();
+    let material = stage.material(grey());
+    for k in 0..9 {
+        let corner = Vec3::new(0.0, 10.0 * k as f32, 0.0);
+        stage.quad(corner, 100.0 * Vec3::X, 100.0 * Vec3::Z, material);
+    }
+    let snapshot = stage.snapshot();
+    let laid_out = laid_out(&cut(&snapshot).sheets, LightmapSpec::Texel(0.1)).unwrap();
+    check(&snapshot, &laid_out);
+    assert!(laid_out.coarser && laid_out.texel > 0.1, "{}", laid_out.texel);
+    assert!(laid_out.layout.pages <= MOST_PAGES && laid_out.layout.page_size == PAGE);
+}
+
+/// A box of many triangles whose charts do not fit one page.
+#[test]
+fn a_primitive_may_have_several_rectangles() {
+    let mut stage = Stage::default();
+    let material = stage.material(grey());
+    stage.sphere(Vec3::ZERO, 20.0, 48, material);
+    let snapshot = stage.snapshot();
+    let laid_out = laid_out(&cut(&snapshot).sheets, LightmapSpec::Texel(0.05)).unwrap();
+    check(&snapshot, &laid_out);
+    let [surface] = laid_out.layout.surfaces() else { panic!("one surface") };
+    assert!(surface.rectangles.len() > 1 && laid_out.layout.pages > 1);
+}
+
+/// Two equal instances and a larger one of one mesh.
+#[test]
+fn equal_instances_share_charts() {
+    let mut stage = Stage::default();
+    let material = stage.material(grey());
+    stage.sphere(Vec3::ZERO, 1.0, 8, material);
+    let mesh = stage.snapshot().instances[0].mesh.clone();
+    for (scale, turn) in [(1.0, 0.7), (2.0, 0.0)] {
+        let place = Affine3A::from_scale_rotation_translation(
+            Vec3::splat(scale),
+            Quat::from_rotation_y(turn),
+            5.0 * Vec3::X,
+        );
+        stage.instance(MeshId(0), mesh.clone(), place);
+    }
+    let snapshot = stage.snapshot();
+    let laid_out = laid_out(&cut(&snapshot).sheets, LightmapSpec::Texel(0.1)).unwrap();
+    check(&snapshot, &laid_out);
+    let [one, other, larger] = laid_out.layout.surfaces() else { panic!("three surfaces") };
+    assert!(Arc::ptr_eq(&one.charts, &other.charts));
+    assert!(!Arc::ptr_eq(&one.charts, &larger.charts));
+}
+
+#[test]
+fn backs_have_lumels_on_the_charts_that_they_name() {
+    let mut stage = Stage::default();
+    let material = stage.material(grey());
+    stage.sphere(Vec3::ZERO, 1.0, 8, material);
+    let mut all = cut(&stage.snapshot()).sheets;
+    let front = all[0].clone();
+    assert!(front.charts() > 1);
+    let mut kept = vec![false; front.charts()];
+    kept[0] = true;
+    all.push(front.back(kept));
+    let laid_out = laid_out(&all, LightmapSpec::Size(256)).unwrap();
+    let [_, back] = laid_out.layout.surfaces() else { panic!("two surfaces") };
+    assert!(back.id.back);
+    for (number, triangle) in back.charts.triangles.iter().enumerate() {
+        assert_eq!(*triangle != Charts::NOWHERE, front.chart_of(number) == Some(0));
+    }
+}
+
+/// A strip of `columns` squares with second coordinates.
+fn strip(columns: u32, uv: impl Fn(Vec2) -> Vec2) -> Primitive {
+    let mut primitive = Primitive::default();
+    for column in 0..=columns {
+        for y in [0.0, 1.0] {
+            primitive.vertices.positions.push(Vec3::new(column as f32, y, 0.0));
+            primitive.vertices.normals.push(Vec3::Z);
+            primitive.uv[1].push(uv(Vec2::new(column as f32 / columns as f32, y)));
+        }
+    }
+    for column in 0..columns {
+        let a = 2 * column;
+        primitive.triangles.extend([[a, a + 2, a + 3], [a, a + 3, a + 1]]);
+    }
+    primitive
+}
+
+/// A file's own second coordinates cut the surface where they are sound; otherwise they are named.
+#[test]
+fn second_coordinates_are_used_or_named() {
+    let sheets_of = |uv: fn(Vec2) -> Vec2| {
+        let mut stage = Stage::default();
+        stage.material(grey());
+        stage.primitive(strip(4, uv), Affine3A::IDENTITY);
+        cut(&stage.snapshot())
+    };
+    let sound = sheets_of(|at| 0.1 + 0.8 * at);
+    assert_eq!((sound.sheets.len(), sound.notes), (1, vec![]));
+    let outside = sheets_of(|at| 1.5 * at);
+    assert_eq!(outside.sheets.len(), 1);
+    assert!(outside.notes[0].contains("leave the square"), "{:?}", outside.notes);
+    let folded = sheets_of(|at| Vec2::new((2.0 * at.x - 1.0).abs(), at.y));
+    assert_eq!(folded.sheets.len(), 1);
+    assert!(folded.notes[0].contains("overlap"), "{:?}", folded.notes);
+}
+
+/// Vertices of a primitive that nothing good can be said of.
+fn bad_meshes() -> Vec<(&'static str, Primitive)> {
+    let of = |positions: Vec<Vec3>, triangles: Vec<[u32; 3]>| Primitive {
+        vertices: Vertices {
+            normals: vec![Vec3::Z; positions.len()],
+            positions,
+            tangents: Vec::new(),
+        },
+        triangles,
+        ..Primitive::default()
+    };
+    let fan: Vec<Vec3> = (0..12).map(|k| Quat::from_rotation_x(0.5 * k as f32) * Vec3::Y).collect();
+    let line = (0..9).map(|k| k as f32 * Vec3::X).collect();
+    let soup = |count: u32, size: f32| {
+        let corner = |k: u32| Vec3::new((k * 7919 % 1009) as f32, (k * 104_729 % 997) as f32, 0.0);
+        let positions =
+            (0..count).flat_map(|k| [Vec3::ZERO, size * Vec3::X, size * Vec3::Y].map(|p| corner(k) + p));
+        of(positions.collect(), (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect())
+    };
+    vec![
+        ("no triangles", of(vec![], vec![])),
+        ("no area", of(line, vec![[0, 1, 2], [3, 4, 5], [6, 7, 8]])),
+        // All pages of a book on one spine.
+        (
+            "an edge of many triangles",
+            of(
+                [vec![Vec3::ZERO, Vec3::X], fan].concat(),
+                (2..14).map(|k| [0, 1, k]).collect(),
+            ),
+        ),
+        (
+            "the same triangle thrice, and its back",
+            of(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2], [0, 1, 2], [1, 2, 0], [0, 2, 1]]),
+        ),
+        ("splinters", soup(500, 1e-6)),
+        ("far apart", of(vec![Vec3::ZERO, 1e8 * Vec3::X, 1e8 * Vec3::Y], vec![[0, 1, 2]])),
+    ]
+}
+
+#[test]
+fn bad_meshes_have_lumels_or_are_named() {
+    for (name, primitive) in bad_meshes() {
+        let triangles = primitive.triangles.len();
+        let mut stage = Stage::default();
+        let material = stage.material(grey());
+        stage.quad(Vec3::ZERO, Vec3::X, Vec3::Y, material);
+        stage.primitive(primitive, Affine3A::IDENTITY);
+        let Sheets { sheets, notes } = cut(&stage.snapshot());
+        match &sheets[..] {
+            [_] => assert!(notes.iter().any(|n| n.starts_with("mesh 1, primitive 0")), "{name}"),
+            [_, bad] => {
+                let laid_out = laid_out(&sheets, LightmapSpec::Size(256)).unwrap();
+                let surface = laid_out.layout.surface(bad.id).unwrap();
+                assert_eq!(surface.charts.triangles.len(), triangles, "{name}");
+                lumels(&surface.charts);
+            }
+            _ => panic!("{name}: {} sheets", sheets.len()),
+        }
+    }
+}
+
+#[test]
+fn nothing_to_lay_out_is_said() {
+    assert_eq!(laid_out(&[], LightmapSpec::default()), Err(ChartError::NoArea));
+    let nothing = Snapshot::clone(&Stage::default().snapshot());
+    assert!(cut(&nothing).sheets.is_empty());
+}
+
+#[test]
+fn cutting_tells_its_progress_and_ends_when_told() {
+    let mut scene = Scene::open("tomb").unwrap();
+    let snapshot = scene.snapshot();
+    let most = std::sync::Mutex::new(0.0f32);
+    let watch = |progress: lumencast_charts::Progress| {
+        let share = progress.done as f32 / progress.total as f32;
+        assert!((0.0..=1.0).contains(&share));
+        let mut most = most.lock().unwrap();
+        *most = most.max(share);
+        true
+    };
+    sheets(&snapshot, None, &watch).unwrap();
+    assert!(*most.lock().unwrap() > 0.9);
+    assert_eq!(sheets(&snapshot, None, &|_| false).unwrap_err(), ChartError::Interrupted);
+}
+
+#[test]
+fn what_is_unlit_black_or_glass_has_no_lumels() {
+    let with = |material: Material| {
+        let mut stage = Stage::default();
+        let material = stage.material(material);
+        stage.quad(Vec3::ZERO, Vec3::X, Vec3::Y, material);
+        cut(&stage.snapshot()).sheets.len()
+    };
+    assert_eq!(with(grey()), 1);
+    assert_eq!(with(Material { unlit: true, ..grey() }), 0);
+    assert_eq!(with(Material { transmission: 0.5, ..grey() }), 0);
+    assert_eq!(with(lambert(Vec3::ZERO, Vec3::ONE)), 0);
+}
+
+/// The mesh is shared by an instance that stands and one that an animation moves.
+#[test]
+fn a_mesh_that_one_instance_moves_has_lumels_on_the_other() {
+    let mut stage = Stage::default();
+    let material = stage.material(grey());
+    stage.quad(Vec3::ZERO, Vec3::X, Vec3::Y, material);
+    let mesh: Arc<Mesh> = stage.snapshot().instances[0].mesh.clone();
+    stage.instance(MeshId(0), mesh, Affine3A::from_translation(Vec3::Z));
+    let mut snapshot = Snapshot::clone(&stage.snapshot());
+    snapshot.instances[1].still = false;
+    let found = cut(&snapshot).sheets;
+    assert_eq!(found.iter().map(|sheet| sheet.instance).collect::<Vec<_>>(), [0]);
+}
