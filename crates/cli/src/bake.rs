@@ -77,8 +77,7 @@ impl Bake {
         file.files = named_files(&scene)?;
         let bytes = file.write();
         out_file::write(&self.output, &bytes)?;
-        let probes: usize =
-            fields.iter().filter_map(Field::as_volume).map(|v| v.grid.probe_count()).sum();
+        let probes: usize = fields.iter().map(Field::probe_count).sum();
         if self.json {
             return output::json(&json!({
                 "file": self.output, "bytes": bytes.len(), "fields": fields.len(),

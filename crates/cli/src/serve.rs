@@ -141,7 +141,7 @@ impl Serve {
             );
         }
         let page = format!("{scheme}://{host}/");
-        let probes: usize = server.tick().light().volumes().map(|v| v.grid.probe_count()).sum();
+        let probes = server.tick().light().probe_count();
         if self.json {
             let ready = json!({
                 "address": page, "scene": server.scene_name(), "port": address.port(),

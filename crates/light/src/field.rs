@@ -19,6 +19,13 @@ impl Field {
         }
     }
 
+    /// Number of its probes.
+    pub fn probe_count(&self) -> usize {
+        match self {
+            Self::Volume(volume) => volume.grid.probe_count(),
+        }
+    }
+
     /// The volume, where it is one.
     pub fn as_volume(&self) -> Option<&ProbeVolume> {
         match self {

@@ -65,6 +65,11 @@ impl Light {
         self.fields
     }
 
+    /// Number of the probes of all fields.
+    pub fn probe_count(&self) -> usize {
+        self.fields.iter().map(Field::probe_count).sum()
+    }
+
     /// The volumes, that with the smallest cells first.
     pub fn volumes(&self) -> impl Iterator<Item = &ProbeVolume> {
         self.fields.iter().filter_map(Field::as_volume)
@@ -78,7 +83,7 @@ impl Light {
     /// All light convolved by a lobe, or through a window (see [`crate::zh`]).
     #[must_use]
     pub fn convolved(mut self, bands: &Bands) -> Self {
-        for volume in self.volumes_mut() {
+        for Field::Volume(volume) in &mut self.fields {
             let probe = volume.order.coefficients();
             volume.coefficients.chunks_mut(probe).for_each(|probe| convolve(probe, bands));
         }
@@ -96,7 +101,7 @@ impl Light {
     /// The same light, all volumes of which are to be read at another offset than their own.
     #[must_use]
     pub fn read_at(mut self, offset: Offset) -> Self {
-        self.volumes_mut().for_each(|volume| volume.offset = offset);
+        self.fields.iter_mut().for_each(|Field::Volume(volume)| volume.offset = offset);
         self
     }
 
@@ -132,8 +137,10 @@ impl Light {
 
     /// Light at a place; `None` when no field has any there.
     pub fn sample(&self, place: &Place) -> Option<Sh> {
-        if let [Field::Volume(only)] = &self.fields[..] {
-            return Some(only.sample(place.position, place.normal));
+        if let [only] = &self.fields[..] {
+            return match only {
+                Field::Volume(volume) => Some(volume.sample(place.position, place.normal)),
+            };
         }
         // It begins with the lowest order; what is added raises it to its own.
         let dark = self.volumes().next().map(|_| Sh::dark(Order::L1));

@@ -8,7 +8,7 @@ use glam::{Affine3A, Mat3, UVec3, Vec3};
 use lumencast_gpu::Gpu;
 use lumencast_gpu::bindings::{self, FILTERED, SAMPLER, STORAGE, UNIFORM};
 use lumencast_gpu::textures;
-use lumencast_light::{Atlas, Grid, Light, ProbeVolume, ScaleRule, atlas_size, texels};
+use lumencast_light::{Atlas, Field, Grid, Light, ProbeVolume, ScaleRule, atlas_size, texels};
 use lumencast_shaders::layout;
 
 use crate::ShadeError;
@@ -81,7 +81,8 @@ impl GpuField {
 
     /// Takes in other light. Where the volumes are as large as before, the texture stays.
     pub(crate) fn update(&mut self, gpu: &Gpu, light: &Light) -> Result<(), ShadeError> {
-        let volumes: Vec<&ProbeVolume> = light.volumes().collect();
+        let volumes: Vec<&ProbeVolume> =
+            light.fields().iter().map(|Field::Volume(volume)| volume).collect();
         let sizes: Vec<UVec3> =
             volumes.iter().map(|v| atlas_size(v.grid.resolution, v.order)).collect();
         if sizes != self.sizes {

@@ -25,6 +25,7 @@
 mod bake;
 pub mod blend;
 mod error;
+mod field;
 pub mod fit;
 mod noise;
 mod options;

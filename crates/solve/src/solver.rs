@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use lumencast_gather::{Gathered, Job};
-use lumencast_light::{Field, FieldId, Light, Place};
+use lumencast_light::{Field, FieldId, Light, Place, ProbeVolume};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::SolveError;
+use crate::field::FieldSolver;
 use crate::fit::{FitSettings, Part, fit};
 use crate::options::GatherOptions;
 use crate::request::{Asked, Request, Turn, What};
@@ -22,12 +23,6 @@ pub struct Solver {
     light: Light,
     /// The number of the next new field.
     next: FieldId,
-}
-
-/// A field, by its kind.
-#[derive(Clone)]
-enum FieldSolver {
-    Volume(VolumeSolver),
 }
 
 /// How hard a fit to surfaces is worked on; it goes on from the last one.
@@ -73,18 +68,18 @@ impl Solver {
                 FieldSolver::Volume(VolumeSolver::new(FieldId(id), spec, &self.options))
             }));
         }
-        let light = Light::new(self.volumes().map(|volume| {
-            let known = self.light.field(volume.id()).cloned();
-            known.unwrap_or_else(|| volume.arriving().clone().into())
-        }));
-        self.light = light;
+        let light = self.fields.iter().map(|field| {
+            let known = self.light.field(field.id()).cloned();
+            known.unwrap_or_else(|| field.arriving())
+        });
+        self.light = Light::new(light);
         Ok(())
     }
 
     /// Numbers of the fields, in the order in which they were asked for; pieces of a volume follow one
     /// another.
     pub fn ids(&self) -> impl ExactSizeIterator<Item = FieldId> + '_ {
-        self.volumes().map(VolumeSolver::id)
+        self.fields.iter().map(FieldSolver::id)
     }
 
     /// The light as it was last solved.
@@ -102,18 +97,18 @@ impl Solver {
 
     /// Number of all probes.
     pub fn probe_count(&self) -> usize {
-        self.volumes().map(VolumeSolver::probe_count).sum()
+        self.fields.iter().map(FieldSolver::probe_count).sum()
     }
 
     /// Number of probes inside walls.
     pub fn buried_count(&self) -> usize {
-        self.volumes().map(VolumeSolver::buried_count).sum()
+        self.fields.iter().map(FieldSolver::buried_count).sum()
     }
 
     /// What to ask for before [`Self::job`], so that a field that wants to know where surfaces are knows
     /// those of this scene.
     pub fn look(&self, field: FieldId, scene: &Arc<Snapshot>) -> Option<Request> {
-        let job = self.volume(field)?.look(scene)?;
+        let job = self.fields.iter().find(|known| known.id() == field)?.look(scene)?;
         Some(Request { job, asked: Asked { field, what: What::Surfaces } })
     }
 
@@ -123,10 +118,10 @@ impl Solver {
         // Numbers of fields beyond a byte stand above those of passes.
         let (low, high) = (u64::from(field.0 & 0xff), u64::from(field.0 >> 8));
         let seed = (turn.pass << 8 | low) ^ (high << 40);
-        let volume = self.volume_mut(field)?;
-        let job = volume.job(scene.clone(), turn.samples);
+        let solver = self.field_mut(field)?;
+        let job = solver.job(scene.clone(), turn.samples);
         let job = Job { previous: turn.previous, bounces, clamp, seed, ..job };
-        let what = What::Light { budgets: job.budgets.clone(), probes: volume.probe_count() };
+        let what = What::Light { budgets: job.budgets.clone(), probes: solver.probe_count() };
         Some(Request { job, asked: Asked { field, what } })
     }
 
@@ -135,28 +130,28 @@ impl Solver {
     /// # Panics
     /// If the sums are those of another request.
     pub fn take(&mut self, asked: &Asked, gathered: &Gathered) {
-        let Some(volume) = self.volume_mut(asked.field) else { return };
+        let Some(field) = self.field_mut(asked.field) else { return };
         match &asked.what {
-            What::Surfaces => volume.found(gathered),
-            What::Light { budgets, .. } => volume.blend(gathered, budgets),
+            What::Surfaces => field.found(gathered),
+            What::Light { budgets, .. } => field.blend(gathered, budgets),
         }
     }
 
     /// The scene was edited: light may be another from now on.
     pub fn expect_change(&mut self) {
-        self.volumes_mut().for_each(VolumeSolver::expect_change);
+        self.fields.iter_mut().for_each(FieldSolver::expect_change);
     }
 
     /// Makes light of what has been taken in: what arrives at the probes or, where they are fitted, the
     /// fit of all of them.
     pub fn solve(&mut self, effort: FitEffort) {
         let Self { fields, light, .. } = self;
-        let of = |field: &Field| {
+        let of = |published: &ProbeVolume| {
             fields.iter().find_map(|FieldSolver::Volume(volume)| {
-                (volume.id() == field.id()).then_some(volume)
+                (volume.id() == published.id).then_some(volume)
             })
         };
-        let ordered: Vec<&VolumeSolver> = light.fields().iter().filter_map(of).collect();
+        let ordered: Vec<&VolumeSolver> = light.volumes().filter_map(of).collect();
         let surfaces: Option<Vec<&Surfaces>> = ordered.iter().map(|v| v.surfaces()).collect();
         let Some(surfaces) = surfaces else {
             let each = light.volumes_mut().zip(ordered);
@@ -177,22 +172,10 @@ impl Solver {
 
     /// Where light matters: see [`VolumeSolver::places`].
     pub(crate) fn places(&self) -> Vec<Place> {
-        self.volumes().flat_map(VolumeSolver::places).collect()
+        self.fields.iter().flat_map(FieldSolver::places).collect()
     }
 
-    fn volume(&self, id: FieldId) -> Option<&VolumeSolver> {
-        self.volumes().find(|volume| volume.id() == id)
-    }
-
-    fn volume_mut(&mut self, id: FieldId) -> Option<&mut VolumeSolver> {
-        self.volumes_mut().find(|volume| volume.id() == id)
-    }
-
-    fn volumes(&self) -> impl ExactSizeIterator<Item = &VolumeSolver> {
-        self.fields.iter().map(|FieldSolver::Volume(volume)| volume)
-    }
-
-    fn volumes_mut(&mut self) -> impl Iterator<Item = &mut VolumeSolver> {
-        self.fields.iter_mut().map(|FieldSolver::Volume(volume)| volume)
+    fn field_mut(&mut self, id: FieldId) -> Option<&mut FieldSolver> {
+        self.fields.iter_mut().find(|field| field.id() == id)
     }
 }

@@ -96,12 +96,12 @@ impl World for Still {
     }
 
     fn facts(&self) -> Vec<(&'static str, String)> {
-        let probes: usize = self.light.volumes().map(|v| v.grid.probe_count()).sum();
-        vec![("light", self.source.clone()), ("probes", probes.to_string())]
+        let probes = self.light.probe_count().to_string();
+        vec![("light", self.source.clone()), ("probes", probes)]
     }
 
     fn notice(&self) -> Option<String> {
-        self.light.volumes().next().is_none().then(|| "There is no indirect light.".to_owned())
+        self.light.fields().is_empty().then(|| "There is no indirect light.".to_owned())
     }
 
     fn is_settled(&self) -> bool {

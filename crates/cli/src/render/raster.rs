@@ -46,7 +46,7 @@ impl Render {
         let mut probes = 0;
         if settings.lighting.indirect {
             let light = Light::new(self.fields(scene, light)?);
-            probes = light.volumes().map(|volume| volume.grid.probe_count()).sum();
+            probes = light.probe_count();
             let (offset, window) = (self.raster.reading.offset, self.raster.window);
             renderer.set_light(&light.seen(offset, window))?;
         }

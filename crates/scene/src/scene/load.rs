@@ -114,10 +114,10 @@ impl Scene {
         for root in &asset.roots {
             scene.nodes.add_root(NodeId(*root));
         }
-        let settings = asset.settings.clone();
-        scene.environment = settings.environment.unwrap_or_default();
-        scene.volumes = settings.volumes;
-        scene.lightmap = settings.lightmap;
+        let Settings { environment, volumes, lightmap } = asset.settings.clone();
+        scene.environment = environment.unwrap_or_default();
+        scene.volumes = volumes;
+        scene.lightmap = lightmap;
         scene.play();
         scene.choose_origin();
         scene
@@ -185,14 +185,15 @@ impl Scene {
 
     /// Applies the settings of the file beside the scene.
     fn settle(&mut self, settings: Settings) -> Result<(), Fault> {
-        if let Some(environment) = settings.environment {
+        let Settings { environment, volumes, lightmap } = settings;
+        if let Some(environment) = environment {
             self.light_by(environment)?;
             self.environment_replaced = true;
         }
-        if !settings.volumes.is_empty() {
-            self.volumes = settings.volumes;
+        if !volumes.is_empty() {
+            self.volumes = volumes;
         }
-        self.lightmap = settings.lightmap.or(self.lightmap);
+        self.lightmap = lightmap.or(self.lightmap);
         Ok(())
     }
 
