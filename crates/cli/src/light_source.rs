@@ -6,6 +6,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use lumencast_codec::{Catalog, DecodeError, LightFile};
+use lumencast_gather::Gather;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::Field;
 use lumencast_scene::{Edit, Scene, Snapshot, VolumeSpec};
@@ -80,9 +81,10 @@ pub(crate) struct Computed {
 }
 
 impl Computed {
-    /// The path tracer that computes it.
-    pub(crate) fn tracer(&self) -> Result<CpuPathTracer> {
-        CpuPathTracer::new(self.tracing.clone()).context("cannot start the threads that trace")
+    /// What computes it.
+    pub(crate) fn gatherer(&self) -> Result<Box<dyn Gather>> {
+        let tracer = CpuPathTracer::new(self.tracing.clone());
+        Ok(Box::new(tracer.context("cannot start the threads that trace")?))
     }
 
     /// The light of volumes, with a bar that shows how far it is.
@@ -90,12 +92,12 @@ impl Computed {
         self,
         scene: &Arc<Snapshot>,
         volumes: &[VolumeSpec],
-        tracer: &mut CpuPathTracer,
+        gatherer: &mut dyn Gather,
     ) -> Result<Baked> {
         let gather = self.reading.gathered(self.bounces, self.clamp, BlendSettings::default());
         let bar = output::share_bar("Computing light");
         let wanted = Bake { scene, volumes, effort: self.effort, options: gather };
-        let light = bake(wanted, tracer, |done| show(&bar, done));
+        let light = bake(wanted, gatherer, |done| show(&bar, done));
         bar.finish_and_clear();
         Ok(light?)
     }

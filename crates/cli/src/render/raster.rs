@@ -124,9 +124,9 @@ impl Render {
             reading: self.raster.reading.drawn(),
             tracing: self.picture.tracing(),
         };
-        let mut tracer = computed.tracer()?;
-        let specs = self.scene.volumes(scene, &mut tracer)?;
-        Ok(computed.volumes(&scene.snapshot(), &specs, &mut tracer)?.fields)
+        let mut gatherer = computed.gatherer()?;
+        let specs = self.scene.volumes(scene, &mut *gatherer)?;
+        Ok(computed.volumes(&scene.snapshot(), &specs, &mut *gatherer)?.fields)
     }
 
     /// Columns and rows of views.

@@ -165,8 +165,8 @@ impl BenchPeers {
         let effort = Effort::of_samples(self.probe_samples);
         let (bounces, clamp) = (self.bounces, f32::INFINITY);
         let computed = Computed { effort, bounces, clamp, reading, tracing };
-        let mut tracer = computed.tracer()?;
-        Ok(Light::new(computed.volumes(snapshot, &[grid], &mut tracer)?.fields))
+        let mut gatherer = computed.gatherer()?;
+        Ok(Light::new(computed.volumes(snapshot, &[grid], &mut *gatherer)?.fields))
     }
 
     fn write(&self, subject: &Subject, name: &str, picture: &Picture) -> Result<()> {

@@ -40,9 +40,9 @@ impl BenchQuality {
         let tracing = self.picture.tracing();
         let effort = Effort::of_samples(samples);
         let computed = Computed { effort, bounces, clamp, reading, tracing };
-        let mut tracer = computed.tracer()?;
+        let mut gatherer = computed.gatherer()?;
         let start = Instant::now();
-        let baked = computed.volumes(&subject.snapshot, &[spec], &mut tracer)?;
+        let baked = computed.volumes(&subject.snapshot, &[spec], &mut *gatherer)?;
         let light = Light::new(baked.fields);
         let seconds = start.elapsed().as_secs_f64();
         Ok(Field {

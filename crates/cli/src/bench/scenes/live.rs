@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use lumencast_codec::{Catalog, EncodedRegion, Epoch};
-use lumencast_gather::path_trace::CpuPathTracer;
+use lumencast_gather::Gather;
 use lumencast_light::Field;
 use lumencast_scene::Scene;
 use lumencast_server::{Mail, Outlet, Tick, TickOptions};
@@ -12,12 +12,12 @@ use crate::output;
 /// The light of a server's ticks after so many seconds. The scene's time stands still.
 pub(super) fn light(
     scene: Scene,
-    tracer: CpuPathTracer,
+    gatherer: Box<dyn Gather>,
     options: TickOptions,
     seconds: f64,
 ) -> Result<Vec<Field>> {
     let ticks = (seconds / options.period).ceil() as u64;
-    let mut tick = Tick::new(scene, Box::new(tracer), options, Epoch(0))?;
+    let mut tick = Tick::new(scene, gatherer, options, Epoch(0))?;
     let bar = output::bar(ticks, "Ticks");
     for _ in 0..ticks {
         tick.step(0.0, Mail::default(), &mut Nobody);

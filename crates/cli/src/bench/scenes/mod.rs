@@ -167,10 +167,10 @@ impl BenchScenes {
         renderer.set_scene(&subject.snapshot);
         let drawn = self.reading.drawn();
         let usual = computed(drawn, self.effort.with(self.probe_samples));
-        let mut tracer = usual.tracer()?;
-        let specs = lumencast_solve::volumes(&mut subject.scene, &mut tracer)?;
+        let mut gatherer = usual.gatherer()?;
+        let specs = lumencast_solve::volumes(&mut subject.scene, &mut *gatherer)?;
         let snapshot = subject.snapshot.clone();
-        let mut bake = |computed: Computed| computed.volumes(&snapshot, &specs, &mut tracer);
+        let mut bake = |computed: Computed| computed.volumes(&snapshot, &specs, &mut *gatherer);
         let baked = bake(usual)?;
         let mut picture_of =
             |fields: Vec<Field>| draw_light(renderer, fields, subject.view, &settings);
@@ -218,7 +218,7 @@ impl BenchScenes {
                 volumes: specs.clone(),
                 ..TickOptions::default()
             };
-            let live = live::light(subject.scene, tracer, options, seconds.into())?;
+            let live = live::light(subject.scene, gatherer, options, seconds.into())?;
             beside.push(Beside {
                 what: format!("live, {samples} samples a tick, after {seconds} s"),
                 psnr: judge.psnr(&picture_of(live)?)?,
