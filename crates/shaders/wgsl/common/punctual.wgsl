@@ -33,25 +33,3 @@ struct Incident {
     // On a surface that faces the light, lux.
     irradiance: vec3f,
 }
-
-fn incident(light: PunctualLight, at: vec3f) -> Incident {
-    if light.kind == LIGHT_DIRECTIONAL {
-        return Incident(-light.direction, 0.0, light.intensity);
-    }
-    let to_light = light.position - at;
-    let distance = length(to_light);
-    if distance == 0.0 {
-        return Incident(vec3f(0.0, 1.0, 0.0), 0.0, vec3f(0.0));
-    }
-    let direction = to_light / distance;
-    let square = distance * distance;
-    var falloff = saturate(1.0 - square * square * light.window);
-    if light.kind == LIGHT_SPOT {
-        let cosine = dot(direction, -light.direction);
-        let t = saturate(cosine * light.cone_scale + light.cone_offset);
-        falloff *= t * t;
-    }
-    // Within the sphere the light is as bright as on it.
-    let outside = max(distance, light.size);
-    return Incident(direction, distance, light.intensity * (falloff / outside / outside));
-}
