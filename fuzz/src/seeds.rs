@@ -4,7 +4,7 @@ use std::path::Path;
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use glam::{Quat, UVec3, Vec3};
-use lumencast_codec::{Epoch, LightFile, ProbeHeader, SceneInfo, UpdateInfo};
+use lumencast_codec::{LightFile, ProbeHeader, SceneInfo, UpdateInfo};
 use lumencast_light::{FieldId, Grid, Order, ProbeVolume};
 use lumencast_scene::{FileContents, Scene};
 use serde_json::{Value, json};
@@ -74,7 +74,7 @@ fn dark(size: UVec3, order: Order) -> LightFile {
     };
     let volume = ProbeVolume::dark(FieldId(0), grid, order);
     let scene = SceneInfo { name: "fuzz".into(), root: "fuzz.glb".into() };
-    LightFile::of_fields(Epoch(1), scene, 0.04, "seed", [&volume.into()], UpdateInfo::default())
+    LightFile::of_fields(scene, "seed", [&volume.into()], UpdateInfo::default())
 }
 
 /// All that a client reads of a server: catalog, state and light.

@@ -477,12 +477,8 @@ fn a_saved_field_shows_until_a_server_s_light_comes() {
     let mut server = Server::new(1);
     server.shine(4.0);
     let scene = server.catalog.scene.clone();
-    let file = LightFile::of_fields(
-        scene,
-        "",
-        [&server.volume.clone().into()],
-        UpdateInfo::default(),
-    );
+    let file =
+        LightFile::of_fields(scene, "", [&server.volume.clone().into()], UpdateInfo::default());
     let mut cache = Cache::new();
     cache.load(&file.write(), 0.0).unwrap();
     assert!(near(shown(&mut cache, 0.0), 4.0));

@@ -80,10 +80,7 @@ pub(crate) fn cut(shape: &Shape<'_>, watch: Watch<'_>) -> Result<Cut, ChartError
     let uv: Option<&[[f32; 2]]> = shape.uv.map(bytemuck::cast_slice);
     let input = MeshInput {
         existing_uvs: uv,
-        ..MeshInput::new(
-            bytemuck::cast_slice(&shape.positions),
-            shape.triangles.as_flattened(),
-        )
+        ..MeshInput::new(bytemuck::cast_slice(&shape.positions), shape.triangles.as_flattened())
     };
     let atlas = generate(input, &options, watch)?;
     if atlas.chart_count > MOST_CHARTS {
@@ -101,7 +98,12 @@ pub(crate) fn cut(shape: &Shape<'_>, watch: Watch<'_>) -> Result<Cut, ChartError
         let has_chart = triangle.iter().all(|v| vertices[*v as usize].chart < atlas.chart_count);
         if has_chart { *triangle } else { Charts::NOWHERE }
     });
-    Ok(Cut { triangles: triangles.collect(), vertices, charts: atlas.chart_count })
+    let triangles: Vec<[u32; 3]> = triangles.collect();
+    // Triangles too thin for coordinates in single precision have no chart.
+    if triangles.iter().all(|triangle| *triangle == Charts::NOWHERE) {
+        return Err(ChartError::NoArea);
+    }
+    Ok(Cut { vertices, triangles, charts: atlas.chart_count })
 }
 
 /// Lays the charts of a surface out at a density, those that `keep` names. They share one rectangle as
@@ -130,7 +132,8 @@ pub(crate) fn lay_out(
     };
     let pack = |page_size| {
         let density = Density::Fixed { texels_per_unit: lumels_a_metre, page_size };
-        let options = Options { density, packing: Packing::Fast, padding: PADDING, ..Options::default() };
+        let options =
+            Options { density, packing: Packing::Fast, padding: PADDING, ..Options::default() };
         generate(input, &options, &|_| true)
     };
     let mut atlas = pack(None)?;
@@ -155,15 +158,15 @@ pub(crate) fn lay_out(
     for (own, triangle) in kept.into_iter().zip(mesh.indices.as_chunks::<3>().0) {
         placed[own] = *triangle;
     }
-    Ok(Charts {
-        sizes,
-        vertices,
-        triangles: placed,
-    })
+    Ok(Charts { sizes, vertices, triangles: placed })
 }
 
 /// Calls the library.
-fn generate(input: MeshInput<'_>, options: &Options, watch: Watch<'_>) -> Result<Atlas, ChartError> {
+fn generate(
+    input: MeshInput<'_>,
+    options: &Options,
+    watch: Watch<'_>,
+) -> Result<Atlas, ChartError> {
     let progress = |progress: Progress| {
         watch(if progress.stage == Stage::Parameterizing { progress.done } else { 0 })
     };

@@ -17,6 +17,8 @@ use crate::sheet::Sheet;
 pub const PAGE: u32 = 1024;
 /// Pages of that size, at most.
 pub const MOST_PAGES: u32 = 8;
+/// Sides of smaller pages, on one of which little scenes fit.
+const SMALLER: [u32; 3] = [128, 256, 512];
 /// Rectangles begin at multiples of this, so that no block of a codec's transform belongs to two.
 const ALIGNMENT: i32 = 4;
 /// Share of a page that charts fill, about: the first guess.
@@ -39,8 +41,8 @@ pub struct LaidOut {
     pub coarser: bool,
 }
 
-/// Lays sheets out on pages: on one of a size, as densely as they fit, or with lumels of a size, on up to
-/// [`MOST_PAGES`] pages of [`PAGE`]² or with the smallest lumels that fit these.
+/// Lays sheets out on pages: on one of a size, as densely as they fit, or with lumels of a size, on one
+/// smaller page or up to [`MOST_PAGES`] pages of [`PAGE`]², or with the smallest lumels that fit these.
 ///
 /// # Errors
 /// [`ChartError::NoRoom`] where no density fits, [`ChartError::NoArea`] without sheets, and whatever the
@@ -56,15 +58,20 @@ pub fn laid_out(sheets: &[Sheet], spec: LightmapSpec) -> Result<LaidOut, ChartEr
     };
     let lumels = f64::from(size) * f64::from(size) * f64::from(pages);
     let guess = (FILLED * lumels / area).sqrt();
-    let attempt = |density: f64| at_density(sheets, density as f32, size, pages);
+    let on = |density: f64, size, pages| at_density(sheets, density as f32, size, pages);
+    let attempt = |density| on(density, size, pages);
     let done = |layout, density: f64| {
         let coarser = asked.is_some_and(|asked| density < asked);
         Ok(LaidOut { layout, texel: (1.0 / density) as f32, coarser })
     };
-    if let Some(asked) = asked.filter(|asked| *asked < 2.0 * guess)
-        && let Some(layout) = attempt(asked)?
-    {
-        return done(layout, asked);
+    if let Some(asked) = asked.filter(|asked| *asked < 2.0 * guess) {
+        let needed = asked * asked * area;
+        let smaller = SMALLER.into_iter().filter(|size| f64::from(size * size) > needed);
+        for (size, pages) in smaller.map(|size| (size, 1)).chain([(size, pages)]) {
+            if let Some(layout) = on(asked, size, pages)? {
+                return done(layout, asked);
+            }
+        }
     }
     let (mut fits, mut least_too_dense) = (None, f64::INFINITY);
     let mut density = asked.map_or(guess, |asked| asked.min(guess));

@@ -80,9 +80,10 @@ impl Best {
         let at = (lumel.at.y * self.widths[rectangle] + lumel.at.x) as usize;
         let place = &mut self.rectangles[rectangle][at];
         let rank = |lumel: &Lumel, area| (lumel.holds_middle, area);
-        if place.as_ref().is_none_or(|(held, held_area)| {
-            rank(held, *held_area) < rank(&lumel, area)
-        }) {
+        if place
+            .as_ref()
+            .is_none_or(|(held, held_area)| rank(held, *held_area) < rank(&lumel, area))
+        {
             *place = Some((lumel, area));
         }
     }

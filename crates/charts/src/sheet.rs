@@ -185,11 +185,8 @@ fn cut_all(
             ));
         }
         let uv = own.ok().flatten();
-        let shape = Shape {
-            positions: unique.positions.to_vec(),
-            triangles: &primitive.triangles,
-            uv,
-        };
+        let shape =
+            Shape { positions: unique.positions.to_vec(), triangles: &primitive.triangles, uv };
         let key = Key::of(&shape);
         match store.and_then(|store| store.load(key, &shape)) {
             Some(cut) => cuts[number] = Some(Arc::new(cut)),
@@ -251,7 +248,8 @@ fn own_coordinates(primitive: &Primitive) -> Result<Option<&[Vec2]>, &'static st
     if uv.is_empty() {
         return Ok(None);
     }
-    let within = |at: &Vec2| (*at + BORDER).cmpge(Vec2::ZERO).all() && (*at - BORDER).cmple(Vec2::ONE).all();
+    let within =
+        |at: &Vec2| (*at + BORDER).cmpge(Vec2::ZERO).all() && (*at - BORDER).cmple(Vec2::ONE).all();
     if !uv.iter().all(within) {
         return Err("leave the square from 0 to 1");
     }

@@ -82,7 +82,7 @@ impl Store {
         let cut = decode(&bytes)?;
         // It was used: others go first.
         drop(file.set_modified(SystemTime::now()));
-        let is_of = |(own, cut_: &[u32; 3])| fits(own, cut_, &cut);
+        let is_of = |(own, placed): (&[u32; 3], &[u32; 3])| fits(own, placed, &cut);
         let same = cut.triangles.len() == shape.triangles.len()
             && shape.triangles.iter().zip(&cut.triangles).all(is_of);
         same.then_some(cut)
@@ -123,9 +123,9 @@ impl Store {
 }
 
 /// Whether a triangle of charts stands for a triangle of the shape.
-fn fits(own: &[u32; 3], cut_: &[u32; 3], cut: &Cut) -> bool {
-    *cut_ == Charts::NOWHERE
-        || own.iter().zip(cut_).all(|(own, v)| cut.vertices[*v as usize].source == *own)
+fn fits(own: &[u32; 3], placed: &[u32; 3], cut: &Cut) -> bool {
+    *placed == Charts::NOWHERE
+        || own.iter().zip(placed).all(|(own, v)| cut.vertices[*v as usize].source == *own)
 }
 
 fn encode(cut: &Cut) -> Vec<u8> {
@@ -147,8 +147,8 @@ fn decode(bytes: &[u8]) -> Option<Cut> {
         return None;
     }
     let (counts, rest) = bytes.strip_prefix(MAKER)?.split_at_checked(12)?;
-    let [charts, vertices, triangles]: [u32; 3] = *bytemuck::pod_collect_to_vec::<u8, u32>(counts)
-        .as_array()?;
+    let [charts, vertices, triangles]: [u32; 3] =
+        *bytemuck::pod_collect_to_vec::<u8, u32>(counts).as_array()?;
     let (vertex_bytes, triangle_bytes) =
         rest.split_at_checked(vertices as usize * size_of::<CutVertex>())?;
     if triangle_bytes.len() != triangles as usize * size_of::<[u32; 3]>() || charts > MOST_CHARTS {
@@ -159,9 +159,9 @@ fn decode(bytes: &[u8]) -> Option<Cut> {
     let is_sound = |vertex: &CutVertex| vertex.at.is_finite();
     let exists = |triangle: &[u32; 3]| {
         *triangle == Charts::NOWHERE
-            || triangle.iter().all(|v| {
-                vertices.get(*v as usize).is_some_and(|vertex| vertex.chart < charts)
-            })
+            || triangle
+                .iter()
+                .all(|v| vertices.get(*v as usize).is_some_and(|vertex| vertex.chart < charts))
     };
     let sound = vertices.iter().all(is_sound) && triangles.iter().all(exists);
     sound.then_some(Cut { vertices, triangles, charts })

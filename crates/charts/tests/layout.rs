@@ -77,7 +77,8 @@ fn built_in_scenes_fill_one_page_of_their_own_size() {
         check(&snapshot, &laid_out);
         assert_eq!(laid_out.layout.pages, 1);
         assert_eq!(spec, LightmapSpec::Size(laid_out.layout.page_size));
-        let covered: usize = laid_out.layout.surfaces().iter().map(|s| lumels(&s.charts).len()).sum();
+        let covered: usize =
+            laid_out.layout.surfaces().iter().map(|s| lumels(&s.charts).len()).sum();
         let share = covered as f32 / laid_out.layout.page_size.pow(2) as f32;
         assert!(share > 0.5, "{name}: {share} of the page is covered");
     }
@@ -92,7 +93,11 @@ fn still_surfaces_alone_have_lumels() {
     let mut found: Vec<&str> =
         cut(&scene.snapshot()).sheets.iter().map(|s| names[&s.id.node].as_str()).collect();
     found.dedup();
-    assert_eq!(found, ["room", "tall box"], "not the sphere, which moves, nor the lamp, which is black");
+    assert_eq!(
+        found,
+        ["room", "tall box"],
+        "not the sphere, which moves, nor the lamp, which is black"
+    );
 }
 
 #[test]
@@ -103,6 +108,11 @@ fn a_texel_is_as_large_as_it_is_asked_to_be() {
     let snapshot = stage.snapshot();
     let laid_out = laid_out(&cut(&snapshot).sheets, LightmapSpec::Texel(0.1)).unwrap();
     assert_eq!((laid_out.texel, laid_out.coarser), (0.1, false));
+    assert_eq!(
+        (laid_out.layout.pages, laid_out.layout.page_size),
+        (1, 128),
+        "no more than it takes"
+    );
     check(&snapshot, &laid_out);
     let [surface] = laid_out.layout.surfaces() else { panic!("one surface") };
     let [size] = surface.charts.sizes[..] else { panic!("one rectangle") };
@@ -242,8 +252,8 @@ fn bad_meshes() -> Vec<(&'static str, Primitive)> {
     let line = (0..9).map(|k| k as f32 * Vec3::X).collect();
     let soup = |count: u32, size: f32| {
         let corner = |k: u32| Vec3::new((k * 7919 % 1009) as f32, (k * 104_729 % 997) as f32, 0.0);
-        let positions =
-            (0..count).flat_map(|k| [Vec3::ZERO, size * Vec3::X, size * Vec3::Y].map(|p| corner(k) + p));
+        let positions = (0..count)
+            .flat_map(|k| [Vec3::ZERO, size * Vec3::X, size * Vec3::Y].map(|p| corner(k) + p));
         of(positions.collect(), (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect())
     };
     vec![
@@ -252,14 +262,14 @@ fn bad_meshes() -> Vec<(&'static str, Primitive)> {
         // All pages of a book on one spine.
         (
             "an edge of many triangles",
-            of(
-                [vec![Vec3::ZERO, Vec3::X], fan].concat(),
-                (2..14).map(|k| [0, 1, k]).collect(),
-            ),
+            of([vec![Vec3::ZERO, Vec3::X], fan].concat(), (2..14).map(|k| [0, 1, k]).collect()),
         ),
         (
             "the same triangle thrice, and its back",
-            of(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2], [0, 1, 2], [1, 2, 0], [0, 2, 1]]),
+            of(
+                vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+                vec![[0, 1, 2], [0, 1, 2], [1, 2, 0], [0, 2, 1]],
+            ),
         ),
         ("splinters", soup(500, 1e-6)),
         ("far apart", of(vec![Vec3::ZERO, 1e8 * Vec3::X, 1e8 * Vec3::Y], vec![[0, 1, 2]])),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use lumencast_codec::{Epoch, LightFile, SavedFile, SceneInfo, UpdateInfo};
+use lumencast_codec::{LightFile, SavedFile, SceneInfo, UpdateInfo};
 use lumencast_gather::path_trace::Levels;
 use lumencast_light::Field;
 use lumencast_scene::{FileContents, Scene};

@@ -11,7 +11,8 @@ use lumencast_light::{Field, ProbeVolume};
 use lumencast_scene::{MeshId, NodeInfo, Scene};
 use serde_json::{Value, json};
 
-use crate::arguments::scene_name;
+use crate::arguments::{LightmapArguments, scene_name};
+use crate::lightmap_report::lightmap_report;
 use crate::output::{self, say};
 use crate::remote::Seen;
 use crate::{light_source, remote, warnings, words};
@@ -22,11 +23,18 @@ use crate::{light_source, remote, warnings, words};
 Examples:
   lumencast inspect sponza.light
   lumencast inspect sponza.glb
+  lumencast inspect sponza.glb --charts --texel 0.05
   lumencast inspect http://127.0.0.1:4443/cornell --json")]
 pub(crate) struct Inspect {
     /// A file, the name of a built-in scene, or the address of a server's scene.
     #[arg(value_name = "FILE|URL", value_parser = scene_name())]
     what: String,
+    /// Cuts a scene's still surfaces into charts and says what pages of lumels they would fill. The
+    /// charts are kept in the user's cache folder.
+    #[arg(long)]
+    charts: bool,
+    #[command(flatten)]
+    lightmap: LightmapArguments,
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
@@ -45,7 +53,13 @@ impl Inspect {
             let (file, fields) = read().with_context(|| self.what.clone())?;
             saved_report(&file, &fields, bytes.len() as u64)
         } else {
-            scene_report(&mut Scene::open(&self.what)?)
+            let mut scene = Scene::open(&self.what)?;
+            let mut report = scene_report(&mut scene);
+            if self.charts {
+                let spec = self.lightmap.spec(&scene);
+                report["lightmap"] = lightmap_report(&mut scene, spec)?;
+            }
+            report
         };
         if self.json {
             return output::json(&report);

@@ -21,6 +21,7 @@ mod fingerprint;
 mod inspect;
 mod interrupt;
 mod light_source;
+mod lightmap_report;
 mod manual;
 mod out_file;
 mod output;

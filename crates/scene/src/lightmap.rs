@@ -27,7 +27,9 @@ impl LightmapSpec {
         match *self {
             Self::Size(size) if !limits::PAGE_SIZES.contains(&size) || size % 16 != 0 => {
                 let (least, most) = (limits::PAGE_SIZES.start(), limits::PAGE_SIZES.end());
-                Err(format!("its size is {size}; a page has {least} to {most} lumels a side, a multiple of 16"))
+                Err(format!(
+                    "its size is {size}; a page has {least} to {most} lumels a side, a multiple of 16"
+                ))
             }
             Self::Texel(texel) if !(texel > 0.0 && texel.is_finite()) => {
                 Err(format!("its texel is {texel} metres; it has to be more than 0"))

@@ -3,6 +3,7 @@
 mod drawing;
 mod effort;
 mod gather;
+mod lightmap;
 mod materials;
 mod reading;
 mod scene;
@@ -14,6 +15,7 @@ pub(crate) use drawing::Exposure;
 pub(crate) use drawing::occlusion;
 pub(crate) use effort::{EffortArguments, MOST_SAMPLES};
 pub(crate) use gather::{GatherArguments, source};
+pub(crate) use lightmap::LightmapArguments;
 pub(crate) use materials::Materials;
 pub(crate) use reading::{Reading, ReadingArguments};
 pub(crate) use scene::{SceneArguments, SceneSource, scene_name};

@@ -360,6 +360,8 @@ fn cache_keeps_what_has_not_changed() {
     let deformation = || Some(Arc::new(Deformation::new(mesh.clone(), vec![], None)));
     let instance = |node, deformation| Instance {
         node: NodeId(node),
+        copy: 0,
+        still: true,
         mesh_id: MeshId(0),
         mesh: mesh.clone(),
         deformation,
@@ -399,6 +401,8 @@ fn one_level_finds_what_two_levels_find() {
     let (soup, ball) = (soup(300, 0.15), ball(12, 0.2));
     let instance = |node, mesh: &Arc<Mesh>, deformation, world_from_object| Instance {
         node: NodeId(node),
+        copy: 0,
+        still: true,
         mesh_id: MeshId(node),
         mesh: mesh.clone(),
         deformation,
@@ -455,6 +459,8 @@ fn surfaces_do_not_shade_themselves() {
         );
         let instance = Instance {
             node: NodeId(0),
+            copy: 0,
+            still: true,
             mesh_id: MeshId(0),
             mesh: ball.clone(),
             deformation: None,

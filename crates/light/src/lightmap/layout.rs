@@ -96,7 +96,6 @@ impl Layout {
         let at = self.surfaces.binary_search_by_key(&id, |surface| surface.id).ok()?;
         Some(&self.surfaces[at])
     }
-
 }
 
 impl Surface {

@@ -58,8 +58,7 @@ mod tests {
         let rectangles = vec![Rectangle { page: 1, corner: UVec2::new(8, 4) }];
         let id = SurfaceId { node: 3, primitive: 1, ..SurfaceId::default() };
         let surface = Surface { id, charts: Arc::new(charts), rectangles };
-        let mut lightmap =
-            Lightmap::dark(FieldId(7), Arc::new(Layout::new(16, 2, vec![surface])));
+        let mut lightmap = Lightmap::dark(FieldId(7), Arc::new(Layout::new(16, 2, vec![surface])));
         // What is linear over the pages comes out exactly.
         for y in 0..16 {
             for x in 0..16 {
@@ -74,12 +73,11 @@ mod tests {
     fn points_are_read_where_their_charts_lie() {
         let lightmap = lightmap();
         let surface = SurfaceId { node: 3, primitive: 1, ..SurfaceId::default() };
-        let read = |triangle, weights| {
-            lightmap.irradiance_at(&OnTriangle { surface, triangle, weights })
-        };
+        let read =
+            |triangle, weights| lightmap.irradiance_at(&OnTriangle { surface, triangle, weights });
         let close = |got: Option<Vec3>, want: Vec3| got.unwrap().abs_diff_eq(want, 1e-5);
         assert!(close(read(0, Vec3::X), Vec3::new(10.5, 6.5, 1.0)));
-        assert!(close(read(0, Vec3::splat(1.0 / 3.0)), Vec3::new(13.1666, 7.8333, 1.0)));
+        assert!(close(read(0, Vec3::splat(1.0 / 3.0)), Vec3::new(13.166_667, 7.833_333, 1.0)));
         assert!(close(read(1, Vec3::new(0.5, 0.25, 0.25)), Vec3::new(11.5, 8.5, 1.0)));
         assert_eq!(read(2, Vec3::X), None, "a triangle without area");
         assert_eq!(read(9, Vec3::X), None, "no such triangle");

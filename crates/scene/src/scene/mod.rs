@@ -26,8 +26,8 @@ use crate::gltf::source::Folder;
 use crate::limits::Taken;
 use crate::trs::Trs;
 use crate::{
-    Aabb, AnimationId, Environment, FileContents, LightmapSpec, Material, Mesh, MeshId, NamedView, NodeId,
-    PunctualLight, Snapshot, Transform, View, VolumeSpec,
+    Aabb, AnimationId, Environment, FileContents, LightmapSpec, Material, Mesh, MeshId, NamedView,
+    NodeId, PunctualLight, Snapshot, Transform, View, VolumeSpec,
 };
 
 /// A scene: the contents of its file, the changes by edits, and its time.

@@ -5,6 +5,8 @@ use super::*;
 pub(super) fn snapshot(placed: Vec<(Affine3A, Arc<Mesh>)>) -> Arc<Snapshot> {
     let instance = |(world_from_object, mesh): (Affine3A, Arc<Mesh>)| Instance {
         node: NodeId(0),
+        copy: 0,
+        still: true,
         mesh_id: MeshId(0),
         mesh,
         deformation: None,

@@ -158,6 +158,8 @@ fn morphed(mesh: &Arc<Mesh>, weight: f32) -> Arc<Snapshot> {
     let deformation = Deformation::new(mesh.clone(), vec![weight], None);
     snapshot(vec![Instance {
         node: NodeId(3),
+        copy: 0,
+        still: true,
         mesh_id: MeshId(0),
         mesh: mesh.clone(),
         deformation: Some(Arc::new(deformation)),
