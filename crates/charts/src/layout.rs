@@ -17,6 +17,8 @@ use crate::sheet::Sheet;
 pub const PAGE: u32 = 1024;
 /// Pages of that size, at most.
 pub const MOST_PAGES: u32 = 8;
+/// Lumels a side of the page that scenes fill that ask for no density, at least.
+const USUAL: u32 = 256;
 /// Sides of smaller pages, on one of which little scenes fit.
 const SMALLER: [u32; 3] = [128, 256, 512];
 /// Rectangles begin at multiples of this, so that no block of a codec's transform belongs to two.
@@ -39,6 +41,17 @@ pub struct LaidOut {
     pub texel: f32,
     /// Whether lumels are larger than they were asked for, since there are only so many pages.
     pub coarser: bool,
+}
+
+/// The density of a scene that asks for none: a lumel every decimetre, or more of them where all of it
+/// would not fill a page of 256².
+pub fn usual(sheets: &[Sheet]) -> LightmapSpec {
+    let area: f64 = sheets.iter().map(Sheet::area).sum();
+    let filled = (area / FILLED).sqrt() as f32 / USUAL as f32;
+    match LightmapSpec::default() {
+        LightmapSpec::Texel(texel) if filled < texel => LightmapSpec::Size(USUAL),
+        spec => spec,
+    }
 }
 
 /// Lays sheets out on pages: on one of a size, as densely as they fit, or with lumels of a size, on one

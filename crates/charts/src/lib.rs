@@ -1,7 +1,7 @@
 //! Surfaces of a scene cut into charts, and laid out on pages of lumels.
 //!
 //! [`sheets`] cuts the still surfaces, once for all equal ones, and keeps what it made in a [`Store`].
-//! [`laid_out`] gives them places on pages, at a density. [`lumels`] tells where each lumel lies on its
+//! [`laid_out`] gives them places on pages, at a density; [`usual`] chooses one. [`lumels`] tells where each lumel lies on its
 //! surface.
 //!
 //! ```
@@ -27,7 +27,7 @@ mod sheet;
 mod store;
 
 pub use error::ChartError;
-pub use layout::{LaidOut, MOST_PAGES, PAGE, laid_out};
+pub use layout::{LaidOut, MOST_PAGES, PAGE, laid_out, usual};
 pub use lumels::{Lumel, lumels};
 pub use sheet::{Progress, Sheet, Sheets, sheets};
 pub use store::Store;

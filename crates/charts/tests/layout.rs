@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{Affine3A, Quat, UVec2, Vec2, Vec3};
-use lumencast_charts::{ChartError, LaidOut, MOST_PAGES, PAGE, Sheets, laid_out, lumels, sheets};
+use lumencast_charts::{
+    ChartError, LaidOut, MOST_PAGES, PAGE, Sheets, laid_out, lumels, sheets, usual,
+};
 use lumencast_light::{Charts, Surface};
 use lumencast_scene::{
     BUILTINS, LightmapSpec, Material, Mesh, MeshId, Primitive, Scene, Snapshot, Vertices,
@@ -130,7 +132,21 @@ fn a_texel_is_as_large_as_it_is_asked_to_be() {
     assert!(((at(2.0, 0.5) - at(1.0, 0.5)).length() - 10.0).abs() < 1e-3);
 }
 
-/// A surface of 150 × 150 m: nine pages at a decimetre.
+/// What fills less than a page of 256² at a decimetre has finer lumels.
+#[test]
+fn little_scenes_fill_a_page() {
+    let of = |side: f32| {
+        let mut stage = Stage::default();
+        let material = stage.material(grey());
+        stage.quad(Vec3::ZERO, side * Vec3::X, side * Vec3::Y, material);
+        usual(&cut(&stage.snapshot()).sheets)
+    };
+    assert_eq!(of(0.01), LightmapSpec::Size(256));
+    assert_eq!(of(15.0), LightmapSpec::Size(256));
+    assert_eq!(of(30.0), LightmapSpec::Texel(0.1));
+}
+
+/// Nine surfaces of 100 × 100 m: at a decimetre each nearly fills a page.
 #[test]
 fn lumels_grow_where_pages_end() {
     let mut stage = Stage::default();
@@ -146,7 +162,7 @@ fn lumels_grow_where_pages_end() {
     assert!(laid_out.layout.pages <= MOST_PAGES && laid_out.layout.page_size == PAGE);
 }
 
-/// A box of many triangles whose charts do not fit one page.
+/// A sphere whose charts do not fit one page.
 #[test]
 fn a_primitive_may_have_several_rectangles() {
     let mut stage = Stage::default();

@@ -1,7 +1,9 @@
 //! What a lightmap of a scene's still surfaces would be like.
 
+use std::time::Instant;
+
 use anyhow::Result;
-use lumencast_charts::{LaidOut, Progress, Sheet, Sheets, Store, laid_out, lumels, sheets};
+use lumencast_charts::{LaidOut, Progress, Sheet, Sheets, Store, laid_out, lumels, sheets, usual};
 use lumencast_light::Surface;
 use lumencast_scene::{LightmapSpec, Scene};
 use serde_json::{Value, json};
@@ -9,18 +11,23 @@ use serde_json::{Value, json};
 use crate::output;
 
 /// Pages, charts, density and coverage, with what has no lumels and why.
-pub(crate) fn lightmap_report(scene: &mut Scene, spec: LightmapSpec) -> Result<Value> {
+pub(crate) fn lightmap_report(scene: &mut Scene, spec: Option<LightmapSpec>) -> Result<Value> {
     let bar = output::share_bar("Cutting surfaces");
     let show = |Progress { done, total }: Progress| {
         bar.set_position(output::SHARE_BAR_LENGTH as u64 * done as u64 / total.max(1) as u64);
         true
     };
+    let start = Instant::now();
     let Sheets { sheets, notes } = sheets(&scene.snapshot(), Store::of_user().as_ref(), &show)?;
     bar.finish_and_clear();
+    let cut = start.elapsed().as_secs_f64();
     if sheets.is_empty() {
         return Ok(json!({ "pages": 0, "surfaces": 0, "notes": notes }));
     }
-    let LaidOut { layout, texel, coarser } = laid_out(&sheets, spec)?;
+    let start = Instant::now();
+    let LaidOut { layout, texel, coarser } =
+        laid_out(&sheets, spec.unwrap_or_else(|| usual(&sheets)))?;
+    let laid_out = start.elapsed().as_secs_f64();
     let covered: usize = layout.surfaces().iter().map(|s: &Surface| lumels(&s.charts).len()).sum();
     Ok(json!({
         "pages": layout.pages,
@@ -31,6 +38,7 @@ pub(crate) fn lightmap_report(scene: &mut Scene, spec: LightmapSpec) -> Result<V
         "charts": sheets.iter().map(Sheet::charts).sum::<usize>(),
         "lumels": covered,
         "coverage": covered as f32 / layout.lumel_count().max(1) as f32,
+        "seconds": { "cut": cut, "laid_out": laid_out },
         "notes": notes,
     }))
 }

@@ -277,6 +277,35 @@ fn pictures_that_cannot_be_compared_are_refused() {
 }
 
 #[test]
+fn charts_of_a_scene_can_be_inspected() {
+    let cache = Folder::new("charts");
+    let inspect = |arguments: &[&str]| {
+        let arguments = [&["inspect", "cornell", "--charts"], arguments].concat();
+        run_with(&arguments, &[("XDG_CACHE_HOME", cache.0.to_str().expect("text"))])
+    };
+    let report = inspect(&["--json"]).json();
+    let lightmap = &report["lightmap"];
+    assert_eq!((&lightmap["pages"], &lightmap["page_size"]), (&json!(1), &json!(256)));
+    assert!(lightmap["coverage"].as_f64().is_some_and(|share| (0.5..1.0).contains(&share)));
+    let kept = cache.0.join("lumencast/charts");
+    assert_eq!(kept.read_dir().expect("charts are kept").count(), 4);
+    let finer = &inspect(&["--texel", "0.01", "--json"]).json()["lightmap"];
+    assert!(finer["texel"].as_f64().is_some_and(|texel| (texel - 0.01).abs() < 1e-6));
+    assert!(finer["lumels"].as_u64() > lightmap["lumels"].as_u64());
+    let words = inspect(&["--lightmap", "128"]).stdout;
+    assert!(words.contains("lightmap: ") && words.contains("page size 128"), "{words}");
+    for (arguments, word) in [
+        (&["--lightmap", "100"][..], "multiple of 16"),
+        (&["--texel", "0"], "more than 0"),
+        (&["--texel", "1", "--lightmap", "128"], "cannot be used with"),
+    ] {
+        let ran = inspect(arguments);
+        assert_eq!(ran.code, Some(2), "{ran:?}");
+        assert!(ran.stderr.contains(word), "{ran:?}");
+    }
+}
+
+#[test]
 fn what_was_baked_can_be_inspected() {
     let folder = Folder::new("bake");
     let path = folder.0.join("cornell.light").to_str().expect("text").to_owned();

@@ -10,15 +10,16 @@ pub(crate) struct LightmapArguments {
     /// density.
     #[arg(long, value_name = "SIZE", value_parser = size, conflicts_with = "texel")]
     lightmap: Option<LightmapSpec>,
-    /// A lumel every so many metres, in place of the scene's own density; 0.1 where it has none.
+    /// A lumel every so many metres, in place of the scene's own density. Where that has none, 0.1 or,
+    /// in little scenes, less.
     #[arg(long, value_name = "METRES", value_parser = texel)]
     texel: Option<LightmapSpec>,
 }
 
 impl LightmapArguments {
-    /// The density for a scene.
-    pub(crate) fn spec(&self, scene: &Scene) -> LightmapSpec {
-        self.lightmap.or(self.texel).or(scene.lightmap()).unwrap_or_default()
+    /// The density that is asked for, here or by the scene.
+    pub(crate) fn spec(&self, scene: &Scene) -> Option<LightmapSpec> {
+        self.lightmap.or(self.texel).or(scene.lightmap())
     }
 }
 
