@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lumencast_charts::{LaidOut, Progress, Sheet, Sheets, Store, laid_out, lumels, sheets, usual};
-use lumencast_light::Surface;
+use lumencast_light::{Charts, Surface};
 use lumencast_scene::{LightmapSpec, Scene};
 use serde_json::{Value, json};
 
@@ -29,6 +29,8 @@ pub(crate) fn lightmap_report(scene: &mut Scene, spec: Option<LightmapSpec>) -> 
         laid_out(&sheets, spec.unwrap_or_else(|| usual(&sheets)))?;
     let laid_out = start.elapsed().as_secs_f64();
     let covered: usize = layout.surfaces().iter().map(|s: &Surface| lumels(&s.charts).len()).sum();
+    let triangles = layout.surfaces().iter().flat_map(|surface| &surface.charts.triangles);
+    let left_out = triangles.filter(|triangle| **triangle == Charts::NOWHERE).count();
     Ok(json!({
         "pages": layout.pages,
         "page_size": layout.page_size,
@@ -36,6 +38,7 @@ pub(crate) fn lightmap_report(scene: &mut Scene, spec: Option<LightmapSpec>) -> 
         "coarser_than_asked": coarser,
         "surfaces": layout.surfaces().len(),
         "charts": sheets.iter().map(Sheet::charts).sum::<usize>(),
+        "triangles_left_out": left_out,
         "lumels": covered,
         "coverage": covered as f32 / layout.lumel_count().max(1) as f32,
         "seconds": { "cut": cut, "laid_out": laid_out },
