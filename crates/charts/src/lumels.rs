@@ -14,7 +14,7 @@ pub struct Lumel {
     pub at: UVec2,
     /// The primitive's triangle that it lies on.
     pub triangle: u32,
-    /// Barycentric weights of its point: of its middle where a triangle holds that, or else of the
+    /// Barycentric weights of its point: nearly its middle where a triangle holds that, or else the
     /// middle of the largest share that a triangle has of it.
     pub weights: Vec3,
     /// Its middle lies in the triangle.

@@ -9,8 +9,8 @@ pub(crate) struct Share {
     pub(crate) lumel: UVec2,
     /// Area that lies in it, of 1.
     pub(crate) area: f32,
-    /// Barycentric weights of a point of the triangle in it: the lumel's middle, if that lies in the
-    /// triangle, or else the middle of the share.
+    /// Barycentric weights of a point of the triangle in it: nearly the lumel's middle, if that lies in
+    /// the triangle, or else the middle of the share.
     pub(crate) weights: Vec3,
     /// The lumel's middle lies in the triangle.
     pub(crate) holds_middle: bool,
@@ -18,6 +18,9 @@ pub(crate) struct Share {
 
 /// Weights so little below 0 still count as inside: what single precision leaves open on an edge.
 const EDGE: f32 = 1e-5;
+/// How far a lumel's point moves from the lumel's middle to that of the share. On the edge of a chart it
+/// would lie in the plane of the wall beside, and see through that.
+const INWARDS: f32 = 1.0 / 16.0;
 /// Shares smaller than this are passed over.
 const LEAST_AREA: f32 = 1e-6;
 
@@ -47,7 +50,7 @@ fn share(corners: [Vec2; 3], twice: f32, lumel: UVec2) -> Option<Share> {
         return None;
     }
     let inside = weights(middle).max(Vec3::ZERO);
-    let weights = if holds_middle { own.max(Vec3::ZERO) } else { inside };
+    let weights = if holds_middle { own.max(Vec3::ZERO).lerp(inside, INWARDS) } else { inside };
     let weights = weights / weights.element_sum();
     weights.is_finite().then_some(Share { lumel, area, weights, holds_middle })
 }

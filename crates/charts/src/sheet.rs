@@ -61,6 +61,11 @@ impl Sheet {
         self.cut.charts as usize
     }
 
+    /// Number of its triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.cut.triangles.len()
+    }
+
     /// The charts of its triangles, in their order; nothing for triangles without area.
     pub fn chart_of(&self, triangle: usize) -> Option<u32> {
         let [first, ..] = *self.cut.triangles.get(triangle)?;

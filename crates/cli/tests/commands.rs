@@ -306,6 +306,25 @@ fn charts_of_a_scene_can_be_inspected() {
 }
 
 #[test]
+fn bench_lightmap_judges_the_light_of_lumels() {
+    let cache = Folder::new("lumels");
+    let bench = |arguments: &[&str]| {
+        let arguments = [&["bench", "lightmap"], arguments].concat();
+        run_with(&arguments, &[("XDG_CACHE_HOME", cache.0.to_str().expect("text"))])
+    };
+    let few = ["cornell", "--samples", "16", "--reference-noise", "35"];
+    let report = bench(&[&few[..], &["--json"]].concat()).json();
+    let [gathered, filtered] =
+        ["gathered", "filtered"].map(|what| report["irradiance_db"][what].as_f64().expect(what));
+    assert!(gathered > 20.0 && filtered > gathered + 2.0, "{gathered} {filtered}");
+    assert!(report["reference"]["noise_db"].as_f64().is_some_and(|noise| noise >= 35.0));
+    let words = bench(&few).stdout;
+    assert!(words.contains("irradiance: ") && words.contains("1 × 256²"), "{words}");
+    let alone = cache.triangles("alone", &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 0.0);
+    bench(&[&alone, "--samples", "1"]).failed_saying(&["no light arrives"]);
+}
+
+#[test]
 fn what_was_baked_can_be_inspected() {
     let folder = Folder::new("bake");
     let path = folder.0.join("cornell.light").to_str().expect("text").to_owned();

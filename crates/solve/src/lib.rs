@@ -27,6 +27,7 @@ pub mod blend;
 mod error;
 mod field;
 pub mod fit;
+mod lightmap;
 mod noise;
 mod options;
 mod placement;
@@ -40,6 +41,7 @@ mod walls;
 
 pub use bake::{Bake, Baked, Done, Effort, bake};
 pub use error::SolveError;
+pub use lightmap::{LightmapSolver, spread, with_backs};
 pub use options::{FitOptions, GatherOptions};
 pub use placement::{Survey, default_volume, survey, volumes};
 pub use request::{Asked, Request, Turn};

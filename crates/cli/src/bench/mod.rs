@@ -6,6 +6,7 @@ mod bmfr;
 mod drawing;
 #[cfg(feature = "gpu")]
 mod judge;
+mod lightmap;
 mod paths;
 #[cfg(feature = "gpu")]
 mod peers;
@@ -27,6 +28,7 @@ pub(crate) enum Bench {
     Tick(tick::BenchTick),
     Rays(rays::BenchRays),
     Paths(paths::BenchPaths),
+    Lightmap(lightmap::BenchLightmap),
     #[cfg(feature = "gpu")]
     Quality(Box<quality::BenchQuality>),
     #[cfg(feature = "gpu")]
@@ -44,6 +46,7 @@ impl Bench {
             Self::Tick(command) => command.run(),
             Self::Rays(command) => command.run(),
             Self::Paths(command) => command.run(),
+            Self::Lightmap(command) => command.run(),
             Self::Quality(command) => command.run(),
             #[cfg(feature = "gpu")]
             Self::Peers(command) => command.run(),

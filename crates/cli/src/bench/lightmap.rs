@@ -1,0 +1,272 @@
+//! `lumencast bench lightmap`: how right the light of lumels is.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use glam::Vec3;
+use lumencast_charts::{LaidOut, Progress, Store, laid_out, sheets, usual};
+use lumencast_gather::path_trace::{CpuPathTracer, Levels, Options};
+use lumencast_gather::{Gather, Job, Receiver};
+use lumencast_light::{FieldId, Lightmap, Place};
+use lumencast_scene::Snapshot;
+use lumencast_solve::{LightmapSolver, spread, with_backs};
+use serde_json::json;
+
+use super::quantile;
+use crate::arguments::{LightmapArguments, Materials, SceneSource};
+use crate::output::{self, say};
+
+/// Points of surfaces at which light is judged.
+const POINTS: usize = 4096;
+/// Samples that lumels, and points of the reference, take at a time.
+const PASS: u32 = 16;
+const REFERENCE_PASS: u32 = 256;
+/// Shares of backs above which a point lies within something.
+const BURIED: f32 = 0.5;
+
+/// Measures how near the irradiance of lumels comes to the path tracer's.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  lumencast bench lightmap cornell
+  lumencast bench lightmap sponza.glb --environment sky:1000 --texel 0.1 --samples 256 --json
+
+Irradiance is read at 4,096 points spread evenly by area over the surfaces that have lumels. It is
+compared as E/π, gamma 2.2, clamped, where the brightest hundredth of the reference is white. Points
+within something are left out.")]
+pub(crate) struct BenchLightmap {
+    #[command(flatten)]
+    scene: SceneSource,
+    #[command(flatten)]
+    lightmap: LightmapArguments,
+    /// Surface scattering events on a path, seen from a lumel.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=64))]
+    bounces: u32,
+    /// How surfaces reflect.
+    #[arg(long, value_enum, default_value_t = Materials::Full)]
+    materials: Materials,
+    /// Samples a lumel.
+    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    samples: u32,
+    /// The reference's noise at which it is good enough, decibels.
+    #[arg(long, value_name = "DB", default_value_t = 55.0)]
+    reference_noise: f64,
+    /// Samples of a point of the reference, at most.
+    #[arg(long, default_value_t = 65_536, value_parser = clap::value_parser!(u32).range(512..=1 << 24))]
+    reference_samples: u32,
+    /// Prints JSON only.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Irradiance at points, and how far to trust it.
+struct Reference {
+    /// Lux; nothing for points within something.
+    irradiance: Vec<Option<Vec3>>,
+    /// What is displayed as white, lux.
+    white: f32,
+    /// How far noise alone takes it from what is right, decibels.
+    noise: f64,
+    /// Samples a point.
+    samples: u32,
+}
+
+impl BenchLightmap {
+    pub(crate) fn run(self) -> Result<()> {
+        let mut scene = self.scene.open()?;
+        let snapshot = scene.snapshot();
+        let options =
+            Options { materials: self.materials.model(), threads: None, levels: Levels::One };
+        let mut tracer =
+            CpuPathTracer::new(options).context("cannot start the threads that trace")?;
+
+        let spec = self.lightmap.spec(&scene);
+        let start = Instant::now();
+        let laid_out = self.lay_out(&snapshot, spec, &mut tracer)?;
+        let layout_seconds = start.elapsed().as_secs_f64();
+
+        let mut solver = LightmapSolver::new(FieldId(0), &snapshot, &laid_out);
+        let start = Instant::now();
+        self.gather(&mut solver, &snapshot, &mut tracer)?;
+        let gather_seconds = start.elapsed().as_secs_f64();
+        solver.solve(false);
+        let gathered = solver.lightmap().clone();
+        let start = Instant::now();
+        solver.solve(true);
+        let filter_seconds = start.elapsed().as_secs_f64();
+
+        let places = spread(&snapshot, &laid_out.layout, POINTS);
+        let reference = self.reference(&places, &snapshot, &mut tracer)?;
+        let psnr = |lightmap: &Lightmap| reference.psnr(&places, lightmap);
+        let (as_gathered, filtered) = (psnr(&gathered), psnr(solver.lightmap()));
+
+        let LaidOut { layout, texel, .. } = &laid_out;
+        let judged = reference.irradiance.iter().flatten().count();
+        if self.json {
+            return output::json(&json!({
+                "scene": scene.name(),
+                "pages": layout.pages,
+                "page_size": layout.page_size,
+                "texel": texel,
+                "surfaces": layout.surfaces().len(),
+                "backs": layout.surfaces().iter().filter(|surface| surface.id.back).count(),
+                "lumels": solver.lumel_count(),
+                "buried": solver.buried_count(),
+                "samples": self.samples,
+                "bounces": self.bounces,
+                "materials": self.materials.to_string(),
+                "points": judged,
+                "irradiance_db": { "gathered": as_gathered, "filtered": filtered },
+                "reference": { "noise_db": reference.noise, "samples": reference.samples },
+                "seconds": {
+                    "layout": layout_seconds, "gather": gather_seconds, "filter": filter_seconds,
+                },
+            }));
+        }
+        say!(
+            "{}: {} × {}², a lumel every {:.1} cm, {} lumels ({} within something)",
+            scene.name(),
+            layout.pages,
+            layout.page_size,
+            100.0 * texel,
+            solver.lumel_count(),
+            solver.buried_count()
+        );
+        say!(
+            "irradiance: {filtered:.1} dB, as gathered {as_gathered:.1} dB, {} samples a lumel",
+            self.samples
+        );
+        say!(
+            "reference: {judged} points, noise {:.1} dB after {} samples",
+            reference.noise,
+            reference.samples
+        );
+        say!(
+            "seconds: layout {layout_seconds:.1}, light {gather_seconds:.1}, filter {filter_seconds:.1}"
+        );
+        Ok(())
+    }
+
+    fn lay_out(
+        &self,
+        scene: &Arc<Snapshot>,
+        spec: Option<lumencast_scene::LightmapSpec>,
+        tracer: &mut CpuPathTracer,
+    ) -> Result<LaidOut> {
+        let bar = output::share_bar("Cutting surfaces");
+        let show = |Progress { done, total }: Progress| {
+            bar.set_position(output::SHARE_BAR_LENGTH as u64 * done as u64 / total.max(1) as u64);
+            true
+        };
+        let fronts = sheets(scene, Store::of_user().as_ref(), &show)?.sheets;
+        bar.finish_and_clear();
+        ensure!(!fronts.is_empty(), "the scene has no still surface that lumels can lie on");
+        let all = with_backs(fronts, scene, tracer)?;
+        Ok(laid_out(&all, spec.unwrap_or_else(|| usual(&all)))?)
+    }
+
+    fn gather(
+        &self,
+        solver: &mut LightmapSolver,
+        scene: &Arc<Snapshot>,
+        tracer: &mut CpuPathTracer,
+    ) -> Result<()> {
+        let bar = output::bar(u64::from(self.samples.div_ceil(PASS)), "Gathering at lumels");
+        for (pass, first) in (0..self.samples).step_by(PASS as usize).enumerate() {
+            let samples = PASS.min(self.samples - first);
+            let job = solver.job(scene.clone(), samples);
+            let job = Job { bounces: self.bounces, seed: pass as u64, ..job };
+            let budgets = job.budgets.clone();
+            let ticket = tracer.submit(job);
+            let gathered = tracer.wait(ticket).context("gathering ended early")?;
+            solver.take(&gathered, &budgets);
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        Ok(())
+    }
+
+    /// The path tracer's irradiance, refined until noise is as low as asked for.
+    fn reference(
+        &self,
+        places: &[Place],
+        scene: &Arc<Snapshot>,
+        tracer: &mut CpuPathTracer,
+    ) -> Result<Reference> {
+        let receivers: Arc<[Receiver]> =
+            places.iter().map(|place| Receiver::point(place.position, place.normal)).collect();
+        let mut halves = [vec![Vec3::ZERO; places.len()], vec![Vec3::ZERO; places.len()]];
+        let mut backs = vec![0.0; places.len()];
+        let mut passes = 0;
+        let bar = output::spinner("Computing the reference".to_owned());
+        loop {
+            for half in &mut halves {
+                let job = Job {
+                    bounces: self.bounces,
+                    // Apart from the lumels' seeds.
+                    seed: 1 << 32 | u64::from(passes),
+                    ..Job::new(scene.clone(), receivers.clone(), REFERENCE_PASS)
+                };
+                let ticket = tracer.submit(job);
+                let gathered = tracer.wait(ticket).context("gathering ended early")?;
+                for ((sum, backs), found) in
+                    half.iter_mut().zip(&mut backs).zip(gathered.sums.iter())
+                {
+                    *sum += found.sum[0];
+                    *backs += found.back_face_fraction;
+                }
+                passes += 1;
+            }
+            let of_half = (passes / 2 * REFERENCE_PASS) as f32;
+            let of = |half: &[Vec3]| -> Vec<Option<Vec3>> {
+                let means = half.iter().zip(&backs);
+                means
+                    .map(|(sum, b)| (*b < BURIED * passes as f32).then(|| *sum / of_half))
+                    .collect()
+            };
+            let [one, other] = [of(&halves[0]), of(&halves[1])];
+            let irradiance: Vec<Option<Vec3>> =
+                one.iter().zip(&other).map(|(a, b)| Some(0.5 * ((*a)? + (*b)?))).collect();
+            let white = white(irradiance.iter().flatten());
+            ensure!(white > 0.0, "no light arrives at the scene's still surfaces");
+            // Each half lies as far from the other as twice the mean lies from what is right.
+            let pairs = one.iter().flatten().copied().zip(other.iter().flatten().copied());
+            let noise = psnr(pairs, white) + 20.0 * 2.0f64.log10();
+            let samples = passes * REFERENCE_PASS;
+            if noise >= self.reference_noise || samples >= self.reference_samples {
+                bar.finish_and_clear();
+                return Ok(Reference { irradiance, white, noise, samples });
+            }
+        }
+    }
+}
+
+impl Reference {
+    /// How near a lightmap comes at the points, decibels.
+    fn psnr(&self, places: &[Place], lightmap: &Lightmap) -> f64 {
+        let pairs = places.iter().zip(&self.irradiance).filter_map(|(place, right)| {
+            Some((lightmap.irradiance_at(place.on.as_ref()?)?, (*right)?))
+        });
+        psnr(pairs, self.white)
+    }
+}
+
+/// The 99th percentile of the largest channels.
+fn white<'a>(irradiances: impl Iterator<Item = &'a Vec3>) -> f32 {
+    let mut values: Vec<f64> = irradiances.map(|e| f64::from(e.max_element())).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    if values.is_empty() { 0.0 } else { quantile(&values, 0.99) as f32 }
+}
+
+/// PSNR of displayed values: gamma 2.2, clamped.
+fn psnr(pairs: impl Iterator<Item = (Vec3, Vec3)>, white: f32) -> f64 {
+    let shown = |e: Vec3| (e / white).clamp(Vec3::ZERO, Vec3::ONE).powf(1.0 / 2.2);
+    let (mut squares, mut count) = (0.0, 0);
+    for (a, b) in pairs {
+        squares += f64::from((shown(a) - shown(b)).length_squared());
+        count += 3;
+    }
+    -10.0 * (squares / f64::from(count)).log10()
+}

@@ -1,0 +1,141 @@
+//! Light at lumels, beside what is known in closed form.
+
+use std::f32::consts::PI;
+
+use glam::{Affine3A, Vec3};
+use lumencast_charts::{LaidOut, Sheet, laid_out, sheets};
+use lumencast_gather::path_trace::{CpuPathTracer, Options};
+use lumencast_gather::{Gather, Job};
+use lumencast_light::{FieldId, Lightmap};
+use lumencast_scene::{Environment, LightmapSpec, Material, Snapshot};
+use lumencast_solve::{LightmapSolver, spread, with_backs};
+use lumencast_testkit::scenes::{Stage, lambert};
+use std::sync::Arc;
+
+fn tracer() -> CpuPathTracer {
+    CpuPathTracer::new(Options::default()).expect("threads")
+}
+
+fn laid(scene: &Arc<Snapshot>) -> LaidOut {
+    let fronts = sheets(scene, None, &|_| true).expect("charts").sheets;
+    let all = with_backs(fronts, scene, &mut tracer()).expect("a look");
+    laid_out(&all, LightmapSpec::Size(128)).expect("a layout")
+}
+
+fn lit(scene: &Arc<Snapshot>, bounces: u32, samples: u32) -> (LightmapSolver, LaidOut) {
+    let laid_out = laid(scene);
+    let mut solver = LightmapSolver::new(FieldId(3), scene, &laid_out);
+    let mut tracer = tracer();
+    let job = Job { bounces, ..solver.job(scene.clone(), samples) };
+    let budgets = job.budgets.clone();
+    let ticket = tracer.submit(job);
+    solver.take(&tracer.wait(ticket).expect("light"), &budgets);
+    solver.solve(true);
+    (solver, laid_out)
+}
+
+fn irradiances(scene: &Snapshot, lightmap: &Lightmap, count: usize) -> Vec<Vec3> {
+    let places = spread(scene, &lightmap.layout, count);
+    places
+        .iter()
+        .map(|p| lightmap.irradiance_at(&p.on.expect("a point")).expect("lumels"))
+        .collect()
+}
+
+/// A closed room whose walls shine: on every lumel arrives π times the radiance, the sum of a geometric
+/// series.
+#[test]
+fn a_furnace_is_as_bright_everywhere() {
+    let mut stage = Stage::default();
+    let wall = stage.material(lambert(Vec3::splat(0.5), Vec3::new(1.0, 2.0, 0.5)));
+    stage.room(Vec3::ZERO, Vec3::new(4.0, 2.0, 3.0), wall);
+    let scene = stage.snapshot();
+    let (solver, _) = lit(&scene, 12, 64);
+    assert_eq!(solver.buried_count(), 0);
+    let expected = PI * Vec3::new(1.0, 2.0, 0.5) / (1.0 - 0.5);
+    for irradiance in irradiances(&scene, solver.lightmap(), 1000) {
+        let ratio = irradiance / expected;
+        assert!((ratio - 1.0).abs().max_element() < 0.02, "{ratio}");
+    }
+}
+
+/// Under an even sky: a plate that stands free has lumels on both sides and is as bright as the sky; a
+/// closed box has none on its insides, though its material is double-sided.
+#[test]
+fn backs_have_lumels_where_light_arrives() {
+    let mut stage = Stage::default();
+    let both = Material { double_sided: true, ..lambert(Vec3::splat(0.5), Vec3::ZERO) };
+    let both = stage.material(both);
+    let single = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
+    stage.quad(Vec3::new(10.0, 0.0, 0.0), Vec3::X, Vec3::Y, both);
+    stage.room(Vec3::ZERO, Vec3::splat(-2.0), both);
+    stage.quad(Vec3::new(-10.0, 0.0, 0.0), Vec3::X, Vec3::Y, single);
+    stage.environment(Environment::Constant { radiance: Vec3::ONE });
+    let scene = stage.snapshot();
+    let (solver, laid_out) = lit(&scene, 2, 64);
+    let backs = laid_out.layout.surfaces().iter().filter(|s| s.id.back);
+    assert_eq!(backs.map(|s| s.id.node).collect::<Vec<_>>(), [0], "the plate's alone");
+    // A convex thing's outside, and both sides of a plate, see nothing but the sky.
+    for irradiance in irradiances(&scene, solver.lightmap(), 500) {
+        assert!((irradiance / PI - 1.0).abs().max_element() < 1e-3, "{irradiance}");
+    }
+}
+
+/// Below a box that stands on a plate no light arrives, and none is measured: its lumels take that of
+/// the plate about it, so that no dark seam shows where they meet.
+#[test]
+fn lumels_within_something_take_the_light_about_them() {
+    let mut stage = Stage::default();
+    let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
+    stage.quad(Vec3::new(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X, grey);
+    stage.room(Vec3::ZERO, Vec3::splat(-1.0), grey);
+    stage.environment(Environment::Constant { radiance: Vec3::ONE });
+    let scene = stage.snapshot();
+    let (solver, _) = lit(&scene, 0, 256);
+    let share = solver.buried_count() as f32 / solver.lumel_count() as f32;
+    // The box stands halfway in the plate: a sixteenth of the plate is within it.
+    assert!((0.01..0.1).contains(&share), "{share}");
+    let dark =
+        irradiances(&scene, solver.lightmap(), 2000).iter().filter(|e| e.x < 0.2 * PI).count();
+    assert_eq!(dark, 0);
+}
+
+/// What is not finite does not count, nor what was never gathered.
+#[test]
+fn a_lightmap_without_light_is_dark() {
+    let mut stage = Stage::default();
+    let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
+    stage.primitive(plate(), Affine3A::from_scale(Vec3::new(1.0, 3.0, 1.0)));
+    stage.quad(Vec3::ZERO, Vec3::X, Vec3::Y, grey);
+    let scene = stage.snapshot();
+    let laid_out = laid(&scene);
+    let mut solver = LightmapSolver::new(FieldId(0), &scene, &laid_out);
+    solver.solve(true);
+    assert!(solver.lightmap().irradiance.iter().all(|e| *e == Vec3::ZERO));
+}
+
+fn plate() -> lumencast_scene::Primitive {
+    let mut stage = Stage::default();
+    let grey = stage.material(lambert(Vec3::ONE, Vec3::ZERO));
+    stage.quad(Vec3::ZERO, Vec3::X, Vec3::Z, grey);
+    stage.snapshot().instances[0].mesh.primitives[0].clone()
+}
+
+/// Points are spread by area: a surface twice as large has twice as many.
+#[test]
+fn points_are_spread_by_area() {
+    let mut stage = Stage::default();
+    let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
+    stage.quad(Vec3::ZERO, Vec3::X, Vec3::Y, grey);
+    stage.quad(Vec3::Z, 2.0 * Vec3::X, Vec3::Y, grey);
+    let scene = stage.snapshot();
+    let fronts: Vec<Sheet> = sheets(&scene, None, &|_| true).expect("charts").sheets;
+    let layout = laid_out(&fronts, LightmapSpec::Size(64)).expect("a layout").layout;
+    let places = spread(&scene, &layout, 3000);
+    let first = places.iter().filter(|place| place.position.z == 0.0).count();
+    assert_eq!((places.len(), first), (3000, 1000));
+    let mean = places.iter().filter(|p| p.position.z == 0.0).map(|p| p.position).sum::<Vec3>();
+    let mean = mean / first as f32;
+    assert!((mean - Vec3::new(0.5, 0.5, 0.0)).abs().max_element() < 0.02, "{mean}");
+    assert!(places.iter().all(|place| place.normal == Vec3::Z));
+}
