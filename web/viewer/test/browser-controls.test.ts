@@ -351,9 +351,13 @@ describe('a person at the page', () => {
       });
     const home = await where();
     const [x, y] = await onScreen(page, home.at);
-    await page.mouse.click(x, y);
-    await draw(page);
-    expect(await page.innerText('.inspector')).toMatch(/lamp[^]*spot light/);
+    // A notice may lie over it, which goes when it is clicked.
+    const select = async () => {
+      await page.mouse.click(x, y);
+      await draw(page);
+      return page.innerText('.inspector');
+    };
+    await expect.poll(select).toMatch(/lamp[^]*spot light/);
     await page.click('.inspector [title^="Move"]');
     await draw(page);
     const view = await camera();

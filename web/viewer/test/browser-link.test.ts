@@ -86,25 +86,25 @@ describe.skipIf(!link)('a link that is too slow', () => {
       };
 
       const wide = await measureAt(RATES.wide, MEASURE / 2);
-      expect(wide.layers).toBe(3);
+      expect(wide.layers).toContain(3);
       for (const { updates, median } of wide.regions) {
         expect(updates).toBeGreaterThan(0.8 * wide.tickRate);
         expect(median).toBeLessThan(0.2);
       }
 
       const half = await measureAt(RATES.half);
-      expect(half.layers).toBe(1);
+      expect(half.layers).toContain(1);
       expect(half.tickRate).toBeGreaterThan(0.9 * wide.tickRate);
       for (const { updates, median, p99 } of half.regions) {
-        // Layer 0 is every fourth update.
-        expect(updates).toBeGreaterThan(0.2 * wide.tickRate);
+        // Layer 0 is every fourth update; trying more than the link carries costs some.
+        expect(updates).toBeGreaterThan(0.125 * wide.tickRate);
         expect(median).toBeLessThan(0.5);
         expect(p99).toBeLessThan(2);
       }
 
       const slow = await measureAt(RATES.tooNarrow, 3 * MEASURE);
       const [near, far] = [slow.regions[0], slow.regions[REGIONS - 1]];
-      expect(slow.layers).toBe(1);
+      expect(slow.layers).toContain(1);
       expect(slow.tickRate).toBeGreaterThan(0.8 * wide.tickRate);
       expect(near.updates).toBeGreaterThan(0.1 * wide.tickRate);
       expect(near.median).toBeLessThan(1);
@@ -136,7 +136,8 @@ interface RegionFigures {
 }
 
 interface Figures {
-  readonly layers: number;
+  /** That were read, every half second: a layer that was dropped is tried again now and then. */
+  readonly layers: readonly number[];
   /** Frames of the scene's state a second. */
   readonly tickRate: number;
   /** By number, and so by distance. */
@@ -185,13 +186,15 @@ function watch(camera: [number, number, number]): void {
     lost: 0,
     async measure(ms) {
       const rates: number[] = [];
+      const layers: number[] = [];
       regions = fresh();
       for (let at = 0; at < ms; at += 500) {
         await new Promise((resolve) => setTimeout(resolve, 500));
         rates.push(session.stats.tickRate ?? 0);
+        layers.push(session.stats.layers);
       }
       return {
-        layers: session.stats.layers,
+        layers,
         tickRate: rates.reduce((a, b) => a + b) / rates.length,
         regions: regions.map(({ updates, ages }) => {
           const sorted = ages.toSorted((a, b) => a - b);
@@ -212,5 +215,6 @@ function row(transport: string, rate: number, { layers, regions }: Figures): str
   const cells = ({ updates, median, p99 }: RegionFigures) =>
     `${updates.toFixed(1)} | ${ms(median)} / ${ms(p99)}`;
   const [near, far] = [regions[0], regions[REGIONS - 1]];
-  return `| ${transport} | ${rate} | ${layers} | ${cells(near)} | ${cells(far)} |`;
+  const usual = layers.toSorted()[layers.length >> 1];
+  return `| ${transport} | ${rate} | ${usual} | ${cells(near)} | ${cells(far)} |`;
 }
