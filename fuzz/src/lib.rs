@@ -6,12 +6,15 @@
 pub mod mutate;
 pub mod seeds;
 
-use glam::UVec3;
+use std::sync::Arc;
+
+use glam::{UVec2, UVec3};
 use lumencast_cache::Cache;
 use lumencast_codec::{
-    Catalog, ClientEdit, LightFile, LightTrack, ProbeDecoder, ProbeHeader, StateFrame,
+    Catalog, ClientEdit, LayoutResource, LightFile, LightTrack, LumelDecoder, LumelHeader,
+    ProbeDecoder, ProbeHeader, StateFrame, layout_resources, read_charts,
 };
-use lumencast_light::Order;
+use lumencast_light::{Charts, Layout, OnTriangle, Order, Rectangle, Surface, SurfaceId};
 use lumencast_scene::{Edit, Scene, Script};
 use lumencast_server::{Inbox, Limits, Verdict};
 
@@ -30,6 +33,45 @@ pub fn probe_frames(data: &[u8]) {
     if let Ok(light) = decoder.decode(second) {
         assert!(light.coefficients.iter().all(|c| !c.is_nan()));
     }
+}
+
+/// Lumel frames, alone and one after another.
+pub fn lumel_frames(data: &[u8]) {
+    // A frame that says its own size fits its tile, so that payloads are reached.
+    let size = LumelHeader::read(data).map_or(UVec2::splat(8), |header| header.size);
+    let mut decoder = LumelDecoder::new(size);
+    // As one frame, and cut in two: the second may be a delta against the first.
+    drop(decoder.decode(data));
+    let (first, second) = data.split_at(data.len() / 2);
+    drop(decoder.decode(first));
+    if let Ok(light) = decoder.decode(second) {
+        assert_eq!(light.irradiance.len(), size.element_product() as usize);
+        assert!(light.irradiance.iter().all(|c| c.is_finite() && c.min_element() >= 0.0));
+    }
+}
+
+/// Layouts and charts: what is accepted can be read at any point, and is the same once it is written
+/// and read again.
+pub fn resources(data: &[u8]) {
+    if let Ok(layout) = LayoutResource::read(data) {
+        assert!(layout.charts().len() <= layout.surfaces.len());
+        layout.layout(|_| Some(Arc::default()));
+    }
+    if let Ok(charts) = read_charts(data) {
+        for triangle in 0..charts.triangles.len() {
+            charts.at(triangle as u32, glam::Vec3::X);
+        }
+        let layout = layout_resources(&beside_each_other(charts.clone())).1.remove(0);
+        assert_eq!(read_charts(layout.bytes()), Ok(charts));
+    }
+}
+
+/// A layout of one surface, each of whose rectangles has a page.
+fn beside_each_other(charts: Charts) -> Layout {
+    let pages = charts.sizes.len() as u32;
+    let rectangles = (0..pages).map(|page| Rectangle { page, corner: UVec2::ZERO }).collect();
+    let surface = Surface { id: SurfaceId::default(), charts: Arc::new(charts), rectangles };
+    Layout::new(4096, pages, vec![surface])
 }
 
 /// Catalogs, state frames and edits: what is accepted is the same once it is written and read again.
@@ -60,6 +102,7 @@ pub fn reader(mut data: &[u8]) {
         match track {
             b'c' => drop(cache.add_catalog(frame, now)),
             b's' => drop(cache.add_state(frame, now)),
+            b'r' => drop(cache.add_resource(frame)),
             layer => {
                 let track = LightTrack { field: 0, region: 0, layer: layer % 4 };
                 drop(cache.add_light(track, frame, now));
@@ -67,11 +110,18 @@ pub fn reader(mut data: &[u8]) {
         }
         let light = cache.light(now);
         assert!(light.irradiance(glam::Vec3::ZERO, glam::Vec3::Y).is_finite());
+        for lightmap in light.lightmaps() {
+            for surface in lightmap.layout.surfaces() {
+                let (surface, weights) = (surface.id, glam::Vec3::X);
+                let read = lightmap.irradiance_at(&OnTriangle { surface, triangle: 0, weights });
+                assert!(read.is_none_or(|irradiance| !irradiance.is_nan()));
+            }
+        }
         cache.scene_events();
     }
 }
 
-/// A frame of [`reader`]: its track (`c`atalog, `s`tate, or the number of a layer), its length in two
+/// A frame of [`reader`]: its track (`c`atalog, `s`tate, `r`esource, or the number of a layer), its length in two
 /// bytes, and what it holds.
 pub fn packed(track: u8, frame: &[u8]) -> Vec<u8> {
     let [low, high] = (frame.len() as u16).to_le_bytes();

@@ -1,11 +1,17 @@
 //! Sound bytes from which mutations start: the repository's vectors and a built-in scene.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use base64::{Engine, prelude::BASE64_STANDARD};
-use glam::{Quat, UVec3, Vec3};
-use lumencast_codec::{LightFile, ProbeHeader, SceneInfo, UpdateInfo};
-use lumencast_light::{FieldId, Grid, Order, ProbeVolume};
+use glam::{Quat, UVec2, UVec3, Vec2, Vec3};
+use lumencast_codec::{
+    FieldEncoder, LightFile, ProbeHeader, Resource, SceneInfo, UpdateInfo, layout_resources,
+};
+use lumencast_light::{
+    ChartVertex, Charts, Field, FieldId, Grid, Layout, Lightmap, Order, ProbeVolume, Rectangle,
+    Surface, SurfaceId,
+};
 use lumencast_scene::{FileContents, Scene};
 use serde_json::{Value, json};
 
@@ -49,6 +55,44 @@ pub fn probe_frames() -> Vec<Vec<u8>> {
     sequences().into_iter().flat_map(|sequence| sequence.frames).collect()
 }
 
+/// A page on which two surfaces share charts, lit so brightly.
+fn lightmap(brightness: f32) -> Lightmap {
+    let at = |x: f32, y: f32| ChartVertex { source: 0, rectangle: 0, at: Vec2::new(x, y) };
+    let charts = Arc::new(Charts {
+        sizes: vec![UVec2::splat(8)],
+        vertices: vec![at(0.5, 0.5), at(7.25, 0.5), at(0.5, 7.5)],
+        triangles: vec![[0, 1, 2], Charts::NOWHERE],
+    });
+    let surface = |node: u32| Surface {
+        id: SurfaceId { node, ..SurfaceId::default() },
+        charts: charts.clone(),
+        rectangles: vec![Rectangle { page: 0, corner: UVec2::new(8 * node, 0) }],
+    };
+    let layout = Layout::new(20, 1, vec![surface(0), surface(1)]);
+    let mut lightmap = Lightmap::dark(FieldId(0), Arc::new(layout));
+    for (lumel, value) in lightmap.irradiance.iter_mut().enumerate() {
+        *value = brightness * Vec3::new(1.0, 2.0, (lumel % 7) as f32);
+    }
+    lightmap
+}
+
+/// Lumel frames of one tile: a keyframe and deltas.
+pub fn lumel_frames() -> Vec<Vec<u8>> {
+    let updates = [1.0, 1.0, 1.1, 3.0].map(|brightness| Field::from(lightmap(brightness)));
+    let mut encoder = FieldEncoder::new(&updates[0]);
+    let mut encode = |(update, field): (u64, &Field)| {
+        let info = UpdateInfo { update, tick: update, ..UpdateInfo::default() };
+        encoder.encode(field, info, |_| true).remove(0).bytes
+    };
+    (0..).zip(&updates).map(&mut encode).collect()
+}
+
+/// Layouts, and charts.
+pub fn resources() -> Vec<Vec<u8>> {
+    let (layout, charts) = layout_resources(&lightmap(1.0).layout);
+    charts.into_iter().chain([layout]).map(Resource::into_bytes).collect()
+}
+
 /// Catalogs, state frames, and edits as clients send them.
 pub fn frames() -> Vec<Vec<u8>> {
     let vectors = vectors("frames.json");
@@ -77,6 +121,22 @@ fn dark(size: UVec3, order: Order) -> LightFile {
     LightFile::of_fields(scene, "seed", [&volume.into()], UpdateInfo::default())
 }
 
+/// A lightmap as a server would save it.
+fn saved_lightmap() -> LightFile {
+    let scene = SceneInfo { name: "fuzz".into(), root: "fuzz.glb".into() };
+    LightFile::of_fields(scene, "seed", [&lightmap(1.0).into()], UpdateInfo::default())
+}
+
+/// All that a client reads of a lightmap: its catalog, layout, charts and light.
+fn lightmap_stream() -> Vec<u8> {
+    let catalog = saved_lightmap().catalog.encode();
+    let (layout, charts) = layout_resources(&lightmap(1.0).layout);
+    let resources = std::iter::once(layout).chain(charts);
+    let resources = resources.flat_map(|resource| packed(b'r', resource.bytes()));
+    let light = lumel_frames().into_iter().flat_map(|frame| packed(0, &frame));
+    packed(b'c', &catalog).into_iter().chain(resources).chain(light).collect()
+}
+
 /// All that a client reads of a server: catalog, state and light.
 pub fn reader() -> Vec<Vec<u8>> {
     let vectors = vectors("frames.json");
@@ -95,7 +155,8 @@ pub fn reader() -> Vec<Vec<u8>> {
         }
         stream
     };
-    sequences().into_iter().map(&mut stream).collect()
+    let volumes: Vec<Vec<u8>> = sequences().into_iter().map(&mut stream).collect();
+    volumes.into_iter().chain([lightmap_stream()]).collect()
 }
 
 /// What clients send.
@@ -112,7 +173,7 @@ pub fn light_files() -> Vec<Vec<u8>> {
         file.write()
     };
     let dark = orders.map(|order| dark(UVec3::splat(2), order).write());
-    sequences().into_iter().map(file).chain(dark).collect()
+    sequences().into_iter().map(file).chain(dark).chain([saved_lightmap().write()]).collect()
 }
 
 /// A built-in scene, and a script.

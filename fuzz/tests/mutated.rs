@@ -22,6 +22,16 @@ fn probe_frames() {
 }
 
 #[test]
+fn lumel_frames() {
+    feed(lumencast_fuzz::lumel_frames, &seeds::lumel_frames(), 20_000);
+}
+
+#[test]
+fn resources() {
+    feed(lumencast_fuzz::resources, &seeds::resources(), 50_000);
+}
+
+#[test]
 fn frames() {
     feed(lumencast_fuzz::frames, &seeds::frames(), 50_000);
 }

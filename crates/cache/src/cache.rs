@@ -3,8 +3,11 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Deref;
 
-use lumencast_codec::{Catalog, ClientEdit, Epoch, FieldInfo, LightFile, LightTrack, StateFrame};
-use lumencast_light::{FieldId, Light};
+use lumencast_codec::{
+    Catalog, ClientEdit, Epoch, FieldInfo, LightFile, LightTrack, Resource, ResourceHash,
+    StateFrame,
+};
+use lumencast_light::{Field, FieldId, Light};
 use lumencast_scene::Edit;
 
 use crate::CacheError;
@@ -13,6 +16,7 @@ use crate::edits::{Edits, SceneEvent};
 use crate::field::FieldCache;
 use crate::newest::Newest;
 use crate::received::Received;
+use crate::resources::Resources;
 
 /// Seconds that the scene's time may run on past the newest state frame.
 const LONGEST_RUN: f64 = 1.0;
@@ -25,7 +29,8 @@ const LONGEST_RUN: f64 = 1.0;
 /// give an error and change nothing.
 ///
 /// Memory: five copies of the light of those regions that frames have come for, at most
-/// [`lumencast_codec::limits::CATALOG_PROBES`] probes.
+/// [`lumencast_codec::limits::CATALOG_PROBES`] probes and [`lumencast_codec::limits::CATALOG_LUMELS`]
+/// lumels; three where nothing changes.
 #[derive(Clone, Debug, Default)]
 pub struct Cache {
     catalog: Option<Catalog>,
@@ -33,6 +38,7 @@ pub struct Cache {
     saved: bool,
     fields: BTreeMap<u32, FieldCache>,
     light: Light,
+    resources: Resources,
     clock: ServerClock,
     state: Option<StateFrame>,
     edits: Edits,
@@ -103,6 +109,13 @@ impl Cache {
         let file = LightFile::read(file)?;
         let mut loaded = Self::default();
         loaded.set_catalog(file.catalog, true);
+        // Twice, since layouts tell which charts are wanted.
+        for resource in file.resources.iter().chain(&file.resources).map(Resource::bytes) {
+            match loaded.add_resource(resource) {
+                Ok(()) | Err(CacheError::UnknownResource(_)) => {}
+                Err(error) => return Err(error),
+            }
+        }
         for frame in &file.frames {
             let track = LightTrack { field: frame.field, region: frame.region, layer: 0 };
             match loaded.add_light(track, &frame.bytes, now) {
@@ -146,6 +159,7 @@ impl Cache {
         }
         self.fields = caches;
         self.light = Light::new(shown);
+        self.resources.follow(&catalog);
         self.catalog = Some(catalog);
         self.saved = saved;
     }
@@ -187,6 +201,23 @@ impl Cache {
         cache.add(track, bytes, now, catalog.tick_seconds, shown.ok_or(unknown)?)
     }
 
+    /// Names of resources that are to be asked for: the layouts that the catalog names, and the charts
+    /// that known layouts name. Those that have come are forgotten when nothing names them any more.
+    pub fn wanted_resources(&self) -> Vec<ResourceHash> {
+        self.resources.wanted()
+    }
+
+    /// Takes in a resource's bytes. Lightmaps show its surfaces from the next call of
+    /// [`Cache::light`] on; those whose charts have not come yet are left out.
+    ///
+    /// # Errors
+    /// [`CacheError::UnknownResource`] when the bytes are none of [`Cache::wanted_resources`]; it
+    /// changes nothing. [`CacheError::Decode`] when they are, and cannot be read or are too much; they
+    /// are then wanted no longer.
+    pub fn add_resource(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
+        self.resources.add(bytes)
+    }
+
     /// The light to be seen at `now`: every region on the way from its last update to its newest,
     /// which it reaches one measured interval after that one came. An update that is overdue leaves
     /// the newest standing.
@@ -210,9 +241,22 @@ impl Cache {
 
     /// Brings the light to what is to be seen at `now`.
     fn show(&mut self, now: f64) {
+        self.lay_out();
         for field in self.light.fields_mut() {
             if let Some(cache) = self.fields.get_mut(&field.id().0) {
                 cache.show(now, field);
+            }
+        }
+    }
+
+    /// Gives lightmaps their layouts, as far as these are known.
+    fn lay_out(&mut self) {
+        self.resources.lay_out();
+        for lightmap in self.light.fields_mut().iter_mut().filter_map(Field::as_lightmap_mut) {
+            let info = self.catalog.as_ref().and_then(|catalog| catalog.field(lightmap.id.0));
+            let shape = info.and_then(|info| info.shape.as_lightmap());
+            if let Some(layout) = shape.and_then(|shape| self.resources.layout(shape)) {
+                lightmap.layout = layout.clone();
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Why a frame was not taken in.
 
-use lumencast_codec::DecodeError;
+use lumencast_codec::{DecodeError, ResourceHash};
 use thiserror::Error;
 
 /// Why a frame was not taken in. The cache is then as it was.
@@ -32,6 +32,10 @@ pub enum CacheError {
         /// The layer of the track.
         layer: u8,
     },
+    /// Nothing that is known wants these bytes: the catalog that named them has gone, they have come
+    /// already, or they are not what was asked for.
+    #[error("nothing names a resource {0}")]
+    UnknownResource(ResourceHash),
     /// A saved field was given when a server's catalog had come already.
     #[error("a server is connected; its light is newer than a file's")]
     Connected,

@@ -4,6 +4,7 @@ use lumencast_codec::{FieldInfo, LightTrack, Shape};
 use lumencast_light::{Field, Light};
 
 use crate::CacheError;
+use crate::lightmap::LightmapCache;
 use crate::newest::Newest;
 use crate::received::Received;
 use crate::volume::VolumeCache;
@@ -13,6 +14,7 @@ use crate::volume::VolumeCache;
 #[derive(Clone, Debug)]
 pub(crate) enum FieldCache {
     Volume(VolumeCache),
+    Lightmap(LightmapCache),
 }
 
 impl FieldCache {
@@ -20,6 +22,7 @@ impl FieldCache {
     pub(crate) fn new(info: &FieldInfo) -> Self {
         match &info.shape {
             Shape::Volume(shape) => Self::Volume(VolumeCache::new(shape)),
+            Shape::Lightmap(shape) => Self::Lightmap(LightmapCache::new(shape)),
         }
     }
 
@@ -28,6 +31,7 @@ impl FieldCache {
         let mut field = info.dark();
         match &mut field {
             Field::Volume(volume) => VolumeCache::light_by(light, volume),
+            Field::Lightmap(lightmap) => LightmapCache::light_by(light, lightmap),
         }
         field
     }
@@ -45,6 +49,12 @@ impl FieldCache {
             (Self::Volume(cache), Field::Volume(volume)) => {
                 cache.add(track, frame, now, tick_seconds, volume)
             }
+            (Self::Lightmap(cache), Field::Lightmap(lightmap)) => {
+                cache.add(track, frame, now, tick_seconds, lightmap)
+            }
+            (Self::Volume(_), Field::Lightmap(_)) | (Self::Lightmap(_), Field::Volume(_)) => {
+                Err(CacheError::UnknownField(track.field))
+            }
         }
     }
 
@@ -52,6 +62,7 @@ impl FieldCache {
     pub(crate) fn forget_updates(&mut self) {
         match self {
             Self::Volume(cache) => cache.forget_updates(),
+            Self::Lightmap(cache) => cache.forget_updates(),
         }
     }
 
@@ -59,20 +70,25 @@ impl FieldCache {
     pub(crate) fn show(&mut self, now: f64, shown: &mut Field) {
         match (self, shown) {
             (Self::Volume(cache), Field::Volume(volume)) => cache.show(now, volume),
+            (Self::Lightmap(cache), Field::Lightmap(lightmap)) => cache.show(now, lightmap),
+            (Self::Volume(_), Field::Lightmap(_)) | (Self::Lightmap(_), Field::Volume(_)) => {}
         }
     }
 
     /// The newest light of each region that has any.
     pub(crate) fn newest(&self) -> impl Iterator<Item = &Newest> {
-        match self {
-            Self::Volume(cache) => cache.newest(),
-        }
+        let newest: Box<dyn Iterator<Item = &Newest>> = match self {
+            Self::Volume(cache) => Box::new(cache.newest()),
+            Self::Lightmap(cache) => Box::new(cache.newest()),
+        };
+        newest
     }
 
     /// The newest light of a region.
     pub(crate) fn newest_of(&self, region: u32) -> Option<&Newest> {
         match self {
             Self::Volume(cache) => cache.newest_of(region),
+            Self::Lightmap(cache) => cache.newest_of(region),
         }
     }
 }

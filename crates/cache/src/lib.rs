@@ -20,9 +20,13 @@ mod clock;
 mod edits;
 mod error;
 mod field;
+mod lightmap;
 mod newest;
+mod passage;
 mod received;
 mod region;
+mod resources;
+mod tile;
 mod volume;
 
 pub use cache::{Cache, CurrentLight};

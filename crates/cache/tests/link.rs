@@ -486,7 +486,7 @@ fn a_saved_field_shows_until_a_server_s_light_comes() {
     assert_eq!(cache.add_state(b"{}", 0.0), Err(CacheError::NoCatalog));
 
     // The server's volume is half as large; its probes read the saved light at their places.
-    let Shape::Volume(shape) = &mut server.catalog.fields[0].shape;
+    let Shape::Volume(shape) = &mut server.catalog.fields[0].shape else { panic!("a volume") };
     shape.grid.size *= 0.5;
     cache.add_catalog(&server.catalog.encode(), 1.0).unwrap();
     assert!(near(shown(&mut cache, 1.0), 4.0));

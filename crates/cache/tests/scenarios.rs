@@ -61,7 +61,7 @@ fn ends(cache: &mut Cache, field: u32, now: f64) -> [f32; 2] {
         Some(Field::Volume(volume)) => {
             [0, volume.grid.probe_count() - 1].map(|probe| volume.probe(probe)[0].x)
         }
-        None => [0.0; 2],
+        Some(Field::Lightmap(_)) | None => [0.0; 2],
     }
 }
 

@@ -18,6 +18,8 @@ pub(crate) const MOST_CHARTS: u32 = 1 << 16;
 pub(crate) const PADDING: u32 = 2;
 /// Charts begin half a lumel further in, so that borders along the axes go through lumels' middles.
 const INSET: Vec2 = Vec2::splat(0.5);
+/// Coordinates are multiples of a part of a lumel, as they are sent.
+const GRID: f32 = 256.0;
 /// Lumels that charts are laid out on first. They are laid out anew at the density that is asked for:
 /// here they only need to be told apart.
 const FIRST_LUMELS: f64 = 65_536.0;
@@ -145,7 +147,7 @@ pub(crate) fn lay_out(
     let vertices = mesh.vertices.iter().map(|vertex| ChartVertex {
         source: cut.vertices[vertex.xref as usize].source,
         rectangle: vertex.page.unwrap_or(0),
-        at: Vec2::from(vertex.uv) * page + INSET,
+        at: (GRID * (Vec2::from(vertex.uv) * page + INSET)).round() / GRID,
     });
     let vertices: Vec<ChartVertex> = vertices.collect();
     // Pages are as large as they may be, whatever lies on them.

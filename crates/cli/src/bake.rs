@@ -8,11 +8,13 @@ use lumencast_codec::{LightFile, SavedFile, SceneInfo, UpdateInfo};
 use lumencast_gather::path_trace::Levels;
 use lumencast_light::Field;
 use lumencast_scene::{FileContents, Scene};
-use lumencast_solve::Baked;
 use lumencast_solve::blend::BlendSettings;
+use lumencast_solve::{Baked, Spent};
 use serde_json::json;
 
-use crate::arguments::{EffortArguments, GatherArguments, MOST_SAMPLES, SceneArguments, source};
+use crate::arguments::{
+    EffortArguments, FieldsArguments, GatherArguments, MOST_SAMPLES, SceneArguments, Wanted, source,
+};
 use crate::{
     light_source, out_file,
     output::{self, say},
@@ -33,6 +35,8 @@ pub(crate) struct Bake {
     scene: SceneArguments,
     #[command(flatten)]
     gather: GatherArguments,
+    #[command(flatten)]
+    fields: FieldsArguments,
     /// The file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -53,17 +57,23 @@ impl Bake {
         let mut scene = self.scene.source.open()?;
         out_file::check_apart([&self.output], &self.scene.source.files(&scene))?;
         let mut gatherer = self.gather.gatherer(Levels::One)?;
-        let volumes = self.scene.volumes(&mut scene, &mut *gatherer)?;
+        let Wanted { volumes, lightmap } =
+            self.fields.wanted(&mut scene, &self.scene, &mut *gatherer)?;
         let snapshot = scene.snapshot();
         let options = self.gather.options(BlendSettings::default(), self.gather.reading.baked());
         let bar = output::share_bar("Computing light");
-        let effort = self.effort.with(self.samples);
-        let wanted = lumencast_solve::Bake { scene: &snapshot, volumes: &volumes, effort, options };
+        let wanted = lumencast_solve::Bake {
+            scene: &snapshot,
+            volumes: &volumes,
+            lightmap: lightmap.as_ref(),
+            effort: self.fields.effort(&self.effort, self.samples),
+            options,
+        };
         let baked = lumencast_solve::bake(wanted, &mut *gatherer, |done| {
             light_source::show(&bar, done);
         });
         bar.finish_and_clear();
-        let Baked { fields, samples, noise } = baked?;
+        let Baked { fields, probes: of_probes, lumels: of_lumels } = baked?;
 
         let info = SceneInfo { name: scene.name().into(), root: scene.root_file().into() };
         let at = UpdateInfo {
@@ -71,6 +81,8 @@ impl Bake {
             scene_version: snapshot.version,
             ..UpdateInfo::default()
         };
+        let samples =
+            of_lumels.map_or(of_probes.samples, |spent| spent.samples.max(of_probes.samples));
         let source = format!("{}, baked, {samples} samples", source(&options));
         let mut file = LightFile::of_fields(info, &source, &fields, at);
         file.edits = scene.edits_since_load();
@@ -78,19 +90,30 @@ impl Bake {
         let bytes = file.write();
         out_file::write(&self.output, &bytes)?;
         let probes: usize = fields.iter().map(Field::probe_count).sum();
+        let pages: u32 = fields.iter().filter_map(Field::as_lightmap).map(|l| l.layout.pages).sum();
         if self.json {
             return output::json(&json!({
                 "file": self.output, "bytes": bytes.len(), "fields": fields.len(),
-                "probes": probes, "samples": samples, "noise": noise,
+                "probes": probes, "samples": of_probes.samples, "noise": of_probes.noise,
+                "pages": pages,
+                "lumel_samples": of_lumels.map(|spent| spent.samples),
+                "lumel_noise": of_lumels.and_then(|spent| spent.noise),
             }));
         }
-        let noise = noise.map_or(String::new(), |noise| format!(", noise {noise:.2} of 255"));
-        say!(
-            "{}: fields: {}, probes: {probes}, {samples} samples a probe{noise}, {}",
-            self.output.display(),
-            fields.len(),
-            output::bytes(bytes.len() as u64)
-        );
+        let spent = |Spent { samples, noise }: Spent, receiver: &str| {
+            let noise = noise.map_or(String::new(), |noise| format!(", noise {noise:.2} of 255"));
+            format!("{samples} samples a {receiver}{noise}")
+        };
+        let (bytes, fields) = (output::bytes(bytes.len() as u64), fields.len());
+        say!("{}: fields: {fields}, {bytes}", self.output.display());
+        if probes > 0 {
+            say!("probes: {probes}, {}", spent(of_probes, "probe"));
+        }
+        if let (Some(of_lumels), Some(laid_out)) = (of_lumels, &lightmap) {
+            let (size, texel) = (laid_out.layout.page_size, 100.0 * laid_out.texel);
+            let spent = spent(of_lumels, "lumel");
+            say!("pages: {pages} of {size}², a lumel every {texel:.1} cm, {spent}");
+        }
         Ok(())
     }
 }

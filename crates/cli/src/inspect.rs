@@ -1,13 +1,15 @@
 //! `lumencast inspect`: what is in saved light, a running server or a scene.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::Vec3;
+use lumencast_charts::lumels;
 use lumencast_codec::{Catalog, FieldInfo, LightFile, SavedFile, Shape, UnknownField};
-use lumencast_light::{Field, ProbeVolume};
+use lumencast_light::{Field, Lightmap, ProbeVolume, luminance};
+use lumencast_picture::{Picture, ToneMap, exposure};
 use lumencast_scene::{MeshId, NodeInfo, Scene};
 use serde_json::{Value, json};
 
@@ -15,7 +17,7 @@ use crate::arguments::{LightmapArguments, scene_name};
 use crate::lightmap_report::lightmap_report;
 use crate::output::{self, say};
 use crate::remote::Seen;
-use crate::{light_source, remote, warnings, words};
+use crate::{light_source, out_file, remote, warnings, words};
 
 /// Says what is in a file (.light, .gltf, .glb), a built-in scene, or a running server.
 #[derive(Debug, Args)]
@@ -35,6 +37,10 @@ pub(crate) struct Inspect {
     charts: bool,
     #[command(flatten)]
     lightmap: LightmapArguments,
+    /// Writes the pages of lumels of saved light or a server's into this folder, as EXR (lux) and as PNG
+    /// (exposed so that the brightest hundredth is white).
+    #[arg(long, value_name = "FOLDER")]
+    pages: Option<PathBuf>,
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
@@ -42,8 +48,13 @@ pub(crate) struct Inspect {
 
 impl Inspect {
     pub(crate) fn run(self) -> Result<()> {
+        if let Some(folder) = &self.pages {
+            out_file::check_folder(folder)?;
+        }
         let report = if light_source::is_address(&self.what) {
-            server_report(&remote::look_at_scene(&self.what)?)
+            let seen = remote::look_at_scene(&self.what)?;
+            self.write_pages(&seen.fields)?;
+            server_report(&seen)
         } else if let Some(bytes) = light_file(Path::new(&self.what))? {
             let read = || -> Result<_> {
                 let file = LightFile::read(&bytes)?;
@@ -51,8 +62,13 @@ impl Inspect {
                 Ok((file, fields))
             };
             let (file, fields) = read().with_context(|| self.what.clone())?;
+            self.write_pages(&fields)?;
             saved_report(&file, &fields, bytes.len() as u64)
         } else {
+            ensure!(
+                self.pages.is_none(),
+                "a scene has no light yet: bake it, and ask for the pages of the file"
+            );
             let mut scene = Scene::open(&self.what)?;
             let mut report = scene_report(&mut scene);
             if self.charts {
@@ -66,6 +82,30 @@ impl Inspect {
         }
         for line in words::lines(&report) {
             say!("{line}");
+        }
+        Ok(())
+    }
+}
+
+impl Inspect {
+    /// Writes all pages of lumels, where that is asked for.
+    fn write_pages(&self, fields: &[Field]) -> Result<()> {
+        let Some(folder) = &self.pages else { return Ok(()) };
+        let lightmaps: Vec<&Lightmap> = fields.iter().filter_map(Field::as_lightmap).collect();
+        ensure!(!lightmaps.is_empty(), "{} has no pages of lumels", self.what);
+        for lightmap in lightmaps {
+            let side = lightmap.layout.page_size;
+            let pages = lightmap.irradiance.chunks((side as usize).pow(2));
+            for (number, page) in pages.enumerate() {
+                let picture = Picture::new(side, side, page.to_vec())?;
+                let path = folder.join(format!("field{}-page{number}.exr", lightmap.id.0));
+                picture.write_exr(&path)?;
+                picture.write_png(
+                    path.with_extension("png"),
+                    ToneMap::Gamma,
+                    exposure(&picture),
+                )?;
+            }
         }
         Ok(())
     }
@@ -90,22 +130,35 @@ fn light_file(path: &Path) -> Result<Option<Vec<u8>>> {
 
 fn light_report(catalog: &Catalog, fields: &[Field], bytes: u64) -> Value {
     let report = |info: &FieldInfo| {
-        let Shape::Volume(shape) = &info.shape;
         let field = fields.iter().find(|field| field.id().0 == info.id);
-        json!({
+        let mut report = json!({
             "id": info.id,
             "kind": info.shape.kind(),
             "source": Some(&info.source).filter(|source| !source.is_empty()),
             "epoch": catalog.epoch_of(info),
-            "order": shape.order,
             "use": info.usage,
-            "grid": shape.grid,
-            "probes": shape.grid.probe_count(),
-            "regions": shape.regions.len(),
-            "layers": shape.layers,
+            "regions": info.shape.regions().count(),
+            "layers": info.shape.layers(),
             "scale_log2": info.scale_log2,
-            "c0": field.and_then(Field::as_volume).map(c0_statistics),
-        })
+        });
+        let own = match &info.shape {
+            Shape::Volume(shape) => json!({
+                "order": shape.order,
+                "grid": shape.grid,
+                "probes": shape.grid.probe_count(),
+                "c0": field.and_then(Field::as_volume).map(c0_statistics),
+            }),
+            Shape::Lightmap(shape) => json!({
+                "page_size": shape.page_size,
+                "pages": shape.pages,
+                "layout": shape.layout.to_string(),
+                "lightmap": field.and_then(Field::as_lightmap).map(lightmap_statistics),
+            }),
+        };
+        if let (Value::Object(report), Value::Object(own)) = (&mut report, own) {
+            report.extend(own);
+        }
+        report
     };
     let unknown = |field: &UnknownField| json!({ "id": field.id, "kind": field.kind });
     json!({
@@ -153,6 +206,30 @@ fn c0_statistics(volume: &ProbeVolume) -> Value {
         "min": luminances.iter().copied().fold(f64::INFINITY, f64::min),
         "mean": sum / luminances.len() as f64,
         "max": luminances.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+    })
+}
+
+/// Surfaces of a lightmap, and the illuminance on lumels that surfaces cover, lux.
+fn lightmap_statistics(lightmap: &Lightmap) -> Value {
+    let layout = &lightmap.layout;
+    let mut illuminances = Vec::new();
+    for surface in layout.surfaces() {
+        illuminances.extend(lumels(&surface.charts).into_iter().map(|lumel| {
+            let rectangle = surface.rectangles[lumel.rectangle as usize];
+            let index = layout.index(rectangle.page, rectangle.corner + lumel.at);
+            f64::from(luminance(lightmap.irradiance[index]))
+        }));
+    }
+    let sum: f64 = illuminances.iter().sum();
+    json!({
+        "surfaces": layout.surfaces().len(),
+        "lumels": illuminances.len(),
+        "coverage": illuminances.len() as f64 / layout.lumel_count().max(1) as f64,
+        "illuminance": {
+            "min": illuminances.iter().copied().reduce(f64::min),
+            "mean": sum / illuminances.len().max(1) as f64,
+            "max": illuminances.iter().copied().reduce(f64::max),
+        },
     })
 }
 

@@ -11,9 +11,9 @@ use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::Field;
 use lumencast_scene::{Edit, Scene, Snapshot, VolumeSpec};
 use lumencast_solve::blend::BlendSettings;
-use lumencast_solve::{Bake, Baked, Done, Effort, bake};
+use lumencast_solve::{Bake, Baked, Done, Effort, Receivers, bake};
 
-use crate::arguments::Reading;
+use crate::arguments::{Reading, Wanted};
 use crate::output::{self, tell};
 use crate::remote::{self, Seen};
 
@@ -94,9 +94,21 @@ impl Computed {
         volumes: &[VolumeSpec],
         gatherer: &mut dyn Gather,
     ) -> Result<Baked> {
-        let gather = self.reading.gathered(self.bounces, self.clamp, BlendSettings::default());
+        self.light(scene, &Wanted { volumes: volumes.to_vec(), lightmap: None }, gatherer)
+    }
+
+    /// The light where it is wanted, with a bar that shows how far it is.
+    pub(crate) fn light(
+        self,
+        scene: &Arc<Snapshot>,
+        wanted: &Wanted,
+        gatherer: &mut dyn Gather,
+    ) -> Result<Baked> {
+        let options = self.reading.gathered(self.bounces, self.clamp, BlendSettings::default());
         let bar = output::share_bar("Computing light");
-        let wanted = Bake { scene, volumes, effort: self.effort, options: gather };
+        let Wanted { volumes, lightmap } = wanted;
+        let (lightmap, effort) = (lightmap.as_ref(), self.effort);
+        let wanted = Bake { scene, volumes, lightmap, effort, options };
         let light = bake(wanted, gatherer, |done| show(&bar, done));
         bar.finish_and_clear();
         Ok(light?)
@@ -106,7 +118,12 @@ impl Computed {
 /// Shows how far a computation is, and how noisy its light still is.
 pub(crate) fn show(bar: &ProgressBar, done: Done) {
     bar.set_position((f64::from(done.share) * output::SHARE_BAR_LENGTH) as u64);
-    if let Some(noise) = done.noise {
-        bar.set_message(format!("Computing light, noise {noise:.2} of 255"));
-    }
+    let receivers = match done.of {
+        Receivers::Probes => "probes",
+        Receivers::Lumels => "lumels",
+    };
+    bar.set_message(match done.noise {
+        Some(noise) => format!("Computing light at {receivers}, noise {noise:.2} of 255"),
+        None => format!("Computing light at {receivers}"),
+    });
 }

@@ -3,23 +3,17 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use lumencast_charts::{LaidOut, Progress, Sheet, Sheets, Store, laid_out, lumels, sheets, usual};
+use lumencast_charts::{LaidOut, Sheet, Sheets, laid_out, lumels, usual};
 use lumencast_light::{Charts, Surface};
 use lumencast_scene::{LightmapSpec, Scene};
 use serde_json::{Value, json};
 
-use crate::output;
+use crate::charting;
 
 /// Pages, charts, density and coverage, with what has no lumels and why.
 pub(crate) fn lightmap_report(scene: &mut Scene, spec: Option<LightmapSpec>) -> Result<Value> {
-    let bar = output::share_bar("Cutting surfaces");
-    let show = |Progress { done, total }: Progress| {
-        bar.set_position(output::SHARE_BAR_LENGTH as u64 * done as u64 / total.max(1) as u64);
-        true
-    };
     let start = Instant::now();
-    let Sheets { sheets, notes } = sheets(&scene.snapshot(), Store::of_user().as_ref(), &show)?;
-    bar.finish_and_clear();
+    let Sheets { sheets, notes } = charting::fronts(&scene.snapshot())?;
     let cut = start.elapsed().as_secs_f64();
     if sheets.is_empty() {
         return Ok(json!({ "pages": 0, "surfaces": 0, "notes": notes }));

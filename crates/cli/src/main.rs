@@ -13,6 +13,7 @@ mod arguments;
 mod bake;
 mod bench;
 mod camera;
+mod charting;
 mod compare;
 mod doctor;
 mod environment;

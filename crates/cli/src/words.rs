@@ -87,6 +87,7 @@ fn unit(key: &str, map: &Map<String, Value>, whole: Unit) -> Unit {
         "bounds" | "center" | "size" | "texel" | "position" | "radius" | "range" | "metres" => {
             Unit::Of("m")
         }
+        "illuminance" => Unit::Of("lx"),
         "angle" | "inner" | "outer" => Unit::Angle,
         "intensity" if map.get("type").is_some_and(|kind| kind == "directional") => Unit::Of("lx"),
         "intensity" => Unit::Of("cd"),

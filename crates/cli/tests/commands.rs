@@ -412,8 +412,19 @@ fn volumes_beyond_the_limits_are_refused_in_words() {
 fn volumes_too_deep_for_browsers_are_baked_in_pieces() {
     let folder = Folder::new("deep");
     let path = folder.0.join("deep.light").to_str().expect("text").to_owned();
-    let baked =
-        run(&["bake", "cornell", "-o", &path, "--volume", "1x2x35", "--samples", "1", "--json"]);
+    let baked = run(&[
+        "bake",
+        "cornell",
+        "-o",
+        &path,
+        "--fields",
+        "volume",
+        "--volume",
+        "1x2x35",
+        "--samples",
+        "1",
+        "--json",
+    ]);
     assert_eq!(baked.code, Some(0), "{baked:?}");
     assert_eq!((&baked.json()["fields"], &baked.json()["probes"]), (&2.into(), &70.into()));
     let fields = run(&["inspect", &path, "--json"]).json()["fields"].clone();

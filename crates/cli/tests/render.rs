@@ -10,6 +10,9 @@ use common::{Folder, PATIENCE, Program, Serving, run};
 use lumencast_picture::{Loaded, Picture, compare};
 use serde_json::json;
 
+/// Light is held by probes alone.
+const PROBES_ALONE: [&str; 2] = ["--fields", "volume"];
+
 fn linear(path: &Path) -> Picture {
     Loaded::read(path).expect("a picture").linear()
 }
@@ -166,6 +169,45 @@ fn says_what_is_wrong_before_it_begins() {
     run(&["render", "/no/such/scene.glb", "-o", text(&picture)]).failed_saying(&["scene.glb"]);
 }
 
+/// A few lumels bring a client's picture nearer to the reference than probes alone, and what is saved of
+/// them can be looked at.
+#[test]
+fn lumels_are_baked_and_drawn() {
+    let folder = Folder::new("render-lumels");
+    let [light, picture, pages] = ["a.light", "a.exr", "pages"].map(|name| folder.0.join(name));
+    let size = ["--size", "72x48", "--exposure", "1", "-o", text(&picture)];
+    let draw = |how: &[&str]| {
+        let ran = run(&[&["render", "cornell"], &size[..], how].concat());
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        Loaded::Linear(linear(&picture))
+    };
+    let reference = draw(&["--lighting", "reference", "--parts", "indirect", "--spp", "512"]);
+    let nearness = |fields: &str| {
+        let few = ["--samples", "256", "--lumel-samples", "64", "--lightmap", "128", "--json"];
+        let bake = ["bake", "cornell", "-o", text(&light), "--fields", fields];
+        let ran = run(&[&bake[..], &few].concat());
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        let drawn = draw(&["--lighting", "indirect", "--light", text(&light)]);
+        (ran.json(), compare(&reference, &drawn, None, 67.0).expect("of one size").psnr)
+    };
+    let (told, probes) = nearness("volume");
+    assert_eq!((&told["pages"], &told["lumel_samples"]), (&0.into(), &json!(null)));
+    let (told, both) = nearness("lightmap,volume");
+    assert_eq!((&told["pages"], &told["lumel_samples"]), (&1.into(), &64.into()));
+    assert!(both > probes + 1.0, "{both} dB, and {probes} dB by probes alone");
+
+    std::fs::create_dir(&pages).expect("a folder");
+    let report = run(&["inspect", text(&light), "--pages", text(&pages), "--json"]).json();
+    let field = &report["fields"][1];
+    assert_eq!((&field["kind"], &field["page_size"]), (&"lightmap".into(), &128.into()));
+    let told = &field["lightmap"];
+    assert!((0.3..1.0).contains(&told["coverage"].as_f64().expect("a share")), "{told}");
+    assert!(told["illuminance"]["mean"].as_f64() > Some(0.1), "{told}");
+    let page = linear(&pages.join("field1-page0.exr"));
+    assert_eq!([page.width(), page.height()], [128, 128]);
+    assert!(pages.join("field1-page0.png").is_file());
+}
+
 /// A field is baked, a client's picture drawn under it, and both judged by the path tracer.
 #[test]
 fn a_clients_picture_is_near_the_reference() {
@@ -181,12 +223,13 @@ fn a_clients_picture_is_near_the_reference() {
     };
     let light = at("cornell.light");
     let bake = ["bake", "cornell", "-o", text(&light), "--samples", "512", "--bounces", "3"];
-    assert_eq!(run(&bake).code, Some(0));
+    assert_eq!(run(&[&bake[..], &PROBES_ALONE].concat()).code, Some(0));
     draw("reference.exr", &["--spp", "128"]);
     let told = draw("field.exr", &["--lighting", "field", "--light", text(&light)]);
     assert_eq!((&told["probes"], &told["samples"]), (&512.into(), &8.into()));
     draw("direct.exr", &["--lighting", "direct"]);
-    draw("indirect.exr", &["--lighting", "indirect", "--probe-samples", "256"]);
+    let few = ["--lighting", "indirect", "--probe-samples", "256"];
+    draw("indirect.exr", &[&few[..], &PROBES_ALONE].concat());
 
     let reference = Loaded::read(at("reference.exr")).expect("a picture");
     let psnr = |name: &str| {
@@ -350,7 +393,7 @@ fn light_of_a_server_is_drawn() {
     let [light, picture] = ["a.light", "a.exr"].map(|name| folder.0.join(name));
     let volume = ["--volume", "4x4x4"];
     let bake = ["bake", "cornell", "--samples", "16384", "--fit", "0", "-o", text(&light)];
-    let ran = run(&[&bake[..], &volume].concat());
+    let ran = run(&[&bake[..], &volume, &PROBES_ALONE].concat());
     assert_eq!(ran.code, Some(0), "{ran:?}");
     let draw = |light: &str| {
         let size = ["--size", "48x32", "--samples", "1", "--shadow-resolution", "64"];
@@ -404,7 +447,8 @@ fn a_window_takes_bands_away() {
     let folder = Folder::new("render-window");
     let [light, picture] = ["a.light", "a.exr"].map(|name| folder.0.join(name));
     let volume = ["--volume", "1x1x1@0,1,0:2,2,2", "--samples", "512", "--fit", "0"];
-    let ran = run(&[&["bake", "cornell", "-o", text(&light)][..], &volume].concat());
+    let bake = ["bake", "cornell", "-o", text(&light)];
+    let ran = run(&[&bake[..], &volume, &PROBES_ALONE].concat());
     assert_eq!(ran.code, Some(0), "{ran:?}");
     let draw = |window: &[&str]| {
         let size = ["--size", "48x32", "--samples", "1", "--materials", "lambert"];

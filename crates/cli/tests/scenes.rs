@@ -14,6 +14,7 @@ fn built_in_scenes_are_near_their_references() {
     let document = folder.0.join("results.md");
     let document = document.to_str().expect("text");
     let few = ["--noise", "off", "--probe-samples", "256", "--reference-spp", "64"];
+    let few = [&few[..], &["--lumel-samples", "8", "--lightmap", "128"]].concat();
     for (name, least) in LEAST {
         let scene = ["bench", "scenes", name, "--json", "--document", document];
         let ran = run(&[&scene[..], &few].concat());

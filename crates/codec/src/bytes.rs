@@ -38,6 +38,42 @@ impl<'a> Reader<'a> {
         }
         Err(DecodeError::Malformed("a varint of more than 8 bytes"))
     }
+
+    /// A varint below 2^32.
+    pub(crate) fn number(&mut self) -> Result<u32, DecodeError> {
+        let value = self.varint()?;
+        u32::try_from(value).map_err(|_| DecodeError::Malformed("a number of 2^32 or more"))
+    }
+
+    /// A signed number: 0, −1, 1, −2, … as 0, 1, 2, 3, ….
+    pub(crate) fn zigzag(&mut self) -> Result<i64, DecodeError> {
+        self.varint().map(unzigzag)
+    }
+
+    /// How many things follow of so many bytes each, at least. What is allocated for them is bounded by
+    /// the bytes that are left.
+    pub(crate) fn count(&mut self, bytes_each: usize) -> Result<usize, DecodeError> {
+        let count = usize::try_from(self.varint()?).unwrap_or(usize::MAX);
+        if count > self.0.len() / bytes_each {
+            return Err(DecodeError::Truncated);
+        }
+        Ok(count)
+    }
+}
+
+/// The signed number that a zigzag varint stands for.
+pub(crate) fn unzigzag(value: u64) -> i64 {
+    (value >> 1) as i64 ^ -((value & 1) as i64)
+}
+
+/// A signed number as a zigzag varint has it.
+pub(crate) fn zigzag(value: i64) -> u64 {
+    (value << 1 ^ value >> 63) as u64
+}
+
+/// Appends a signed number of magnitude below 2^52.
+pub(crate) fn put_zigzag(out: &mut Vec<u8>, value: i64) {
+    put_varint(out, zigzag(value));
 }
 
 /// Appends a varint; values of 2^53 and more saturate (no count of ours gets there).
@@ -62,6 +98,18 @@ mod tests {
             let mut reader = Reader(&out);
             assert_eq!(reader.varint(), Ok(value));
             assert!(reader.0.is_empty());
+        }
+    }
+
+    #[test]
+    fn signed_numbers_round_trip() {
+        for (value, becomes) in [(0, 0), (-1, 1), (1, 2), (-2, 3)] {
+            assert_eq!((zigzag(value), unzigzag(becomes)), (becomes, value));
+        }
+        for value in [0, -1, 64, -65, u32::MAX.into(), -i64::from(u32::MAX), (1 << 52) - 1] {
+            let mut out = Vec::new();
+            put_zigzag(&mut out, value);
+            assert_eq!(Reader(&out).zigzag(), Ok(value));
         }
     }
 

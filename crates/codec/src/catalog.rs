@@ -92,6 +92,8 @@ impl Catalog {
         }
         let probes = fields.iter().map(|field| field.shape.probe_count()).sum();
         DecodeError::limit("probes of all fields", probes, limits::CATALOG_PROBES)?;
+        let lumels = fields.iter().map(|field| field.shape.lumel_count()).sum();
+        DecodeError::limit("lumels of all fields", lumels, limits::CATALOG_LUMELS)?;
         let Frame { epoch, scene, tick_seconds, .. } = frame;
         Ok(Self { epoch, scene, tick_seconds, fields, unknown })
     }
@@ -112,8 +114,9 @@ mod tests {
     use super::*;
     use crate::Shape;
     use glam::{Quat, UVec3, Vec3};
-    use lumencast_light::{FieldId, Grid, Offset, Order, ProbeVolume};
+    use lumencast_light::{FieldId, Grid, Layout, Lightmap, Offset, Order, ProbeVolume};
     use serde_json::json;
+    use std::sync::Arc;
 
     fn catalog() -> Catalog {
         let grid = Grid {
@@ -154,6 +157,78 @@ mod tests {
         assert_eq!(Catalog::decode(value.to_string().as_bytes()), Ok(expected));
     }
 
+    fn with_lightmap() -> Catalog {
+        let mut catalog = catalog();
+        let layout = Arc::new(Layout::new(600, 2, Vec::new()));
+        let lightmap = Lightmap::dark(FieldId(4), layout);
+        catalog.fields.push(FieldInfo::of_lightmap(&lightmap, Some(10), "bake"));
+        catalog
+    }
+
+    #[test]
+    fn lightmaps_stand_beside_volumes() {
+        let catalog = with_lightmap();
+        assert_eq!(Catalog::decode(&catalog.encode()), Ok(catalog.clone()));
+        let value: Value = serde_json::from_slice(&catalog.encode()).unwrap();
+        let field = &catalog.fields[1];
+        let layout = field.shape.as_lightmap().unwrap().layout.to_string();
+        let written = json!({
+            "id": 4, "use": "static", "scale_log2": 10, "source": "bake", "kind": "lightmap",
+            "shape": { "coding": "halves", "page_size": 600, "pages": 2, "layout": layout },
+        });
+        assert_eq!(value["fields"][1], written);
+        let shape = &field.shape;
+        assert!(shape.regions().eq(0..18));
+        assert_eq!((shape.layers(), shape.kind(), shape.lumel_count()), (1, "lightmap", 720_000));
+        assert_eq!(shape.distance(17, Vec3::ONE), 0.0);
+        assert_eq!(shape.distance(18, Vec3::ONE), f32::INFINITY);
+        assert!(field.dark().as_lightmap().unwrap().layout.surfaces().is_empty());
+    }
+
+    #[test]
+    fn lightmaps_in_other_codings_are_unknown_and_those_told_wrongly_left_out() {
+        let kept = |member: &str, value: Value| {
+            let mut catalog: Value = serde_json::from_slice(&with_lightmap().encode()).unwrap();
+            catalog["fields"][1]["shape"][member] = value;
+            let read = Catalog::decode(catalog.to_string().as_bytes()).unwrap();
+            (read.fields.len() - 1, read.unknown.len())
+        };
+        assert_eq!(kept("page_size", json!(600)), (1, 0));
+        for coding in [json!("h264"), json!(null), json!(7)] {
+            assert_eq!(kept("coding", coding), (0, 1));
+        }
+        for (member, wrong) in [
+            ("page_size", json!(0)),
+            ("page_size", json!(4097)),
+            ("page_size", json!(1.5)),
+            ("pages", json!(0)),
+            ("pages", json!(24)),
+            ("layout", json!("12")),
+            ("layout", json!(null)),
+        ] {
+            assert_eq!(kept(member, wrong.clone()), (0, 0), "{member} {wrong}");
+        }
+        // Small pages have fewer lumels than a field may have, and more tiles.
+        let mut many = with_lightmap();
+        let Shape::Lightmap(shape) = &mut many.fields[1].shape else { panic!("a volume") };
+        (shape.page_size, shape.pages) = (1, 4097);
+        assert_eq!(Catalog::decode(&many.encode()).map(|read| read.fields.len()), Ok(1));
+    }
+
+    #[test]
+    fn lumels_of_all_fields_are_bounded() {
+        let mut catalog = with_lightmap();
+        let Shape::Lightmap(shape) = &mut catalog.fields[1].shape else { panic!("a volume") };
+        (shape.page_size, shape.pages) = (4096, 1);
+        assert_eq!(Catalog::decode(&catalog.encode()).map(|read| read.fields.len()), Ok(1));
+        let Shape::Lightmap(shape) = &mut catalog.fields[1].shape else { panic!("a volume") };
+        (shape.page_size, shape.pages) = (1024, 8);
+        assert_eq!(Catalog::decode(&catalog.encode()), Ok(catalog.clone()));
+        catalog.fields.push(FieldInfo { id: 5, ..catalog.fields[1].clone() });
+        let error = Catalog::decode(&catalog.encode()).map_err(|error| error.kind());
+        assert_eq!(error, Err("limit"));
+    }
+
     #[test]
     fn offset_scale_source_and_epoch_may_be_absent() {
         let mut value: Value = serde_json::from_slice(&catalog().encode()).unwrap();
@@ -166,8 +241,8 @@ mod tests {
         let old = Catalog::decode(value.to_string().as_bytes()).unwrap();
         let field = &old.fields[0];
         assert_eq!((field.source.as_str(), old.epoch_of(field)), ("", old.epoch));
-        let Shape::Volume(shape) = &field.shape;
-        assert_eq!((field.scale_log2, shape.offset), (None, Offset::HALF_CELL));
+        let offset = field.shape.as_volume().map(|shape| shape.offset);
+        assert_eq!((field.scale_log2, offset), (None, Some(Offset::HALF_CELL)));
         let written: Value = serde_json::from_slice(&old.encode()).unwrap();
         assert_eq!(written, value, "and are then not written");
         let new = catalog();

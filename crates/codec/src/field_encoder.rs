@@ -3,13 +3,15 @@
 use lumencast_light::Field;
 
 use crate::field_info::FieldInfo;
-use crate::{EncodedRegion, ProbeEncoder, UpdateInfo};
+use crate::{EncodedRegion, LightmapShape, LumelEncoder, ProbeEncoder, UpdateInfo};
 
 /// Encodes the updates of a field, by its kind.
 #[derive(Clone, Debug)]
 pub enum FieldEncoder {
     /// Encodes a volume of probes.
     Volume(ProbeEncoder),
+    /// Encodes a lightmap.
+    Lightmap(LumelEncoder),
 }
 
 impl FieldEncoder {
@@ -19,10 +21,14 @@ impl FieldEncoder {
             Field::Volume(volume) => {
                 Self::Volume(ProbeEncoder::new(volume.grid.resolution, volume.order))
             }
+            Field::Lightmap(lightmap) => {
+                Self::Lightmap(LumelEncoder::new(LightmapShape::of(lightmap)))
+            }
         }
     }
 
-    /// Encodes an update for the regions that somebody watches; see [`ProbeEncoder::encode`].
+    /// Encodes an update for the regions that somebody watches; see [`ProbeEncoder::encode`] and
+    /// [`LumelEncoder::encode`].
     ///
     /// # Panics
     /// If `field` is of another shape than that given to [`Self::new`].
@@ -34,27 +40,48 @@ impl FieldEncoder {
     ) -> Vec<EncodedRegion> {
         match (self, field) {
             (Self::Volume(encoder), Field::Volume(volume)) => encoder.encode(volume, info, watched),
+            (Self::Lightmap(encoder), Field::Lightmap(lightmap)) => {
+                encoder.encode(lightmap, info, watched)
+            }
+            (Self::Volume(_), Field::Lightmap(_)) | (Self::Lightmap(_), Field::Volume(_)) => {
+                panic!("a field of another kind")
+            }
         }
     }
 
     /// Numbers of the field's regions.
     pub fn regions(&self) -> impl Iterator<Item = u32> + '_ {
-        match self {
-            Self::Volume(encoder) => encoder.regions().map(|region| region.id),
-        }
+        let numbers: Box<dyn Iterator<Item = u32> + '_> = match self {
+            Self::Volume(encoder) => Box::new(encoder.regions().map(|region| region.id)),
+            Self::Lightmap(encoder) => Box::new(encoder.shape().tiles().map(|tile| tile.id)),
+        };
+        numbers
     }
 
     /// log2 of the field's scale after the last update; none before there was any light.
     pub fn scale_log2(&self) -> Option<i8> {
         match self {
             Self::Volume(encoder) => encoder.scale_log2(),
+            Self::Lightmap(encoder) => encoder.scale_log2(),
         }
     }
 
     /// The field as a catalog lists it; `source` as in [`FieldInfo::source`].
+    ///
+    /// # Panics
+    /// If `field` is of another kind than that given to [`Self::new`].
     pub fn describe(&self, field: &Field, source: &str) -> FieldInfo {
-        match field {
-            Field::Volume(volume) => FieldInfo::of_volume(volume, self.scale_log2(), source),
+        let scale_log2 = self.scale_log2();
+        match (self, field) {
+            (Self::Volume(_), Field::Volume(volume)) => {
+                FieldInfo::of_volume(volume, scale_log2, source)
+            }
+            (Self::Lightmap(encoder), Field::Lightmap(lightmap)) => {
+                FieldInfo::of_lumels(lightmap.id, encoder.shape().clone(), scale_log2, source)
+            }
+            (Self::Volume(_), Field::Lightmap(_)) | (Self::Lightmap(_), Field::Volume(_)) => {
+                panic!("a field of another kind")
+            }
         }
     }
 }

@@ -1,12 +1,13 @@
 //! What a catalog tells of a field.
 
 use glam::Vec3;
-use lumencast_light::{Field, FieldId, ProbeVolume};
+use lumencast_light::{Field, FieldId, Lightmap, ProbeVolume};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
 use crate::epoch::Epoch;
 use crate::error::json;
+use crate::lightmap_shape::LightmapShape;
 use crate::volume_shape::VolumeShape;
 use crate::{DecodeError, limits};
 
@@ -42,6 +43,8 @@ pub struct FieldInfo {
 pub enum Shape {
     /// Probes in the cells of a box.
     Volume(VolumeShape),
+    /// Lumels on surfaces.
+    Lightmap(LightmapShape),
 }
 
 /// Which instances a field is for.
@@ -80,10 +83,33 @@ impl FieldInfo {
         }
     }
 
+    /// A lightmap, computed by the catalog's own server; `source` as in [`FieldInfo::source`].
+    pub fn of_lightmap(lightmap: &Lightmap, scale_log2: Option<i8>, source: &str) -> Self {
+        Self::of_lumels(lightmap.id, LightmapShape::of(lightmap), scale_log2, source)
+    }
+
+    /// The same of a lightmap whose shape is known.
+    pub(crate) fn of_lumels(
+        id: FieldId,
+        shape: LightmapShape,
+        scale_log2: Option<i8>,
+        source: &str,
+    ) -> Self {
+        Self {
+            id: id.0,
+            usage: Use::Static,
+            scale_log2,
+            source: source.to_owned(),
+            epoch: None,
+            shape: Shape::Lightmap(shape),
+        }
+    }
+
     /// The field without light.
     pub fn dark(&self) -> Field {
         match &self.shape {
             Shape::Volume(shape) => shape.dark(FieldId(self.id)).into(),
+            Shape::Lightmap(shape) => shape.dark(FieldId(self.id)).into(),
         }
     }
 
@@ -104,15 +130,21 @@ impl FieldInfo {
 }
 
 impl Shape {
-    /// Whether an entry of a catalog is of a kind, and in a basis, that this program knows.
+    /// Whether an entry of a catalog is of a kind, and in a basis or coding, that this program knows.
     fn is_known(entry: &Value) -> bool {
-        let is_other = entry["shape"].is_object() && entry["shape"]["basis"] != "sh";
-        entry["kind"] == "volume" && !is_other
+        let shape = &entry["shape"];
+        let is_other = |what: &str, known: &str| shape.is_object() && shape[what] != known;
+        match entry["kind"].as_str() {
+            Some("volume") => !is_other("basis", "sh"),
+            Some("lightmap") => !is_other("coding", "halves"),
+            _ => false,
+        }
     }
 
     fn validated(self) -> Result<Self, DecodeError> {
         match self {
             Self::Volume(shape) => shape.validated().map(Self::Volume),
+            Self::Lightmap(shape) => shape.validated().map(Self::Lightmap),
         }
     }
 
@@ -120,6 +152,15 @@ impl Shape {
     pub fn as_volume(&self) -> Option<&VolumeShape> {
         match self {
             Self::Volume(shape) => Some(shape),
+            Self::Lightmap(_) => None,
+        }
+    }
+
+    /// The lightmap, where it is one.
+    pub fn as_lightmap(&self) -> Option<&LightmapShape> {
+        match self {
+            Self::Volume(_) => None,
+            Self::Lightmap(shape) => Some(shape),
         }
     }
 
@@ -127,36 +168,44 @@ impl Shape {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Volume(_) => "volume",
+            Self::Lightmap(_) => "lightmap",
         }
     }
 
     /// Numbers of its regions: what is coded and sent as one frame.
     pub fn regions(&self) -> impl Iterator<Item = u32> + '_ {
-        match self {
-            Self::Volume(shape) => shape.regions.iter().map(|region| region.id),
-        }
+        let numbers: Box<dyn Iterator<Item = u32> + '_> = match self {
+            Self::Volume(shape) => Box::new(shape.regions.iter().map(|region| region.id)),
+            Self::Lightmap(shape) => Box::new(shape.tiles().map(|tile| tile.id)),
+        };
+        numbers
     }
 
     /// Temporal layers of each region.
     pub fn layers(&self) -> u8 {
         match self {
             Self::Volume(shape) => shape.layers,
+            Self::Lightmap(_) => 1,
         }
     }
 
     /// Distance of a world position from a region, metres; infinite where it has none of this number.
+    /// Where the surfaces of a lightmap's region lie is not known from its shape: it is everywhere.
     pub fn distance(&self, region: u32, position: Vec3) -> f32 {
         match self {
             Self::Volume(shape) => shape
                 .region(region)
                 .map_or(f32::INFINITY, |region| shape.distance(region, position)),
+            Self::Lightmap(shape) => shape.tile(region).map_or(f32::INFINITY, |_| 0.0),
         }
     }
 
-    /// Distance of a world position from what it lights, metres; 0 inside.
+    /// Distance of a world position from what it lights, metres; 0 inside, and for a lightmap, whose
+    /// shape does not tell where its surfaces lie.
     pub fn distance_from_all(&self, position: Vec3) -> f32 {
         match self {
             Self::Volume(shape) => shape.grid.distance(position),
+            Self::Lightmap(_) => 0.0,
         }
     }
 
@@ -164,6 +213,15 @@ impl Shape {
     pub fn probe_count(&self) -> usize {
         match self {
             Self::Volume(shape) => shape.grid.probe_count(),
+            Self::Lightmap(_) => 0,
+        }
+    }
+
+    /// Number of its lumels.
+    pub fn lumel_count(&self) -> usize {
+        match self {
+            Self::Volume(_) => 0,
+            Self::Lightmap(shape) => shape.lumel_count(),
         }
     }
 }

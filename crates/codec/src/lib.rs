@@ -8,31 +8,42 @@
 
 mod bytes;
 mod catalog;
+mod encoded_region;
 mod epoch;
 mod error;
 mod field_encoder;
 mod field_info;
 mod file;
+mod frame_head;
+mod lightmap_shape;
 pub mod limits;
+mod lumel;
 mod probe;
 mod range_coder;
+mod resource;
 mod state;
 pub mod tracks;
+mod update_info;
 mod volume_shape;
 mod volumes;
 
 pub use catalog::{Catalog, SceneInfo};
+pub use encoded_region::EncodedRegion;
 pub use epoch::Epoch;
 pub use error::DecodeError;
 pub use field_encoder::FieldEncoder;
 pub use field_info::{FieldInfo, Shape, UnknownField, Use};
 pub use file::{LightFile, SavedFile, SavedFrame};
-pub use probe::{
-    EncodedRegion, ProbeDecoder, ProbeEncoder, ProbeHeader, Region, RegionLight, UpdateInfo,
-    regions,
+pub use frame_head::FrameHead;
+pub use lightmap_shape::{Coding, LightmapShape};
+pub use lumel::{LumelDecoder, LumelEncoder, LumelHeader, Tile, TileLight};
+pub use probe::{ProbeDecoder, ProbeEncoder, ProbeHeader, Region, RegionLight, regions};
+pub use resource::{
+    LayoutResource, PlacedSurface, Resource, ResourceHash, layout_resources, read_charts,
 };
 pub use state::{AcceptedEdit, ClientEdit, RefusedEdit, SceneState, StateFrame};
 pub use tracks::LightTrack;
+pub use update_info::UpdateInfo;
 pub use volume_shape::{Basis, VolumeShape};
 pub use volumes::{VolumesError, check_volumes};
 

@@ -18,6 +18,18 @@ pub const FIELD_PROBES: usize = 1 << 18;
 pub const CATALOG_PROBES: usize = 1 << 19;
 /// Cells of a region along an axis.
 pub const REGION_CELLS: u32 = 16;
+/// Lumels of a tile along a side.
+pub const TILE_LUMELS: u32 = 256;
+/// Lumels of a page along a side.
+pub const PAGE_LUMELS: u32 = 4096;
+/// Lumels of a field.
+pub const FIELD_LUMELS: usize = 8 << 20;
+/// Lumels of all fields of a catalog together.
+pub const CATALOG_LUMELS: usize = 8 << 20;
+/// Bytes of a resource.
+pub const RESOURCE_BYTES: usize = 64 << 20;
+/// Bytes of all resources that a client keeps.
+pub const CATALOG_RESOURCE_BYTES: usize = 256 << 20;
 /// Bytes of the text that names a field's source.
 pub const SOURCE_BYTES: usize = 128;
 /// Edits of a snapshot.

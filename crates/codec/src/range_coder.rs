@@ -2,7 +2,7 @@
 //! probabilities that adapt fast at first. See docs/wire.md, "Range coder".
 //!
 //! Encoder and decoder are two implementations of [`BitCoder`], so the model of what is coded
-//! ([`crate::probe`]) is written once: it passes each bit in and goes on with the bit that comes out.
+//! ([`crate::probe`], [`crate::lumel`]) is written once: it passes each bit in and goes on with the bit that comes out.
 
 /// Zero bytes that an encoder may leave off the end, and a decoder may read past it.
 const IMPLICIT_ZEROS: usize = 64;

@@ -1,12 +1,17 @@
 //! All that is known of a scene's light.
 
+use std::f32::consts::PI;
+
 use glam::Vec3;
 
 use crate::sh::{Sh, convolve};
 use crate::zh::{self, Bands};
-use crate::{Field, FieldId, Offset, Order, Place, ProbeVolume};
+use crate::{Field, FieldId, Lightmap, Offset, Order, Place, ProbeVolume};
 
-/// The light of a scene: fields, of which the finer volumes are laid over the coarser.
+/// The light of a scene: fields, of which the finer volumes are laid over the coarser, and lightmaps
+/// over all of them.
+///
+/// Where a surface has lumels, its irradiance is theirs alone. All other light is that of volumes.
 ///
 /// Where a volume ends, light passes smoothly into the next coarser one over the outermost half
 /// cell, or into those that abut: on a shared face the mean of both counts. Beyond all volumes the
@@ -33,7 +38,7 @@ use crate::{Field, FieldId, Offset, Order, Place, ProbeVolume};
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Light {
-    /// Volumes first, by size of cell, the smallest first.
+    /// Volumes first, by size of cell, the smallest first; then lightmaps.
     fields: Vec<Field>,
 }
 
@@ -70,6 +75,11 @@ impl Light {
         self.fields.iter().map(Field::probe_count).sum()
     }
 
+    /// The lightmaps.
+    pub fn lightmaps(&self) -> impl Iterator<Item = &Lightmap> {
+        self.fields.iter().filter_map(Field::as_lightmap)
+    }
+
     /// The volumes, that with the smallest cells first.
     pub fn volumes(&self) -> impl Iterator<Item = &ProbeVolume> {
         self.fields.iter().filter_map(Field::as_volume)
@@ -80,10 +90,10 @@ impl Light {
         self.fields.iter_mut().filter_map(Field::as_volume_mut)
     }
 
-    /// All light convolved by a lobe, or through a window (see [`crate::zh`]).
+    /// All light of volumes convolved by a lobe, or through a window (see [`crate::zh`]).
     #[must_use]
     pub fn convolved(mut self, bands: &Bands) -> Self {
-        for Field::Volume(volume) in &mut self.fields {
+        for volume in self.volumes_mut() {
             let probe = volume.order.coefficients();
             volume.coefficients.chunks_mut(probe).for_each(|probe| convolve(probe, bands));
         }
@@ -101,7 +111,7 @@ impl Light {
     /// The same light, all volumes of which are to be read at another offset than their own.
     #[must_use]
     pub fn read_at(mut self, offset: Offset) -> Self {
-        self.fields.iter_mut().for_each(|Field::Volume(volume)| volume.offset = offset);
+        self.volumes_mut().for_each(|volume| volume.offset = offset);
         self
     }
 
@@ -135,12 +145,10 @@ impl Light {
         shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0).collect()
     }
 
-    /// Light at a place; `None` when no field has any there.
+    /// The volumes' light at a place; `None` where there is no volume.
     pub fn sample(&self, place: &Place) -> Option<Sh> {
-        if let [only] = &self.fields[..] {
-            return match only {
-                Field::Volume(volume) => Some(volume.sample(place.position, place.normal)),
-            };
+        if let [Field::Volume(only)] = &self.fields[..] {
+            return Some(only.sample(place.position, place.normal));
         }
         // It begins with the lowest order; what is added raises it to its own.
         let dark = self.volumes().next().map(|_| Sh::dark(Order::L1));
@@ -152,26 +160,49 @@ impl Light {
         })
     }
 
-    /// Irradiance on a surface at a world position with a world normal, lux; black where there is no
-    /// light.
+    /// The lumels' irradiance at a place, lux; `None` where it has none.
+    pub fn at_lumels(&self, place: &Place) -> Option<Vec3> {
+        let on = place.on.as_ref()?;
+        self.lightmaps().find_map(|lightmap| lightmap.irradiance_at(on))
+    }
+
+    /// Radiance that arrives at a place from a direction, cd/m²; `None` where nothing is known. Lumels
+    /// know irradiance alone, which counts as arriving evenly.
+    pub fn radiance(&self, place: &Place, direction: Vec3) -> Option<Vec3> {
+        let even = self.at_lumels(place).map(|irradiance| irradiance / PI);
+        even.or_else(|| Some(self.sample(place)?.radiance(direction)))
+    }
+
+    /// Irradiance at a place of a surface, lux; black where there is no light.
+    pub fn irradiance_at(&self, place: &Place) -> Vec3 {
+        self.at_lumels(place).unwrap_or_else(|| {
+            let light = self.sample(place);
+            light.map_or(Vec3::ZERO, |light| light.irradiance(place.normal))
+        })
+    }
+
+    /// The volumes' irradiance on a surface at a world position with a world normal, lux; black where
+    /// there is no light.
     pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Vec3 {
-        let light = self.sample(&Place::on_surface(position, normal));
-        light.map_or(Vec3::ZERO, |light| light.irradiance(normal))
+        self.irradiance_at(&Place::on_surface(position, normal))
     }
 }
 
-/// The size of a volume's cells, cubic metres: finer volumes lie over coarser ones.
+/// The size of a volume's cells, cubic metres: finer volumes lie over coarser ones. Other kinds come
+/// after all volumes.
 fn cell_volume(field: &Field) -> f32 {
     match field {
         Field::Volume(volume) => volume.grid.spacing().element_product(),
+        Field::Lightmap(_) => f32::INFINITY,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Grid;
-    use glam::{Quat, UVec3};
+    use crate::{ChartVertex, Charts, Grid, Layout, OnTriangle, Rectangle, Surface, SurfaceId};
+    use glam::{Quat, UVec2, UVec3, Vec2};
+    use std::sync::Arc;
 
     fn uniform(id: u32, center: Vec3, size: f32, cells: u32, value: f32) -> ProbeVolume {
         let grid = Grid {
@@ -281,6 +312,37 @@ mod tests {
                 assert!((sum - 1.0).abs() < 1e-6, "{x}: {shares:?}");
             }
         }
+    }
+
+    /// Lumels count before volumes where the place has some, and nowhere else.
+    #[test]
+    fn lumels_lie_over_volumes() {
+        let surface = SurfaceId { node: 3, ..SurfaceId::default() };
+        let at = |x: f32, y: f32| ChartVertex { source: 0, rectangle: 0, at: Vec2::new(x, y) };
+        let charts = Charts {
+            sizes: vec![UVec2::splat(4)],
+            vertices: vec![at(1.0, 1.0), at(3.0, 1.0), at(1.0, 3.0)],
+            triangles: vec![[0, 1, 2]],
+        };
+        let rectangles = vec![Rectangle::default()];
+        let of = Surface { id: surface, charts: Arc::new(charts), rectangles };
+        let mut lumels = Lightmap::dark(FieldId(1), Arc::new(Layout::new(4, 1, vec![of])));
+        lumels.irradiance.fill(Vec3::splat(6.0));
+        let volume = uniform(0, Vec3::ZERO, 4.0, 2, 1.0 / 0.282_094_8);
+        let light = Light::new([Field::from(lumels), volume.into()]);
+        assert!(light.fields()[0].as_volume().is_some(), "volumes first");
+        let point = OnTriangle { surface, triangle: 0, weights: Vec3::splat(1.0 / 3.0) };
+        let place = Place { on: Some(point), ..Place::on_surface(Vec3::ZERO, Vec3::Y) };
+        assert_eq!(light.irradiance_at(&place), Vec3::splat(6.0));
+        let radiance = light.radiance(&place, Vec3::X).unwrap();
+        assert!(radiance.abs_diff_eq(Vec3::splat(6.0 / PI), 1e-5));
+        let back = OnTriangle { surface: SurfaceId { back: true, ..surface }, ..point };
+        let behind = Place { on: Some(back), ..place };
+        assert!((light.irradiance_at(&behind).x - PI).abs() < 1e-3, "the volume's");
+        assert!((light.radiance(&behind, Vec3::X).unwrap().x - 1.0).abs() < 1e-3);
+        let dark = Light::new(light.lightmaps().cloned());
+        assert_eq!(dark.radiance(&behind, Vec3::X), None);
+        assert_eq!(dark.irradiance_at(&behind), Vec3::ZERO);
     }
 
     #[test]

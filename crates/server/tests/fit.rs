@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{UVec3, Vec3};
 use lumencast_codec::{Catalog, EncodedRegion, Epoch};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::{Field, ProbeVolume};
+use lumencast_light::ProbeVolume;
 use lumencast_scene::{Edit, LightSpec, NodeId, Scene, Transform, VolumeSpec};
 use lumencast_server::{Mail, Outlet, Received, SampleRange, Tick, TickOptions};
 use lumencast_solve::{Bake, Effort, FitOptions, GatherOptions, bake};
@@ -46,10 +46,10 @@ fn baked(scene: &mut Scene, fit: Option<FitOptions>) -> ProbeVolume {
     let snapshot: Arc<_> = scene.snapshot();
     let effort = Effort::of_samples(4096);
     let (volumes, options) = (volumes(), gather(fit));
-    let wanted = Bake { scene: &snapshot, volumes: &volumes, effort, options };
-    let light = bake(wanted, &mut tracer(), |_| ());
-    let Field::Volume(volume) = light.expect("a volume").fields.remove(0);
-    volume
+    let (scene, volumes) = (&snapshot, &volumes);
+    let wanted = Bake { scene, volumes, lightmap: None, effort, options };
+    let light = bake(wanted, &mut tracer(), |_| ()).expect("light");
+    light.fields[0].as_volume().expect("a volume").clone()
 }
 
 /// Root of the mean square of the differences of irradiance on the floor and three walls, over the

@@ -21,4 +21,15 @@ pub enum ShadeError {
         /// The adapter's.
         limit: u32,
     },
+    /// Lightmaps are larger than the adapter's textures.
+    #[error(
+        "the light's {pages} pages of {side}² lumels do not fit the adapter's textures; give fewer or \
+         smaller ones"
+    )]
+    Pages {
+        /// Lumels a side of the largest.
+        side: u32,
+        /// Number of all.
+        pages: u32,
+    },
 }

@@ -1,4 +1,4 @@
-//! The light on the device: all volumes in one 3D texture.
+//! The light on the device: all volumes in one 3D texture, beside the lumels' pages.
 //!
 //! A volume's atlas (`light::Atlas`) is deep and narrow, so volumes are stacked along z, and where the
 //! adapter's textures are not deep enough, in columns side by side. Reading clamps to the outermost
@@ -8,10 +8,12 @@ use glam::{Affine3A, Mat3, UVec3, Vec3};
 use lumencast_gpu::Gpu;
 use lumencast_gpu::bindings::{self, FILTERED, SAMPLER, STORAGE, UNIFORM};
 use lumencast_gpu::textures;
-use lumencast_light::{Atlas, Field, Grid, Light, ProbeVolume, ScaleRule, atlas_size, texels};
+use lumencast_light::{Atlas, Grid, Light, ProbeVolume, ScaleRule, atlas_size, texels};
 use lumencast_shaders::layout;
 
 use crate::ShadeError;
+use crate::charted::SurfaceLayouts;
+use crate::lumels::GpuLumels;
 
 /// Group 2 of the shaders.
 #[derive(Debug)]
@@ -28,12 +30,16 @@ pub(crate) struct GpuField {
     placed: Vec<(Grid, layout::Volume)>,
     /// The point of the world that places are relative to.
     about: Vec3,
+    lumels: GpuLumels,
+    /// Where surfaces lie on the lumels' pages.
+    pub(crate) layouts: SurfaceLayouts,
 }
 
 /// The bindings of group 2.
 fn group_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
     let atlas = bindings::texture(FILTERED, wgpu::TextureViewDimension::D3);
-    let types = [UNIFORM, STORAGE, atlas, SAMPLER];
+    let pages = bindings::texture(FILTERED, wgpu::TextureViewDimension::D2Array);
+    let types = [UNIFORM, STORAGE, atlas, SAMPLER, pages];
     gpu.group_layout("field", wgpu::ShaderStages::FRAGMENT, &types)
 }
 
@@ -48,7 +54,9 @@ impl GpuField {
             ..Default::default()
         });
         let atlas = texture(gpu, UVec3::ONE);
-        let group = group(gpu, &layout, &sampler, &atlas, &[]);
+        let lumels = GpuLumels::new(gpu);
+        let bound = Bound { atlas: &atlas, sampler: &sampler, volumes: &[], lumels: &lumels };
+        let group = bound.group(gpu, &layout);
         Self {
             layout,
             sampler,
@@ -59,6 +67,8 @@ impl GpuField {
             scales: vec![],
             placed: vec![],
             about: Vec3::ZERO,
+            lumels,
+            layouts: SurfaceLayouts::default(),
         }
     }
 
@@ -76,13 +86,15 @@ impl GpuField {
             volume.cell_from_world = cell_from_world(grid, self.about);
         }
         let volumes: Vec<_> = self.placed.iter().map(|(_, volume)| *volume).collect();
-        self.group = group(gpu, &self.layout, &self.sampler, &self.atlas, &volumes);
+        let Self { atlas, sampler, lumels, .. } = self;
+        self.group = Bound { atlas, sampler, volumes: &volumes, lumels }.group(gpu, &self.layout);
     }
 
-    /// Takes in other light. Where the volumes are as large as before, the texture stays.
+    /// Takes in other light. Where fields are as large as before, the textures stay.
     pub(crate) fn update(&mut self, gpu: &Gpu, light: &Light) -> Result<(), ShadeError> {
-        let volumes: Vec<&ProbeVolume> =
-            light.fields().iter().map(|Field::Volume(volume)| volume).collect();
+        self.lumels.update(gpu, light)?;
+        self.layouts = SurfaceLayouts::of(light);
+        let volumes: Vec<&ProbeVolume> = light.volumes().collect();
         let sizes: Vec<UVec3> =
             volumes.iter().map(|v| atlas_size(v.grid.resolution, v.order)).collect();
         if sizes != self.sizes {
@@ -160,25 +172,32 @@ fn write(gpu: &Gpu, atlas: &wgpu::Texture, origin: UVec3, packed: &Atlas) {
     gpu.write_texels(to, bytemuck::cast_slice(&packed.halves), textures::volume_size(packed.size));
 }
 
-fn group(
-    gpu: &Gpu,
-    layout: &wgpu::BindGroupLayout,
-    sampler: &wgpu::Sampler,
-    atlas: &wgpu::Texture,
-    volumes: &[layout::Volume],
-) -> wgpu::BindGroup {
-    let fields = layout::Fields { count: volumes.len() as u32 };
-    let uniform = gpu.buffer("fields", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&fields), 0);
-    let least = size_of::<layout::Volume>() as u64;
-    let storage = wgpu::BufferUsages::STORAGE;
-    let list = gpu.buffer("volumes", storage, bytemuck::cast_slice(volumes), least);
-    let resources = [
-        uniform.as_entire_binding(),
-        list.as_entire_binding(),
-        wgpu::BindingResource::TextureView(&textures::view(atlas)),
-        wgpu::BindingResource::Sampler(sampler),
-    ];
-    gpu.group("fields", layout, &resources)
+/// What group 2 binds.
+struct Bound<'a> {
+    atlas: &'a wgpu::Texture,
+    sampler: &'a wgpu::Sampler,
+    volumes: &'a [layout::Volume],
+    lumels: &'a GpuLumels,
+}
+
+impl Bound<'_> {
+    fn group(&self, gpu: &Gpu, layout: &wgpu::BindGroupLayout) -> wgpu::BindGroup {
+        let Self { atlas, sampler, volumes, lumels } = self;
+        let fields = layout::Fields { count: volumes.len() as u32, lumel_scale: lumels.scale() };
+        let uniform =
+            gpu.buffer("fields", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&fields), 0);
+        let least = size_of::<layout::Volume>() as u64;
+        let storage = wgpu::BufferUsages::STORAGE;
+        let list = gpu.buffer("volumes", storage, bytemuck::cast_slice(volumes), least);
+        let resources = [
+            uniform.as_entire_binding(),
+            list.as_entire_binding(),
+            wgpu::BindingResource::TextureView(&textures::view(atlas)),
+            wgpu::BindingResource::Sampler(sampler),
+            wgpu::BindingResource::TextureView(&lumels.view()),
+        ];
+        gpu.group("fields", layout, &resources)
+    }
 }
 
 #[cfg(test)]

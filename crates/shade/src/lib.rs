@@ -17,6 +17,7 @@
 #![forbid(unsafe_code)]
 
 mod camera;
+mod charted;
 mod deform;
 mod draw;
 mod drawn;
@@ -26,6 +27,7 @@ mod field;
 mod frame;
 mod geometry;
 mod lights;
+mod lumels;
 mod materials;
 mod meter;
 mod occlusion;

@@ -91,6 +91,7 @@ impl Passes {
             wgpu::BindingResource::Buffer(view),
             scene.instances.as_entire_binding(),
             visible.as_entire_binding(),
+            scene.rectangles.as_entire_binding(),
         ];
         let group = gpu.group("pass", layout, &resources);
         Self { group, stride, shadows: shadow_calls, cameras: camera_calls }

@@ -45,7 +45,7 @@ pub(crate) struct Layouts {
 
 /// The bindings of group 0.
 fn pass_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
-    let types = [UNIFORM_BY_OFFSET, STORAGE, STORAGE];
+    let types = [UNIFORM_BY_OFFSET, STORAGE, STORAGE, STORAGE];
     gpu.group_layout("pass", wgpu::ShaderStages::VERTEX_FRAGMENT, &types)
 }
 

@@ -10,6 +10,7 @@ use lumencast_scene::{Snapshot, View};
 
 use crate::ShadeError;
 use crate::camera::{Camera, jitter};
+use crate::charted::SurfaceLayouts;
 use crate::draw::{Depths, Picture};
 use crate::drawn::Drawn;
 use crate::field::GpuField;
@@ -49,14 +50,21 @@ pub struct Renderer {
     pipelines: Option<Pipelines>,
     target: Option<Target>,
     scene: GpuScene,
-    /// What is on the device, and with which materials.
-    shown: Option<(Arc<Snapshot>, Materials)>,
+    shown: Option<Shown>,
     wanted: Option<Arc<Snapshot>>,
     lights: GpuLights,
     field: GpuField,
     occluder: Occluder,
     /// The shadow maps that are on the device.
     shadows: Option<ShadowPlan>,
+}
+
+/// What of a scene is on the device.
+#[derive(Clone, Debug)]
+struct Shown {
+    snapshot: Arc<Snapshot>,
+    materials: Materials,
+    layouts: SurfaceLayouts,
 }
 
 impl Renderer {
@@ -204,7 +212,7 @@ impl Renderer {
     }
 
     fn snapshot(&self) -> Option<Arc<Snapshot>> {
-        self.shown.as_ref().map(|(snapshot, _)| snapshot.clone())
+        self.shown.as_ref().map(|shown| shown.snapshot.clone())
     }
 
     /// Makes ready what the settings ask for; `commands` bring the scene to its moment.
@@ -230,12 +238,16 @@ impl Renderer {
         }
         let Some(wanted) = &self.wanted else { return };
         self.field.place_about(&self.gpu, wanted.origin);
-        let is_shown = |(shown, model): &(Arc<Snapshot>, Materials)| {
-            Arc::ptr_eq(shown, wanted) && *model == settings.materials
+        let (materials, layouts) = (settings.materials, &self.field.layouts);
+        let is_shown = |shown: &Shown| {
+            Arc::ptr_eq(&shown.snapshot, wanted)
+                && shown.materials == materials
+                && shown.layouts.is(layouts)
         };
         if !self.shown.as_ref().is_some_and(is_shown) {
-            self.scene.update(&self.gpu, commands, wanted, settings.materials);
-            self.shown = Some((wanted.clone(), settings.materials));
+            self.scene.update(&self.gpu, commands, (wanted, layouts), materials);
+            let (snapshot, layouts) = (wanted.clone(), layouts.clone());
+            self.shown = Some(Shown { snapshot, materials, layouts });
             self.shadows = None;
         }
     }

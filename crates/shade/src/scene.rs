@@ -10,6 +10,7 @@ use lumencast_scene::{Aabb, Deformation, Instance, Material, NodeId, Snapshot};
 use lumencast_shaders::layout;
 
 use crate::camera::Frustum;
+use crate::charted::{Charted, SurfaceLayouts};
 use crate::deform::{Cause, Deformer, Deforming};
 use crate::geometry::Geometry;
 use crate::materials::{self, GpuMaterial, Surface};
@@ -47,6 +48,7 @@ struct Deformed {
 #[derive(Debug)]
 pub(crate) struct GpuScene {
     geometry: Geometry,
+    charted: Charted,
     textures: Textures,
     deformer: Deformer,
     deformed: HashMap<NodeId, Deformed>,
@@ -56,6 +58,8 @@ pub(crate) struct GpuScene {
     /// What `materials` were made of.
     source: Option<(Arc<[Material]>, Materials)>,
     pub(crate) instances: wgpu::Buffer,
+    /// Where the lumels of instances lie.
+    pub(crate) rectangles: wgpu::Buffer,
     draws: Vec<Draw>,
     pub(crate) bounds: Aabb,
 }
@@ -64,31 +68,32 @@ impl GpuScene {
     pub(crate) fn new(gpu: &Gpu, anisotropy: u16) -> Self {
         Self {
             geometry: Geometry::default(),
+            charted: Charted::default(),
             textures: Textures::new(gpu, anisotropy),
             deformer: Deformer::new(gpu),
             deformed: HashMap::new(),
             material_layout: materials::group_layout(gpu),
             materials: Vec::new(),
             source: None,
-            instances: instance_buffer(gpu, &[]),
+            instances: list(gpu, "instances", &[] as &[layout::Instance]),
+            rectangles: list(gpu, "rectangles", &[] as &[layout::Rectangle]),
             draws: Vec::new(),
             bounds: Aabb::EMPTY,
         }
     }
 
-    /// Takes in another moment of the scene; what has not changed stays where it is.
+    /// Takes in another moment of the scene, and where its lumels lie; what has not changed stays where
+    /// it is.
     pub(crate) fn update(
         &mut self,
         gpu: &Gpu,
         commands: &mut Commands,
-        snapshot: &Snapshot,
+        (snapshot, layouts): (&Snapshot, &SurfaceLayouts),
         model: Materials,
     ) {
         self.update_materials(gpu, &snapshot.materials, model);
-        let placed: Vec<layout::Instance> = snapshot.instances.iter().map(placed).collect();
-        self.instances = instance_buffer(gpu, &placed);
         self.deform(gpu, commands, snapshot);
-        self.list_draws(gpu, &snapshot.instances);
+        self.list_draws(gpu, &snapshot.instances, layouts);
         self.bounds = Aabb::EMPTY;
         for (_, bounds) in self.draws.iter().flat_map(|draw| &draw.placed) {
             self.bounds.grow(bounds.min);
@@ -98,25 +103,31 @@ impl GpuScene {
     }
 
     /// Lists what has to be drawn, primitive by primitive of the same vertices, with where it stands.
-    fn list_draws(&mut self, gpu: &Gpu, instances: &[Instance]) {
+    fn list_draws(&mut self, gpu: &Gpu, instances: &[Instance], layouts: &SurfaceLayouts) {
         self.draws.clear();
         let mut known: HashMap<(usize, usize), usize> = HashMap::new();
+        let mut placed: Vec<layout::Instance> = instances.iter().map(place).collect();
+        let mut rectangles: Vec<layout::Rectangle> = Vec::new();
+        let mut before = self.charted.begin();
         for (instance, number) in instances.iter().zip(0..) {
+            placed[number as usize].lumels = rectangles.len() as u32;
             let own = self.deformed.get(&instance.node);
-            for primitive in 0..instance.mesh.primitives.len() {
-                let part = match own {
-                    Some(deformed) => &deformed.parts[primitive],
-                    None => &self.geometry.parts(gpu, &instance.mesh)[primitive],
-                };
+            let with_lumels =
+                self.charted.parts(gpu, &mut before, instance, layouts, &mut rectangles);
+            let (parts, shape) = match (own, with_lumels, &instance.deformation) {
+                (Some(own), _, Some(by)) => (&own.parts[..], Arc::as_ptr(by).addr()),
+                (_, Some(charted), _) => (charted.parts, charted.number),
+                _ => {
+                    let shape = Arc::as_ptr(&instance.mesh).addr();
+                    (self.geometry.parts(gpu, &instance.mesh), shape)
+                }
+            };
+            for (primitive, part) in parts.iter().enumerate() {
                 if part.index_count == 0 {
                     continue;
                 }
                 let place = |corner| instance.world_from_object.transform_point3(corner);
                 let bounds = part.bounds.transformed(place);
-                let shape = match &instance.deformation {
-                    Some(deformation) => Arc::as_ptr(deformation).addr(),
-                    None => Arc::as_ptr(&instance.mesh).addr(),
-                };
                 let draw = *known.entry((shape, primitive)).or_insert_with(|| {
                     let material = instance.mesh.primitives[primitive].material.0 as usize;
                     // Past the last one lies glTF's default material.
@@ -129,6 +140,8 @@ impl GpuScene {
                 self.draws[draw].placed.push((number, bounds));
             }
         }
+        self.instances = list(gpu, "instances", &placed);
+        self.rectangles = list(gpu, "rectangles", &rectangles);
         // Sorted, few things change from one draw call to the next.
         self.draws.sort_by_key(|draw| (draw.surface, draw.material));
     }
@@ -254,12 +267,12 @@ impl GpuScene {
     }
 }
 
-fn instance_buffer(gpu: &Gpu, placed: &[layout::Instance]) -> wgpu::Buffer {
-    let least = size_of::<layout::Instance>() as u64;
-    gpu.buffer("instances", wgpu::BufferUsages::STORAGE, bytemuck::cast_slice(placed), least)
+fn list<T: bytemuck::Pod>(gpu: &Gpu, label: &'static str, items: &[T]) -> wgpu::Buffer {
+    let least = size_of::<T>() as u64;
+    gpu.buffer(label, wgpu::BufferUsages::STORAGE, bytemuck::cast_slice(items), least)
 }
 
-fn placed(instance: &Instance) -> layout::Instance {
+fn place(instance: &Instance) -> layout::Instance {
     let to = &instance.world_from_object;
     let normal = Affine3A::from_mat3(to.inverse().matrix3.transpose().into());
     layout::Instance {
@@ -312,7 +325,8 @@ mod tests {
     fn on_a_device() -> GpuScene {
         let gpu = Gpu::new().expect("an adapter");
         let mut scene = GpuScene::new(&gpu, 1);
-        scene.update(&gpu, &mut Commands::new(&gpu), &snapshot(), Materials::Full);
+        let moment = (&*snapshot(), &SurfaceLayouts::default());
+        scene.update(&gpu, &mut Commands::new(&gpu), moment, Materials::Full);
         scene
     }
 
@@ -368,7 +382,8 @@ mod tests {
         }
         for _ in 0..2 {
             let mut commands = Commands::new(&gpu);
-            scene.update(&gpu, &mut commands, &snapshot, Materials::Full);
+            let moment = (&snapshot, &SurfaceLayouts::default());
+            scene.update(&gpu, &mut commands, moment, Materials::Full);
             let mut placed: Vec<_> = scene.draws.iter().map(|draw| draw.placed.len()).collect();
             placed.sort_unstable();
             assert_eq!((placed, scene.deformed.len()), (vec![1, 1, 2, 2], 2));

@@ -36,9 +36,18 @@ pub struct Instance {
     pub world_from_object: Rows,
     pub normal_from_object: Rows,
     pub mirrors: u32,
+    pub lumels: u32,
     pub _pad0: u32,
     pub _pad1: u32,
-    pub _pad2: u32,
+}
+
+/// A rectangle of lumels. Group 0, binding 3.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Rectangle {
+    pub corner: Vec2,
+    pub layer: u32,
+    pub _pad: u32,
 }
 
 /// What holds for all of a frame's passes. Group 1, binding 0.
@@ -101,12 +110,16 @@ pub struct ShadowView {
     pub _pad1: f32,
 }
 
-/// How many volumes there are. Group 2, binding 0.
+/// How many volumes there are, and how pages of lumels are stored. Group 2, binding 0.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Fields {
     pub count: u32,
+    pub lumel_scale: f32,
 }
+
+/// `NO_LUMELS` of the shaders.
+pub const NO_LUMELS: u32 = u32::MAX;
 
 /// A probe volume in the atlas. Group 2, binding 1.
 #[repr(C)]

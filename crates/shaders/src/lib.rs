@@ -43,7 +43,7 @@ macro_rules! modules {
 
 /// The names and texts of all modules. `shade/sampling`, which `shade/forward` imports, is one of
 /// `shade/by_pixels` and `shade/by_samples`: see [`forward`].
-pub const MODULES: [(&str, &str); 36] = modules![
+pub const MODULES: [(&str, &str); 37] = modules![
     "common/environment",
     "common/harmonics",
     "common/math",
@@ -63,6 +63,7 @@ pub const MODULES: [(&str, &str); 36] = modules![
     "shade/frame",
     "shade/frame_bindings",
     "shade/indirect",
+    "shade/lumels",
     "shade/meter",
     "shade/meter_bindings",
     "shade/occlusion",

@@ -93,7 +93,8 @@ fn layouts_agree() {
         m,
         View { clip_from_world, world_from_clip, view_from_clip, eye, perspective, forward, turn }
     );
-    same!(m, Instance { world_from_object, normal_from_object, mirrors, _pad0, _pad1, _pad2 });
+    same!(m, Instance { world_from_object, normal_from_object, mirrors, lumels, _pad0, _pad1 });
+    same!(m, Rectangle { corner, layer, _pad });
     same!(
         m,
         Frame {
@@ -128,7 +129,7 @@ fn layouts_agree() {
         }
     );
     same!(m, ShadowView { clip_from_world, texel, near, depth_range, search, reach, _pad0, _pad1 });
-    same!(m, Fields { count });
+    same!(m, Fields { count, lumel_scale });
     volumes_agree(m);
     same!(m, Map { row0, row1 });
     same!(m, Deform { vertices, morphs, joints, influences, flags });

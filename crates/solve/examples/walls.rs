@@ -65,7 +65,8 @@ fn main() {
             let blend = BlendSettings::default();
             let options = GatherOptions { blend, fit, offset, ..GatherOptions::default() };
             let effort = Effort::of_samples(16_384);
-            let wanted = Bake { scene: &scene, volumes: &[volume], effort, options };
+            let volumes = &[volume];
+            let wanted = Bake { scene: &scene, volumes, lightmap: None, effort, options };
             let baked = bake(wanted, tracer, |_| ()).expect("light");
             let light = Light::new(baked.fields);
             100.0 * floor(&light, wall, 1.0) / floor(&light, wall, -1.0)

@@ -2,22 +2,42 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
 use lumencast_gather::{Budget, Gathered, Job};
-use lumencast_light::{Field, FieldId, Place};
+use lumencast_light::{Field, FieldId, Light};
 use lumencast_scene::Snapshot;
 
+use crate::lightmap::LightmapSolver;
 use crate::volume::VolumeSolver;
 
 /// A field, by its kind.
 #[derive(Clone)]
 pub(crate) enum FieldSolver {
-    Volume(VolumeSolver),
+    Volume(Box<VolumeSolver>),
+    Lightmap(LightmapSolver),
 }
 
 impl FieldSolver {
     pub(crate) fn id(&self) -> FieldId {
         match self {
             Self::Volume(volume) => volume.id(),
+            Self::Lightmap(lightmap) => lightmap.id(),
+        }
+    }
+
+    /// The volume, where it is one.
+    pub(crate) fn as_volume(&self) -> Option<&VolumeSolver> {
+        match self {
+            Self::Volume(volume) => Some(volume),
+            Self::Lightmap(_) => None,
+        }
+    }
+
+    /// The lightmap, where it is one.
+    pub(crate) fn as_lightmap_mut(&mut self) -> Option<&mut LightmapSolver> {
+        match self {
+            Self::Volume(_) => None,
+            Self::Lightmap(lightmap) => Some(lightmap),
         }
     }
 
@@ -25,12 +45,14 @@ impl FieldSolver {
     pub(crate) fn arriving(&self) -> Field {
         match self {
             Self::Volume(volume) => volume.arriving().clone().into(),
+            Self::Lightmap(lightmap) => lightmap.lightmap().clone().into(),
         }
     }
 
     pub(crate) fn probe_count(&self) -> usize {
         match self {
             Self::Volume(volume) => volume.probe_count(),
+            Self::Lightmap(_) => 0,
         }
     }
 
@@ -38,13 +60,15 @@ impl FieldSolver {
     pub(crate) fn buried_count(&self) -> usize {
         match self {
             Self::Volume(volume) => volume.buried_count(),
+            Self::Lightmap(_) => 0,
         }
     }
 
-    /// Where its light matters: places with directions that surfaces there may face.
-    pub(crate) fn places(&self) -> Vec<Place> {
+    /// Irradiances that light has where that of this field matters.
+    pub(crate) fn seen(&self, light: &Light) -> Vec<Vec3> {
         match self {
-            Self::Volume(volume) => volume.places(),
+            Self::Volume(volume) => volume.seen(light),
+            Self::Lightmap(lightmap) => lightmap.seen(light),
         }
     }
 
@@ -52,6 +76,7 @@ impl FieldSolver {
     pub(crate) fn look(&self, scene: &Arc<Snapshot>) -> Option<Job> {
         match self {
             Self::Volume(volume) => volume.look(scene),
+            Self::Lightmap(_) => None,
         }
     }
 
@@ -59,6 +84,7 @@ impl FieldSolver {
     pub(crate) fn found(&mut self, gathered: &Gathered) {
         match self {
             Self::Volume(volume) => volume.found(gathered),
+            Self::Lightmap(_) => {}
         }
     }
 
@@ -66,6 +92,7 @@ impl FieldSolver {
     pub(crate) fn job(&mut self, scene: Arc<Snapshot>, samples: u32) -> Job {
         match self {
             Self::Volume(volume) => volume.job(scene, samples),
+            Self::Lightmap(lightmap) => lightmap.job(scene, samples),
         }
     }
 
@@ -73,6 +100,7 @@ impl FieldSolver {
     pub(crate) fn blend(&mut self, gathered: &Gathered, budgets: &[Budget]) {
         match self {
             Self::Volume(volume) => volume.blend(gathered, budgets),
+            Self::Lightmap(lightmap) => lightmap.take(gathered, budgets),
         }
     }
 
@@ -80,6 +108,13 @@ impl FieldSolver {
     pub(crate) fn expect_change(&mut self) {
         match self {
             Self::Volume(volume) => volume.expect_change(),
+            Self::Lightmap(lightmap) => lightmap.expect_change(),
         }
+    }
+}
+
+impl From<VolumeSolver> for FieldSolver {
+    fn from(volume: VolumeSolver) -> Self {
+        Self::Volume(Box::new(volume))
     }
 }

@@ -14,7 +14,8 @@
 //! let mut tracer = CpuPathTracer::new(Options::default())?;
 //! let volumes = volumes(&mut scene, &mut tracer)?;
 //! let (effort, options) = (Effort::of_samples(1024), GatherOptions::default());
-//! let wanted = Bake { scene: &scene.snapshot(), volumes: &volumes, effort, options };
+//! let scene = &scene.snapshot();
+//! let wanted = Bake { scene, volumes: &volumes, lightmap: None, effort, options };
 //! let baked = bake(wanted, &mut tracer, |_| ())?;
 //! let light = Light::new(baked.fields);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -39,9 +40,9 @@ mod surfaces;
 mod volume;
 mod walls;
 
-pub use bake::{Bake, Baked, Done, Effort, bake};
+pub use bake::{Bake, Baked, Done, Effort, Receivers, Spent, bake};
 pub use error::SolveError;
-pub use lightmap::{LightmapSolver, spread, with_backs};
+pub use lightmap::{LightmapSolver, seam_differences, spread, with_backs};
 pub use options::{FitOptions, GatherOptions};
 pub use placement::{Survey, default_volume, survey, volumes};
 pub use request::{Asked, Request, Turn};

@@ -1,27 +1,22 @@
 //! How noisy light is, as it is shown.
 
 use glam::Vec3;
-use lumencast_light::{Light, Place};
+use lumencast_light::FieldId;
 
 use crate::solver::Solver;
 
-/// Points of surfaces, or directions at probes, that are looked at, about so many at most.
-const PLACES: usize = 1 << 16;
 /// Share of all irradiances that lie below what is displayed as white.
 const WHITE: f32 = 0.99;
 
 /// Root of the mean square by which two states of the same fields differ where they are read, in codes
-/// of 0 to 255: v^(1/2.2) for surfaces alike, where the brightest hundredth is white. They are read on
-/// the surfaces that the fields know, or in all directions at their probes.
-pub(crate) fn shown(one: &Solver, other: &Solver) -> f32 {
-    let places = one.places();
-    let step = places.len().div_ceil(PLACES).max(1);
-    let read = |light: &Light| -> Vec<Vec3> {
-        let irradiance =
-            |place: &Place| light.irradiance(place.position, place.normal).max(Vec3::ZERO);
-        places.iter().step_by(step).map(irradiance).collect()
+/// of 0 to 255: v^(1/2.2) for surfaces alike, where the brightest hundredth is white. Volumes are read
+/// on the surfaces that they know, or in all directions at their probes; lightmaps at their lumels.
+pub(crate) fn shown(one: &Solver, other: &Solver, fields: &[FieldId]) -> f32 {
+    let seen = |solver: &Solver| -> Vec<Vec3> {
+        let all = fields.iter().flat_map(|field| solver.seen(*field));
+        all.map(|irradiance| irradiance.max(Vec3::ZERO)).collect()
     };
-    let [one, other] = [one, other].map(|solver| read(solver.light()));
+    let [one, other] = [one, other].map(seen);
     let white = white(&one);
     if white <= 0.0 {
         return 0.0;

@@ -2,13 +2,16 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
+use lumencast_charts::LaidOut;
 use lumencast_gather::{Gathered, Job};
-use lumencast_light::{Field, FieldId, Light, Place, ProbeVolume};
+use lumencast_light::{Field, FieldId, Light, ProbeVolume};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::SolveError;
 use crate::field::FieldSolver;
 use crate::fit::{FitSettings, Part, fit};
+use crate::lightmap::LightmapSolver;
 use crate::options::GatherOptions;
 use crate::request::{Asked, Request, Turn, What};
 use crate::surfaces::Surfaces;
@@ -47,8 +50,8 @@ impl Solver {
         Ok(empty)
     }
 
-    /// Keeps these volumes from now on. Those that it kept already go on under their numbers, with all
-    /// that is known of their light; others get numbers that none has had.
+    /// Keeps these volumes from now on, before all other fields. Those that it kept already go on under
+    /// their numbers, with all that is known of their light; others get numbers that none has had.
     ///
     /// # Errors
     /// [`SolveError::Volume`]; nothing has changed then.
@@ -58,22 +61,43 @@ impl Solver {
         }
         let mut before = std::mem::take(&mut self.fields);
         for spec in volumes.iter().flat_map(|spec| spec.split()) {
-            let same = before
-                .iter()
-                .position(|FieldSolver::Volume(volume)| volume.spec() == spec)
-                .map(|at| before.remove(at));
-            self.fields.push(same.unwrap_or_else(|| {
-                let FieldId(id) = self.next;
-                self.next = FieldId(id + 1);
-                FieldSolver::Volume(VolumeSolver::new(FieldId(id), spec, &self.options))
-            }));
+            let is_same = |field: &FieldSolver| field.as_volume().is_some_and(|v| v.spec() == spec);
+            let same = before.iter().position(is_same).map(|at| before.remove(at));
+            let field = same
+                .unwrap_or_else(|| VolumeSolver::new(self.next_id(), spec, &self.options).into());
+            self.fields.push(field);
         }
+        before.retain(|field| field.as_volume().is_none());
+        self.fields.append(&mut before);
+        self.list_light();
+        Ok(())
+    }
+
+    /// Keeps the lumels of a layout from now on, after all volumes, or none. They are dark at first, and
+    /// have a number that no field has had.
+    pub fn set_lightmap(&mut self, scene: &Snapshot, laid_out: Option<&LaidOut>) {
+        self.fields.retain(|field| field.as_volume().is_some());
+        if let Some(laid_out) = laid_out {
+            let ratio = self.options.blend.ratio;
+            let lightmap = LightmapSolver::new(self.next_id(), scene, laid_out, ratio);
+            self.fields.push(FieldSolver::Lightmap(lightmap));
+        }
+        self.list_light();
+    }
+
+    fn next_id(&mut self) -> FieldId {
+        let FieldId(id) = self.next;
+        self.next = FieldId(id + 1);
+        FieldId(id)
+    }
+
+    /// Publishes the fields that there are, with the light that is known of them.
+    fn list_light(&mut self) {
         let light = self.fields.iter().map(|field| {
             let known = self.light.field(field.id()).cloned();
             known.unwrap_or_else(|| field.arriving())
         });
         self.light = Light::new(light);
-        Ok(())
     }
 
     /// Numbers of the fields, in the order in which they were asked for; pieces of a volume follow one
@@ -142,14 +166,19 @@ impl Solver {
         self.fields.iter_mut().for_each(FieldSolver::expect_change);
     }
 
-    /// Makes light of what has been taken in: what arrives at the probes or, where they are fitted, the
-    /// fit of all of them.
+    /// Makes light of what has been taken in.
     pub fn solve(&mut self, effort: FitEffort) {
+        self.solve_volumes(effort);
+        self.solve_lightmaps();
+    }
+
+    /// What arrives at the probes or, where they are fitted, the fit of all of them.
+    pub(crate) fn solve_volumes(&mut self, effort: FitEffort) {
         let Self { fields, light, .. } = self;
+        let volumes: Vec<&VolumeSolver> =
+            fields.iter().filter_map(FieldSolver::as_volume).collect();
         let of = |published: &ProbeVolume| {
-            fields.iter().find_map(|FieldSolver::Volume(volume)| {
-                (volume.id() == published.id).then_some(volume)
-            })
+            volumes.iter().copied().find(|volume| volume.id() == published.id)
         };
         let ordered: Vec<&VolumeSolver> = light.volumes().filter_map(of).collect();
         let surfaces: Option<Vec<&Surfaces>> = ordered.iter().map(|v| v.surfaces()).collect();
@@ -170,9 +199,22 @@ impl Solver {
         fit(light, &parts, &FitSettings { rounds, steps, ..FitSettings::default() });
     }
 
-    /// Where light matters: see [`VolumeSolver::places`].
-    pub(crate) fn places(&self) -> Vec<Place> {
-        self.fields.iter().flat_map(FieldSolver::places).collect()
+    /// What arrives at lumels, filtered on the surface.
+    pub(crate) fn solve_lightmaps(&mut self) {
+        for lightmap in self.fields.iter_mut().filter_map(FieldSolver::as_lightmap_mut) {
+            lightmap.solve(true);
+            let fields = self.light.fields_mut().iter_mut();
+            let mut published = fields.filter_map(Field::as_lightmap_mut);
+            if let Some(published) = published.find(|known| known.id == lightmap.id()) {
+                published.clone_from(lightmap.lightmap());
+            }
+        }
+    }
+
+    /// Irradiances that the light has where that of a field matters.
+    pub(crate) fn seen(&self, field: FieldId) -> Vec<Vec3> {
+        let known = self.fields.iter().find(|known| known.id() == field);
+        known.map_or_else(Vec::new, |known| known.seen(&self.light))
     }
 
     fn field_mut(&mut self, id: FieldId) -> Option<&mut FieldSolver> {

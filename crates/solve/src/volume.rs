@@ -4,13 +4,16 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use lumencast_gather::{Budget, Gathered, Job, Receiver};
-use lumencast_light::{FieldId, Place, ProbeVolume};
+use lumencast_light::{FieldId, Light, Place, ProbeVolume};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::blend::History;
 use crate::options::GatherOptions;
 use crate::surfaces::Surfaces;
 use crate::walls::{Buried, Sight};
+
+/// Points, or directions at probes, at which light is seen, about so many at most.
+const SEEN: usize = 1 << 16;
 
 /// What makes light of a volume's sums.
 ///
@@ -64,9 +67,17 @@ impl VolumeSolver {
         self.buried.count()
     }
 
-    /// Where its light matters: points of the surfaces that it knows, with their normals, or all
-    /// directions along the axes at probes that are not inside walls.
-    pub(crate) fn places(&self) -> Vec<Place> {
+    /// Irradiances that light has where the volume's matters.
+    pub(crate) fn seen(&self, light: &Light) -> Vec<Vec3> {
+        let places = self.places();
+        let step = places.len().div_ceil(SEEN).max(1);
+        let irradiance = |place: &Place| light.irradiance(place.position, place.normal);
+        places.iter().step_by(step).map(irradiance).collect()
+    }
+
+    /// Points of the surfaces that it knows, with their normals, or all directions along the axes at
+    /// probes that are not inside walls.
+    fn places(&self) -> Vec<Place> {
         if let Some(surfaces) = &self.surfaces {
             return surfaces.places();
         }

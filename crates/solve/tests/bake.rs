@@ -3,10 +3,11 @@
 use std::f32::consts::PI;
 
 use glam::{Quat, UVec3, Vec3};
+use lumencast_charts::{laid_out, sheets};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_light::{Field, Grid, Order};
-use lumencast_scene::{Environment, Material, Scene, VolumeSpec};
-use lumencast_solve::{Bake, Done, Effort, FitOptions, GatherOptions, bake};
+use lumencast_light::{Grid, Order};
+use lumencast_scene::{Environment, LightmapSpec, Material, Scene, VolumeSpec};
+use lumencast_solve::{Bake, Done, Effort, FitOptions, GatherOptions, Spent, bake};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 const FIT: FitOptions = FitOptions { points: 16 };
@@ -34,28 +35,39 @@ fn gather(fit: Option<FitOptions>) -> GatherOptions {
 #[test]
 fn baking_ends_by_its_noise() {
     let snapshot = scene().snapshot();
-    for fit in [None, Some(FIT)] {
+    let sheets = sheets(&snapshot, None, &|_| true).expect("charts").sheets;
+    let lumels = laid_out(&sheets, LightmapSpec::Size(64)).expect("a layout");
+    let subjects = [
+        (volumes(), None, gather(None)),
+        (volumes(), None, gather(Some(FIT))),
+        (Vec::new(), Some(&lumels), gather(None)),
+    ];
+    for (volumes, lightmap, options) in subjects {
         let light = |effort: Effort, told: &mut Vec<Done>| {
-            let progress = |done| told.push(done);
-            let (volumes, options) = (volumes(), gather(fit));
-            let wanted = Bake { scene: &snapshot, volumes: &volumes, effort, options };
-            bake(wanted, &mut tracer(), progress).expect("light")
+            let wanted = Bake { scene: &snapshot, volumes: &volumes, lightmap, effort, options };
+            let baked = bake(wanted, &mut tracer(), |done| told.push(done)).expect("light");
+            baked.lumels.unwrap_or(baked.probes)
         };
         let mut told = Vec::new();
-        let rough = light(Effort { samples: 1 << 20, noise: Some(4.0) }, &mut told);
+        let rough = light(Effort { noise: Some(4.0), ..Effort::of_samples(1 << 20) }, &mut told);
         assert!(rough.samples < 1 << 18 && rough.noise.is_some_and(|noise| noise <= 4.0));
         assert_eq!(told.last().map(|done| (done.share, done.noise)), Some((1.0, rough.noise)));
         assert!(told.windows(2).all(|pair| pair[0].share <= 1.0));
         let noise = |samples| {
-            light(Effort { samples, noise: Some(1e-6) }, &mut Vec::new()).noise.expect("noise")
+            let effort = Effort { noise: Some(1e-6), ..Effort::of_samples(samples) };
+            light(effort, &mut Vec::new()).noise.expect("noise")
         };
-        let ratio = noise(1024) / noise(16_384);
+        let (few, many) = if lightmap.is_some() { (64, 1024) } else { (1024, 16_384) };
+        let ratio = noise(few) / noise(many);
         assert!(ratio > 2.0, "16 times the samples, a quarter of the noise at most: {ratio}");
     }
     let (volumes, effort, options) = (volumes(), Effort::of_samples(300), gather(None));
-    let wanted = Bake { scene: &snapshot, volumes: &volumes, effort, options };
+    let lightmap = Some(&lumels);
+    let wanted = Bake { scene: &snapshot, volumes: &volumes, lightmap, effort, options };
     let off = bake(wanted, &mut tracer(), |_| ()).expect("light");
-    assert_eq!((off.samples, off.noise), (300, None));
+    let spent = Spent { samples: 300, noise: None };
+    assert_eq!((off.probes, off.lumels), (spent, Some(spent)));
+    assert_eq!(off.fields.len(), volumes.len() + 1);
 }
 
 /// A closed box that its volume spans to the millimetre, under an even sky: all probes are within, and
@@ -72,9 +84,10 @@ fn what_stands_on_the_border_is_lit_from_outside() {
         let grid = Grid { center: Vec3::ZERO, rotation: Quat::IDENTITY, size, resolution };
         let volume = VolumeSpec { grid, order: Order::L2 };
         let (effort, options) = (Effort::of_samples(1024), gather(Some(FIT)));
-        let wanted = Bake { scene: &stage.snapshot(), volumes: &[volume], effort, options };
-        let light = bake(wanted, &mut tracer(), |_| ());
-        let Field::Volume(light) = light.expect("a volume").fields.remove(0);
+        let (scene, volumes) = (&stage.snapshot(), &[volume]);
+        let wanted = Bake { scene, volumes, lightmap: None, effort, options };
+        let baked = bake(wanted, &mut tracer(), |_| ()).expect("light");
+        let light = baked.fields[0].as_volume().expect("a volume");
         for normal in Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
             let (u, v) = normal.any_orthonormal_pair();
             for (x, y) in [(0.0, 0.0), (0.8, 0.3), (-0.5, 0.9)] {

@@ -12,6 +12,9 @@ use lumencast_solve::{LightmapSolver, spread, with_backs};
 use lumencast_testkit::scenes::{Stage, lambert};
 use std::sync::Arc;
 
+/// The least weight of an update where all are averaged.
+const MEAN: f32 = f32::MIN_POSITIVE;
+
 fn tracer() -> CpuPathTracer {
     CpuPathTracer::new(Options::default()).expect("threads")
 }
@@ -24,7 +27,7 @@ fn laid(scene: &Arc<Snapshot>) -> LaidOut {
 
 fn lit(scene: &Arc<Snapshot>, bounces: u32, samples: u32) -> (LightmapSolver, LaidOut) {
     let laid_out = laid(scene);
-    let mut solver = LightmapSolver::new(FieldId(3), scene, &laid_out);
+    let mut solver = LightmapSolver::new(FieldId(3), scene, &laid_out, MEAN);
     let mut tracer = tracer();
     let job = Job { bounces, ..solver.job(scene.clone(), samples) };
     let budgets = job.budgets.clone();
@@ -109,7 +112,7 @@ fn a_lightmap_without_light_is_dark() {
     stage.quad(Vec3::ZERO, Vec3::X, Vec3::Y, grey);
     let scene = stage.snapshot();
     let laid_out = laid(&scene);
-    let mut solver = LightmapSolver::new(FieldId(0), &scene, &laid_out);
+    let mut solver = LightmapSolver::new(FieldId(0), &scene, &laid_out, MEAN);
     solver.solve(true);
     assert!(solver.lightmap().irradiance.iter().all(|e| *e == Vec3::ZERO));
 }

@@ -39,6 +39,6 @@ pub(crate) struct EffortArguments {
 impl EffortArguments {
     /// The effort of at most so many samples a probe.
     pub(crate) fn with(&self, samples: u32) -> Effort {
-        Effort { samples, noise: self.noise.0 }
+        Effort { noise: self.noise.0, ..Effort::of_samples(samples) }
     }
 }

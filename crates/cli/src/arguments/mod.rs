@@ -2,6 +2,7 @@
 
 mod drawing;
 mod effort;
+mod fields;
 mod gather;
 mod lightmap;
 mod materials;
@@ -14,6 +15,7 @@ pub(crate) use drawing::Exposure;
 #[cfg(feature = "gpu")]
 pub(crate) use drawing::occlusion;
 pub(crate) use effort::{EffortArguments, MOST_SAMPLES};
+pub(crate) use fields::{FieldsArguments, Wanted};
 pub(crate) use gather::{GatherArguments, source};
 pub(crate) use lightmap::LightmapArguments;
 pub(crate) use materials::Materials;

@@ -6,16 +6,17 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::Vec3;
-use lumencast_charts::{LaidOut, Progress, Store, laid_out, sheets, usual};
+use lumencast_charts::LaidOut;
 use lumencast_gather::path_trace::{CpuPathTracer, Levels, Options};
 use lumencast_gather::{Gather, Job, Receiver};
 use lumencast_light::{FieldId, Lightmap, Place};
 use lumencast_scene::Snapshot;
-use lumencast_solve::{LightmapSolver, spread, with_backs};
+use lumencast_solve::{LightmapSolver, seam_differences, spread};
 use serde_json::json;
 
 use super::quantile;
 use crate::arguments::{LightmapArguments, Materials, SceneSource};
+use crate::charting;
 use crate::output::{self, say};
 
 /// Points of surfaces at which light is judged.
@@ -84,10 +85,11 @@ impl BenchLightmap {
 
         let spec = self.lightmap.spec(&scene);
         let start = Instant::now();
-        let laid_out = self.lay_out(&snapshot, spec, &mut tracer)?;
+        let laid_out = charting::lay_out(&snapshot, spec, &mut tracer)?
+            .context("the scene has no still surface that lumels can lie on")?;
         let layout_seconds = start.elapsed().as_secs_f64();
 
-        let mut solver = LightmapSolver::new(FieldId(0), &snapshot, &laid_out);
+        let mut solver = LightmapSolver::new(FieldId(0), &snapshot, &laid_out, f32::MIN_POSITIVE);
         let start = Instant::now();
         self.gather(&mut solver, &snapshot, &mut tracer)?;
         let gather_seconds = start.elapsed().as_secs_f64();
@@ -96,6 +98,11 @@ impl BenchLightmap {
         let start = Instant::now();
         solver.solve(true);
         let filter_seconds = start.elapsed().as_secs_f64();
+
+        let mut seams: Vec<f64> =
+            seam_differences(&snapshot, solver.lightmap()).into_iter().map(f64::from).collect();
+        seams.sort_unstable_by(f64::total_cmp);
+        let seam = (!seams.is_empty()).then(|| quantile(&seams, 0.99));
 
         let places = spread(&snapshot, &laid_out.layout, POINTS);
         let reference = self.reference(&places, &snapshot, &mut tracer)?;
@@ -119,6 +126,7 @@ impl BenchLightmap {
                 "materials": self.materials.to_string(),
                 "points": judged,
                 "irradiance_db": { "gathered": as_gathered, "filtered": filtered },
+                "seams": { "points": seams.len(), "p99": seam },
                 "reference": { "noise_db": reference.noise, "samples": reference.samples },
                 "seconds": {
                     "layout": layout_seconds, "gather": gather_seconds, "filter": filter_seconds,
@@ -138,6 +146,9 @@ impl BenchLightmap {
             "irradiance: {filtered:.1} dB, as gathered {as_gathered:.1} dB, {} samples a lumel",
             self.samples
         );
+        if let Some(seam) = seam {
+            say!("seams: both sides differ by {:.2} % in the 99th percentile", 100.0 * seam);
+        }
         say!(
             "reference: {judged} points, noise {:.1} dB after {} samples",
             reference.noise,
@@ -147,24 +158,6 @@ impl BenchLightmap {
             "seconds: layout {layout_seconds:.1}, light {gather_seconds:.1}, filter {filter_seconds:.1}"
         );
         Ok(())
-    }
-
-    fn lay_out(
-        &self,
-        scene: &Arc<Snapshot>,
-        spec: Option<lumencast_scene::LightmapSpec>,
-        tracer: &mut CpuPathTracer,
-    ) -> Result<LaidOut> {
-        let bar = output::share_bar("Cutting surfaces");
-        let show = |Progress { done, total }: Progress| {
-            bar.set_position(output::SHARE_BAR_LENGTH as u64 * done as u64 / total.max(1) as u64);
-            true
-        };
-        let fronts = sheets(scene, Store::of_user().as_ref(), &show)?.sheets;
-        bar.finish_and_clear();
-        ensure!(!fronts.is_empty(), "the scene has no still surface that lumels can lie on");
-        let all = with_backs(fronts, scene, tracer)?;
-        Ok(laid_out(&all, spec.unwrap_or_else(|| usual(&all)))?)
     }
 
     fn gather(

@@ -43,10 +43,11 @@ impl Render {
         let snapshot = scene.snapshot();
         let mut renderer = Renderer::new(gpu, &settings);
         renderer.set_scene(&snapshot);
-        let mut probes = 0;
+        let (mut probes, mut pages) = (0, 0);
         if settings.lighting.indirect {
             let light = Light::new(self.fields(scene, light)?);
             probes = light.probe_count();
+            pages = light.lightmaps().map(|lightmap| lightmap.layout.pages).sum();
             let (offset, window) = (self.raster.reading.offset, self.raster.window);
             renderer.set_light(&light.seen(offset, window))?;
         }
@@ -72,7 +73,7 @@ impl Render {
                 drawn.lights_without_shadow
             );
         }
-        let done = Done { adapter, drawn, probes, seconds, exposure };
+        let done = Done { adapter, drawn, probes, pages, seconds, exposure };
         if self.json {
             return output::json(&self.report_drawn(&done));
         }
@@ -118,15 +119,15 @@ impl Render {
             return Ok(light.fields);
         }
         let computed = Computed {
-            effort: self.raster.effort.with(self.raster.probe_samples),
+            effort: self.raster.fields.effort(&self.raster.effort, self.raster.probe_samples),
             bounces: self.picture.bounces.saturating_sub(1),
             clamp: self.clamp,
             reading: self.raster.reading.drawn(),
             tracing: self.picture.tracing(),
         };
         let mut gatherer = computed.gatherer()?;
-        let specs = self.scene.volumes(scene, &mut *gatherer)?;
-        Ok(computed.volumes(&scene.snapshot(), &specs, &mut *gatherer)?.fields)
+        let wanted = self.raster.fields.wanted(scene, &self.scene, &mut *gatherer)?;
+        Ok(computed.light(&scene.snapshot(), &wanted, &mut *gatherer)?.fields)
     }
 
     /// Columns and rows of views.
@@ -135,7 +136,7 @@ impl Render {
     }
 
     fn print_drawn(&self, done: &Done) {
-        let Done { adapter, drawn, probes, seconds, exposure } = done;
+        let Done { adapter, drawn, probes, pages, seconds, exposure } = done;
         let UVec2 { x: width, y: height } = self.picture.size;
         let files: Vec<_> = self.output.iter().map(|path| path.display().to_string()).collect();
         say!("{}", files.join(", "));
@@ -146,7 +147,7 @@ impl Render {
             drawn.frames,
         );
         say!(
-            "probes: {probes}, shadow maps: {} of {}², exposure {exposure}",
+            "probes: {probes}, pages of lumels: {pages}, shadow maps: {} of {}², exposure {exposure}",
             drawn.shadow_maps,
             drawn.shadow_resolution
         );
@@ -178,6 +179,7 @@ impl Render {
             "shadow_resolution": drawn.shadow_resolution,
             "lights_without_shadow": drawn.lights_without_shadow,
             "probes": done.probes,
+            "pages": done.pages,
             "seconds": done.seconds,
             "device_seconds": drawn.time.map(|time| json!({
                 "deformation": time.deformation,
@@ -196,6 +198,8 @@ struct Done {
     drawn: Drawn,
     /// The number of the light's probes.
     probes: usize,
+    /// The number of its pages of lumels.
+    pages: u32,
     seconds: f64,
     exposure: f32,
 }

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use glam::UVec2;
 
-use crate::arguments::{EffortArguments, MOST_SAMPLES, ReadingArguments};
+use crate::arguments::{EffortArguments, FieldsArguments, MOST_SAMPLES, ReadingArguments};
 use crate::light_source;
 use crate::values::{parse_occlusion, parse_positive};
 
@@ -24,6 +24,8 @@ pub(crate) struct RasterArguments {
     pub(super) probe_samples: u32,
     #[command(flatten)]
     pub(super) effort: EffortArguments,
+    #[command(flatten)]
+    pub(super) fields: FieldsArguments,
     #[command(flatten)]
     pub(super) reading: ReadingArguments,
     /// Takes ringing out of the field by a Hann window that ends at this band; 3 leaves order 2 a

@@ -3,11 +3,12 @@
 use glam::{UVec3, Vec3};
 use lumencast_light::Order;
 
-use super::header::{ProbeHeader, layer};
+use super::header::ProbeHeader;
 use super::model::{Given, Reconstruction, code_region};
 use super::quantise::to_rgb;
 use crate::DecodeError;
 use crate::range_coder::Decoder;
+use crate::update_info::layer;
 
 /// Decodes the frames of one region of a field. Holds the newest reconstruction of layers 0 and 1,
 /// which deltas refer to: for an L2 region of 512 probes 2 × 55 KiB.

@@ -3,11 +3,12 @@
 use glam::{UVec3, Vec3};
 use lumencast_light::{Order, ProbeVolume, ScaleRule};
 
-use super::header::{ProbeHeader, UpdateInfo};
+use super::header::ProbeHeader;
 use super::model::{Choices, Reconstruction, code_region};
 use super::quantise::{from_rgb, step, step_index};
 use super::regions::{Region, regions};
 use crate::range_coder::{Encoder, MAX_MAGNITUDE};
+use crate::{EncodedRegion, UpdateInfo};
 
 // The three that follow were chosen by `examples/measure`: of many combinations those that cost the
 // fewest bytes at an error of 0.55 % of c0's length, which is 0.95 % of a grey probe's c0 a channel.
@@ -46,22 +47,6 @@ struct RegionState {
     /// Layers whose next frame begins a group, since layer 0 had a keyframe.
     new_group: [bool; 3],
     scale_log2: i8,
-}
-
-/// A frame to be sent.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EncodedRegion {
-    /// Number of the region.
-    pub region: u32,
-    /// Temporal layer.
-    pub layer: u8,
-    /// Whether the frame begins a group on its track.
-    pub new_group: bool,
-    /// The frame.
-    pub bytes: Vec<u8>,
-    /// Root-mean-square error over the region's values, each relative to the length of its probe's
-    /// c0.
-    pub error: f32,
 }
 
 impl ProbeEncoder {

@@ -8,6 +8,6 @@ mod quantise;
 mod regions;
 
 pub use decoder::{ProbeDecoder, RegionLight};
-pub use encoder::{EncodedRegion, ProbeEncoder};
-pub use header::{ProbeHeader, UpdateInfo};
+pub use encoder::ProbeEncoder;
+pub use header::ProbeHeader;
 pub use regions::{Region, regions};

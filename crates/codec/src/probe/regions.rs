@@ -20,7 +20,7 @@ const CELLS: u32 = 10;
 
 impl Region {
     /// Indices of the region's probes within a volume of `resolution`, in the region's index order.
-    pub fn probes(self, resolution: UVec3) -> impl Iterator<Item = usize> {
+    pub fn probes(self, resolution: UVec3) -> impl Iterator<Item = usize> + Clone {
         let r = resolution.as_usizevec3();
         let (min, size) = (self.min.as_usizevec3(), self.size.as_usizevec3());
         (min.z..min.z + size.z).flat_map(move |z| {

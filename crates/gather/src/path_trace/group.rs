@@ -496,9 +496,9 @@ impl Shader<'_, '_> {
             let at = met.position + self.world.origin();
             let on = self.world.on_triangle(&hit, leaves != met.is_front());
             let place = Place { position: at, normal: side, on: Some(on) };
-            let Some(arriving) = light.sample(&place) else { continue };
+            let Some(arriving) = light.radiance(&place, direction) else { continue };
             let path = &self.paths[index as usize];
-            let scattered = path.throughput * (weight * arriving.radiance(direction));
+            let scattered = path.throughput * (weight * arriving);
             let scattered = self.limited(self.depth + 1, scattered);
             self.paths[index as usize].seen.add(Part::Indirect, scattered);
         }

@@ -88,7 +88,7 @@ fn cornell() -> Drawn {
     let snapshot = scene.snapshot();
     let options = GatherOptions::default();
     let effort = Effort::of_samples(1024);
-    let wanted = Bake { scene: &snapshot, volumes: &[volume], effort, options };
+    let wanted = Bake { scene: &snapshot, volumes: &[volume], lightmap: None, effort, options };
     let light = bake(wanted, &mut tracer, |_| ()).unwrap();
     Drawn { scene: snapshot, light: Light::new(light.fields), view, exposure: 2.0 }
 }

@@ -119,7 +119,7 @@ fn light_is_turned_as_the_tracers() {
         let alone = scene(environment, false);
         let effort = Effort::of_samples(16_384);
         let options = GatherOptions::default();
-        let wanted = Bake { scene: &alone, volumes: &[volume], effort, options };
+        let wanted = Bake { scene: &alone, volumes: &[volume], lightmap: None, effort, options };
         let light = bake(wanted, &mut tracer, |_| ());
         let scene = scene(alone.environment.clone(), true);
         let mut renderer = renderer(&scene, &settings);

@@ -10,6 +10,7 @@ mod direct_light;
 mod environments;
 mod far;
 mod indirect_light;
+mod lumels;
 mod materials;
 mod occlusion;
 mod screen;

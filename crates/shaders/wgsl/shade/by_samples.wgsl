@@ -10,6 +10,10 @@ struct Varying {
     @location(5) @interpolate(flat) instance: u32,
     // 1 at every vertex, see `point_at`.
     @location(6) @interpolate(perspective, sample) one: f32,
+    // Lumels from the corner of the front's rectangle, and of the back's.
+    @location(7) @interpolate(perspective, sample) lumels: vec4f,
+    // These rectangles, see `shade/lumels`.
+    @location(8) @interpolate(flat) rectangles: vec2u,
 }
 
 struct Facing {

@@ -7,6 +7,7 @@
 #import shade/frame
 #import shade/frame_bindings
 #import shade/indirect
+#import shade/lumels
 #import shade/pass_bindings
 #import shade/sampling
 #import shade/sight
@@ -23,6 +24,8 @@ struct Vertex {
     @location(3) uv0: vec2f,
     @location(4) uv1: vec2f,
     @location(5) color: vec4f,
+    @location(6) lumels: vec4f,
+    @location(7) rectangles: vec2u,
     @builtin(instance_index) instance: u32,
 }
 
@@ -39,6 +42,9 @@ fn forward_vertex(in: Vertex) -> Varying {
     out.color = in.color;
     out.instance = index;
     out.one = 1.0;
+    out.lumels = in.lumels;
+    let own = in.rectangles + instances[index].lumels;
+    out.rectangles = select(own, vec2u(NO_LUMELS), in.rectangles == vec2u(NO_LUMELS));
     return out;
 }
 
@@ -196,7 +202,12 @@ fn radiance_of(in: Varying, p: Point, faces_front: bool, turn: f32) -> vec3f {
             if OCCLUDED {
                 visible = ambient_visibility(in.clip, p.slopes);
             }
-            radiance += indirect_light(b, site, p.substance.roughness, occlusion, visible);
+            let lumels = in.lumels / in.one;
+            var arriving = Lumels(in.rectangles.x, lumels.xy);
+            if !front {
+                arriving = Lumels(in.rectangles.y, lumels.zw);
+            }
+            radiance += indirect_light(b, site, arriving, p.substance.roughness, occlusion, visible);
         }
     }
     return radiance;

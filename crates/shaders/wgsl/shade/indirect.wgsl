@@ -5,6 +5,7 @@
 #import field/light
 #import shade/ambient
 #import shade/frame_bindings
+#import shade/lumels
 #import surface/bsdf
 #import surface/site
 
@@ -13,20 +14,34 @@
 // comes from the mirror image of that lobe. The material's occlusion is of the side that is seen: light
 // from behind it leaves alone. So is `visible`, what ambient occlusion leaves; both tell of the same
 // crevices, of which each counts once.
-fn indirect_light(b: Bsdf, at: Site, roughness: f32, occlusion: f32, visible: f32) -> vec3f {
+//
+// Where the point has lumels, what arrives at them is scattered diffusely in place of the field's light.
+// They know what hides light nearby: `visible` leaves it alone.
+fn indirect_light(
+    b: Bsdf,
+    at: Site,
+    lumels: Lumels,
+    roughness: f32,
+    occlusion: f32,
+    visible: f32,
+) -> vec3f {
     let n = at.normal;
     let n_v = dot(n, at.view);
     let table = table_at(n_v, roughness);
     let by = textureSampleLevel(environment_brdf, table_sampler, table, 0.0);
     let toward = mean_direction(n, at.view, by.zw);
     let bands = specular_bands(length(by.zw), table);
-    let light = field_light(at.position, n, lobe(n, diffuse_bands(b)), lobe(toward, bands));
+    var light = field_light(at.position, n, lobe(n, diffuse_bands(b)), lobe(toward, bands));
     let under = 1.0 - reflectance(b, n_v);
     var of_diffuse = vec3f(occlusion);
     var of_specular = occlusion;
     if OCCLUDED {
-        of_diffuse = min(of_diffuse, many_bounces(visible, b.diffuse));
         of_specular = min(of_specular, visible);
+    }
+    if lumels.rectangle != NO_LUMELS {
+        light.a = lumel_light(lumels);
+    } else if OCCLUDED {
+        of_diffuse = min(of_diffuse, many_bounces(visible, b.diffuse));
     }
     var sum = b.diffuse * under * of_diffuse * light.a / PI;
     sum += (b.f0 * by.x + b.f90 * by.y) * specular_occlusion(n_v, of_specular, b.alpha) * light.b;

@@ -6,3 +6,5 @@
 @group(0) @binding(1) var<storage, read> instances: array<Instance>;
 // Indices of the instances that the pass draws, draw by draw.
 @group(0) @binding(2) var<storage, read> visible: array<u32>;
+// Where the lumels of instances lie, instance by instance.
+@group(0) @binding(3) var<storage, read> rectangles: array<Rectangle>;

@@ -19,7 +19,16 @@ struct Instance {
     normal_from_object: array<vec4f, 3>,
     // 1 where the transform mirrors, so that windings are turned about.
     mirrors: u32,
+    // Where its rectangles of lumels begin in the list of all.
+    lumels: u32,
     _pad0: u32,
     _pad1: u32,
-    _pad2: u32,
+}
+
+// A rectangle of lumels: charts of one side of a primitive of an instance.
+struct Rectangle {
+    // Its first lumel, on a layer of the pages' texture.
+    corner: vec2f,
+    layer: u32,
+    _pad: u32,
 }

@@ -1,10 +1,13 @@
 //! Lumels that nothing is known of get the light of those about them.
 //!
-//! Push-pull (Gortler et al. 1996, "The Lumigraph", section 3.4): means of what is known go up a
+//! Those beside known ones, which filtering reads, take the mean of these and of nothing farther off:
+//! light from beyond a wall, or of another chart, is not to show beside it. The rest is filled by
+//! push-pull (Gortler et al. 1996, "The Lumigraph", section 3.4): means of what is known go up a
 //! pyramid of halves, and down again to where nothing is known. What comes of it is smooth, costs few
 //! bits, and is the nearest neighbour's light beside a chart.
 
 use glam::{UVec2, Vec2, Vec3};
+use rayon::prelude::*;
 
 /// A level of the pyramid: sums of what is known, and their weights.
 struct Level {
@@ -52,9 +55,44 @@ impl Level {
     }
 }
 
+/// Rings of lumels about known ones that take their light alone: filtering reads the first, and the
+/// chroma of video the second.
+const RINGS: u32 = 2;
+
 /// Fills the lumels of a page, `side` a side, that are not known. A page of which nothing is known
 /// stays as it is.
 pub(crate) fn fill(page: &mut [Vec3], side: u32, is_known: impl Fn(usize) -> bool) {
+    let mut known: Vec<bool> = (0..page.len()).map(is_known).collect();
+    for _ in 0..RINGS {
+        grow(page, &mut known, side);
+    }
+    push_pull(page, side, |number| known[number]);
+}
+
+/// Gives lumels beside known ones the mean of these, which are known from then on.
+fn grow(page: &mut [Vec3], known: &mut [bool], side: u32) {
+    let beside = |number: u32| {
+        let (x, y) = ((number % side) as i32, (number / side) as i32);
+        let about = (0..9).map(move |k| (x + k % 3 - 1, y + k / 3 - 1));
+        let within = |c: i32| (0..side as i32).contains(&c);
+        about
+            .filter(move |(x, y)| within(*x) && within(*y))
+            .map(move |(x, y)| (y * side as i32 + x) as usize)
+    };
+    let mean = |number: u32| {
+        let lumels = beside(number).filter(|lumel| known[*lumel]).map(|lumel| page[lumel]);
+        let (sum, count) = lumels.fold((Vec3::ZERO, 0.0), |(sum, n), light| (sum + light, n + 1.0));
+        (count > 0.0).then(|| sum / count)
+    };
+    let unknown = (0..page.len() as u32).into_par_iter().filter(|n| !known[*n as usize]);
+    let grown: Vec<(u32, Vec3)> = unknown.filter_map(|n| Some((n, mean(n)?))).collect();
+    for (number, light) in grown {
+        page[number as usize] = light;
+        known[number as usize] = true;
+    }
+}
+
+fn push_pull(page: &mut [Vec3], side: u32, is_known: impl Fn(usize) -> bool) {
     let own =
         |number: usize| if is_known(number) { (page[number], 1.0) } else { (Vec3::ZERO, 0.0) };
     let mut levels = vec![Level { side, lumels: (0..page.len()).map(own).collect() }];
@@ -120,6 +158,21 @@ mod tests {
         for row in 0..side {
             assert!((page[row * side + 8].x - 1.0).abs() < 1.0, "{}", page[row * side + 8]);
             assert!((page[row * side + side - 9].x - 9.0).abs() < 1.0);
+        }
+    }
+
+    /// Lumels beside known ones take the light of these alone, however near others are.
+    #[test]
+    fn what_is_read_beside_a_border_is_of_its_own_side() {
+        let side = SIDE as usize;
+        let known = |number: usize| !(20..25).contains(&(number % side));
+        let own = |number: usize| if number % side < 22 { 1.0 } else { 9.0 };
+        let mut page: Vec<Vec3> = (0..side * side).map(|number| Vec3::splat(own(number))).collect();
+        fill(&mut page, SIDE, known);
+        for row in page.chunks(side) {
+            let values = [20, 21, 23, 24].map(|column: usize| row[column].x);
+            assert_eq!(values, [1.0, 1.0, 9.0, 9.0]);
+            assert!((1.0..=9.0).contains(&row[22].x));
         }
     }
 

@@ -12,19 +12,21 @@ use anyhow::{Context, Result};
 use clap::Args;
 use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
 use lumencast_gather::reference::{self, Film, Parts, PictureSettings};
-use lumencast_light::{Field, Light};
+use lumencast_light::{Field, Layout, Light};
 use lumencast_picture::{Picture, ToneMap, exposure};
 use lumencast_scene::{Edit, Environment, Scene, Snapshot, View};
 use lumencast_server::{SampleRange, TickOptions};
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading, Shadows};
-use lumencast_solve::Effort;
 use lumencast_solve::blend::BlendSettings;
+use lumencast_solve::{Effort, Spent};
 
 use super::drawing::{cells, draw, sum};
 use super::judge::{Judge, covered};
 use super::peers::{SIZE, SUBJECTS};
 use super::section::Section;
-use crate::arguments::{EffortArguments, MOST_SAMPLES, Reading, ReadingArguments};
+use crate::arguments::{
+    EffortArguments, FieldsArguments, MOST_SAMPLES, Reading, ReadingArguments, Wanted,
+};
 use crate::film_file::{FilmFile, KeptFilm};
 use crate::light_source::Computed;
 use crate::output::{self, tell};
@@ -65,6 +67,8 @@ pub(crate) struct BenchScenes {
     reading: ReadingArguments,
     #[command(flatten)]
     effort: EffortArguments,
+    #[command(flatten)]
+    fields: FieldsArguments,
     /// Samples a probe, at most.
     #[arg(long, value_name = "N", default_value_t = MOST_SAMPLES,
           value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
@@ -166,11 +170,16 @@ impl BenchScenes {
         let settings = Settings { pre_exposure: exposure, ..*settings };
         renderer.set_scene(&subject.snapshot);
         let drawn = self.reading.drawn();
-        let usual = computed(drawn, self.effort.with(self.probe_samples));
+        let usual = computed(drawn, self.fields.effort(&self.effort, self.probe_samples));
         let mut gatherer = usual.gatherer()?;
-        let specs = lumencast_solve::volumes(&mut subject.scene, &mut *gatherer)?;
+        let volumes = match self.fields.volumes() {
+            true => lumencast_solve::volumes(&mut subject.scene, &mut *gatherer)?,
+            false => Vec::new(),
+        };
+        let lightmap = self.fields.lumels(&mut subject.scene, &mut *gatherer)?;
+        let wanted = Wanted { volumes, lightmap };
         let snapshot = subject.snapshot.clone();
-        let mut bake = |computed: Computed| computed.volumes(&snapshot, &specs, &mut *gatherer);
+        let mut bake = |computed: Computed| computed.light(&snapshot, &wanted, &mut *gatherer);
         let baked = bake(usual)?;
         let mut picture_of =
             |fields: Vec<Field>| draw_light(renderer, fields, subject.view, &settings);
@@ -196,7 +205,11 @@ impl BenchScenes {
         }
         let mut beside = Vec::new();
         if let Some(times) = self.times {
-            let effort = Effort::of_samples(baked.samples.saturating_mul(times));
+            let more = |spent: Spent| spent.samples.saturating_mul(times);
+            let effort = Effort {
+                lumel_samples: baked.lumels.map_or(1, more),
+                ..Effort::of_samples(more(baked.probes))
+            };
             let more = bake(computed(drawn, effort))?;
             beside.push(Beside {
                 what: format!("{times} times the samples"),
@@ -215,7 +228,7 @@ impl BenchScenes {
             let options = TickOptions {
                 samples: SampleRange::fixed(samples),
                 gather: served.gathered(BOUNCES - 1, f32::INFINITY, BlendSettings::default()),
-                volumes: specs.clone(),
+                volumes: wanted.volumes.clone(),
                 ..TickOptions::default()
             };
             let live = live::light(subject.scene, gatherer, options, seconds.into())?;
@@ -224,16 +237,22 @@ impl BenchScenes {
                 psnr: judge.psnr(&picture_of(live)?)?,
             });
         }
+        let pages = wanted.lightmap.iter().map(|laid_out| {
+            let Layout { pages, page_size, .. } = laid_out.layout;
+            format!("{pages} × {page_size}²")
+        });
         Ok(Row {
             psnr: judge.psnr(&picture)?,
             reference_noise: judge.noise(indirect.film())?,
             reference_samples: indirect.film().samples(),
             scene: subject.name,
             under_sky: subject.under_sky,
-            grids: specs.iter().map(cells).collect(),
-            probes: specs.iter().map(|spec| spec.grid.probe_count()).sum(),
-            samples: baked.samples,
-            noise: baked.noise,
+            grids: wanted.volumes.iter().map(cells).chain(pages).collect(),
+            probes: wanted.volumes.iter().map(|spec| spec.grid.probe_count()).sum(),
+            samples: baked.probes.samples,
+            noise: baked.probes.noise,
+            lumel_samples: baked.lumels.map(|spent| spent.samples),
+            lumel_noise: baked.lumels.and_then(|spent| spent.noise),
             exposure,
             beside,
         })

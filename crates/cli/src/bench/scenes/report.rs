@@ -23,8 +23,12 @@ pub(super) struct Row {
     pub(super) probes: usize,
     /// The samples of a probe.
     pub(super) samples: u32,
-    /// The field's noise, codes of 0 to 255.
+    /// The noise of volumes, codes of 0 to 255.
     pub(super) noise: Option<f32>,
+    /// The samples of a lumel, where there are some.
+    pub(super) lumel_samples: Option<u32>,
+    /// The noise of lumels.
+    pub(super) lumel_noise: Option<f32>,
     pub(super) exposure: f32,
     /// The PSNR of the picture's indirect part.
     pub(super) psnr: Psnr,
@@ -49,7 +53,7 @@ impl Report {
         let beside = self.rows.first().map_or(&[][..], |row| &row.beside);
         let more: String = beside.iter().map(|beside| format!(" {} |", beside.what)).collect();
         let mut text = format!(
-            "| scene | grid | samples a probe | noise, codes | indirect part, dB |{more} \
+            "| scene | grid | samples a receiver | noise, codes | indirect part, dB |{more} \
              reference's noise |\n|{}\n",
             " --- |".repeat(6 + beside.len())
         );
@@ -66,7 +70,12 @@ impl Row {
     /// The row as a line of the table.
     pub(super) fn line(&self) -> String {
         let star = if self.under_sky { "*" } else { "" };
-        let noise = self.noise.map_or("off".into(), |noise| format!("{noise:.2}"));
+        let shown = |noise: Option<f32>| noise.map_or("off".into(), |noise| format!("{noise:.2}"));
+        let both = |probes: String, lumels: Option<String>| {
+            [probes].into_iter().chain(lumels).collect::<Vec<_>>().join(", ")
+        };
+        let noise = both(shown(self.noise), self.lumel_samples.map(|_| shown(self.lumel_noise)));
+        let samples = both(self.samples.to_string(), self.lumel_samples.map(|n| n.to_string()));
         let beside = |beside: &Beside| {
             let Psnr { sharp, filtered } = beside.psnr;
             format!(" {sharp:.1} ({filtered:.1}), {:+.2} |", filtered - self.psnr.filtered)
@@ -76,7 +85,7 @@ impl Row {
             "| {}{star} | {} | {} | {noise} | {:.1} ({:.1}) |{beside} {:.1} |",
             self.scene,
             self.grids.join(", "),
-            self.samples,
+            samples,
             self.psnr.sharp,
             self.psnr.filtered,
             self.reference_noise

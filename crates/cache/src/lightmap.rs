@@ -1,0 +1,74 @@
+//! A lightmap: its tiles, each on the way to its newest light.
+
+use std::collections::BTreeMap;
+
+use lumencast_codec::{LightTrack, LightmapShape, LumelHeader};
+use lumencast_light::{Field, Light, Lightmap};
+
+use crate::CacheError;
+use crate::newest::Newest;
+use crate::received::Received;
+use crate::tile::TileCache;
+
+/// The tiles of a lightmap; those for which frames have come hold memory.
+#[derive(Clone, Debug)]
+pub(crate) struct LightmapCache {
+    shape: LightmapShape,
+    tiles: BTreeMap<u32, TileCache>,
+}
+
+impl LightmapCache {
+    pub(crate) fn new(shape: &LightmapShape) -> Self {
+        Self { shape: shape.clone(), tiles: BTreeMap::new() }
+    }
+
+    /// Gives a lightmap the pages of the one that had its number before, where they are as many and as
+    /// large, and their layout until its own is known.
+    pub(crate) fn light_by(light: &Light, lightmap: &mut Lightmap) {
+        let pages = |lightmap: &Lightmap| (lightmap.layout.page_size, lightmap.layout.pages);
+        let before = light.field(lightmap.id).and_then(Field::as_lightmap);
+        if let Some(before) = before.filter(|before| pages(before) == pages(lightmap)) {
+            lightmap.clone_from(before);
+        }
+    }
+
+    pub(crate) fn add(
+        &mut self,
+        track: LightTrack,
+        frame: &[u8],
+        now: f64,
+        tick_seconds: f64,
+        shown: &mut Lightmap,
+    ) -> Result<Received, CacheError> {
+        let LightTrack { field, region, layer } = track;
+        let unknown = CacheError::UnknownRegion { field, region };
+        let tile = self.shape.tile(region).ok_or(unknown)?;
+        let info = LumelHeader::read(frame)?.info;
+        if layer != 0 {
+            return Err(CacheError::WrongLayer { update: info.update, layer });
+        }
+        let news = self.tiles.entry(region).or_insert_with(|| TileCache::new(tile)).add(
+            frame,
+            now,
+            tick_seconds,
+            shown,
+        )?;
+        Ok(Received { info, news })
+    }
+
+    pub(crate) fn forget_updates(&mut self) {
+        self.tiles.values_mut().for_each(TileCache::forget_updates);
+    }
+
+    pub(crate) fn show(&mut self, now: f64, shown: &mut Lightmap) {
+        self.tiles.values_mut().for_each(|tile| tile.show(now, shown));
+    }
+
+    pub(crate) fn newest(&self) -> impl Iterator<Item = &Newest> {
+        self.tiles.values().filter_map(TileCache::newest)
+    }
+
+    pub(crate) fn newest_of(&self, region: u32) -> Option<&Newest> {
+        self.tiles.get(&region)?.newest()
+    }
+}

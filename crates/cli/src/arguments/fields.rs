@@ -1,0 +1,90 @@
+//! Which kinds of fields hold the light.
+
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use lumencast_charts::LaidOut;
+use lumencast_gather::Gather;
+use lumencast_scene::{Scene, VolumeSpec};
+use lumencast_solve::Effort;
+
+use super::effort::EffortArguments;
+use super::lightmap::LightmapArguments;
+use super::scene::SceneArguments;
+use crate::charting;
+use crate::output::tell;
+
+/// A lumel takes so many samples at most, unless told otherwise.
+const LUMEL_SAMPLES: u32 = 256;
+
+/// Which kinds of fields hold the light.
+#[derive(Debug, Args)]
+pub(crate) struct FieldsArguments {
+    /// What holds the light: lumels of still surfaces (lightmap), probes for all else (volume).
+    #[arg(
+        long,
+        value_name = "KIND,KIND",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "lightmap,volume"
+    )]
+    fields: Vec<FieldKind>,
+    /// Samples a lumel where the light is computed, at most, and no more than a probe takes.
+    #[arg(long, value_name = "N", default_value_t = LUMEL_SAMPLES,
+          value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    lumel_samples: u32,
+    #[command(flatten)]
+    pub(crate) lightmap: LightmapArguments,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum FieldKind {
+    Lightmap,
+    Volume,
+}
+
+/// Where light is to be computed.
+pub(crate) struct Wanted {
+    pub(crate) volumes: Vec<VolumeSpec>,
+    pub(crate) lightmap: Option<LaidOut>,
+}
+
+impl FieldsArguments {
+    /// Where light of a scene is to be computed. People are told what has no lumels, and why.
+    pub(crate) fn wanted(
+        &self,
+        scene: &mut Scene,
+        volumes: &SceneArguments,
+        gatherer: &mut dyn Gather,
+    ) -> Result<Wanted> {
+        let volumes = if self.volumes() { volumes.volumes(scene, gatherer)? } else { Vec::new() };
+        Ok(Wanted { volumes, lightmap: self.lumels(scene, gatherer)? })
+    }
+
+    /// Whether there are to be volumes.
+    pub(crate) fn volumes(&self) -> bool {
+        self.fields.contains(&FieldKind::Volume)
+    }
+
+    /// The lumels of a scene, if there are to be some and it has surfaces for them.
+    pub(crate) fn lumels(
+        &self,
+        scene: &mut Scene,
+        gatherer: &mut dyn Gather,
+    ) -> Result<Option<LaidOut>> {
+        if !self.fields.contains(&FieldKind::Lightmap) {
+            return Ok(None);
+        }
+        let spec = self.lightmap.spec(scene);
+        let laid_out = charting::lay_out(&scene.snapshot(), spec, gatherer)?;
+        if laid_out.is_none() && !self.volumes() {
+            tell!("warning: the scene has no still surface that lumels can lie on");
+        }
+        Ok(laid_out)
+    }
+
+    /// How long light is computed: at most so many samples a probe.
+    pub(crate) fn effort(&self, effort: &EffortArguments, samples: u32) -> Effort {
+        let lumel_samples = self.lumel_samples.min(samples);
+        Effort { lumel_samples, ..effort.with(samples) }
+    }
+}

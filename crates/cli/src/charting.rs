@@ -1,0 +1,56 @@
+//! Still surfaces cut into charts and laid out, with a bar that shows how far that is.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use lumencast_charts::{ChartError, LaidOut, Progress, Sheets, Store, laid_out, usual};
+use lumencast_gather::Gather;
+use lumencast_scene::{LightmapSpec, Snapshot};
+use lumencast_solve::with_backs;
+
+use crate::output::{self, tell};
+
+/// The fronts of a scene's still surfaces, cut into charts.
+pub(crate) fn fronts(scene: &Snapshot) -> Result<Sheets> {
+    let bar = output::share_bar("Cutting surfaces");
+    let show = |Progress { done, total }: Progress| {
+        bar.set_position(output::SHARE_BAR_LENGTH as u64 * done as u64 / total.max(1) as u64);
+        true
+    };
+    let sheets = lumencast_charts::sheets(scene, Store::of_user().as_ref(), &show);
+    bar.finish_and_clear();
+    Ok(sheets?)
+}
+
+/// The lumels of a scene at a density, or at the usual one; nothing where it has no surface for any.
+/// People are told where they come out otherwise than asked for.
+pub(crate) fn lay_out(
+    scene: &Arc<Snapshot>,
+    spec: Option<LightmapSpec>,
+    gatherer: &mut dyn Gather,
+) -> Result<Option<LaidOut>> {
+    let Sheets { sheets, notes } = fronts(scene)?;
+    for note in notes {
+        tell!("warning: {note}");
+    }
+    if sheets.is_empty() {
+        return Ok(None);
+    }
+    let all = with_backs(sheets, scene, gatherer)?;
+    match laid_out(&all, spec.unwrap_or_else(|| usual(&all))) {
+        Ok(laid_out) => {
+            if laid_out.coarser {
+                let size = 100.0 * laid_out.texel;
+                tell!(
+                    "warning: lumels are {size:.1} cm wide, since there is no room for smaller ones"
+                );
+            }
+            Ok(Some(laid_out))
+        }
+        Err(error @ (ChartError::NoRoom | ChartError::NoArea)) => {
+            tell!("warning: no surface has lumels: {error}");
+            Ok(None)
+        }
+        Err(error) => Err(error.into()),
+    }
+}

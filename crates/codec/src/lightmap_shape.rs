@@ -1,0 +1,101 @@
+//! The shape of a lightmap: its pages, and where surfaces lie on them.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use lumencast_light::{FieldId, Layout, Lightmap};
+use serde::{Deserialize, Serialize};
+
+use crate::lumel::{Tile, per_side, tile, tiles};
+use crate::{
+    DecodeError, LayoutResource, Resource, ResourceHash, layout_resources, limits, read_charts,
+};
+
+/// A lightmap, as a catalog describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LightmapShape {
+    /// How lumels are coded.
+    pub coding: Coding,
+    /// Lumels a side of every page.
+    pub page_size: u32,
+    /// Number of pages.
+    pub pages: u32,
+    /// The resource that tells where surfaces lie on the pages.
+    pub layout: ResourceHash,
+}
+
+/// How lumels are coded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Coding {
+    /// As half floats, without loss.
+    #[default]
+    Halves,
+}
+
+impl LightmapShape {
+    /// The shape of a lightmap. It costs as much as writing its layout.
+    pub fn of(lightmap: &Lightmap) -> Self {
+        let Layout { page_size, pages, .. } = *lightmap.layout;
+        let layout = layout_resources(&lightmap.layout).0.hash();
+        Self { coding: Coding::Halves, page_size, pages, layout }
+    }
+
+    /// A lightmap of this shape without light, whose layout has no surfaces: nothing is read from it
+    /// until the layout is known.
+    pub fn dark(&self, id: FieldId) -> Lightmap {
+        Lightmap::dark(id, Arc::new(Layout::new(self.page_size, self.pages, Vec::new())))
+    }
+
+    /// Number of lumels of all pages.
+    pub fn lumel_count(&self) -> usize {
+        self.pages as usize * (self.page_size as usize).pow(2)
+    }
+
+    /// Its tiles, in order of their numbers.
+    pub fn tiles(&self) -> impl Iterator<Item = Tile> + use<> {
+        tiles(self.page_size, self.pages)
+    }
+
+    /// The tile of a number.
+    pub fn tile(&self, id: u32) -> Option<Tile> {
+        tile(self.page_size, self.pages, id)
+    }
+
+    /// Its layout, of resources that hold all of it.
+    ///
+    /// # Errors
+    /// [`DecodeError`] when the layout or charts are missing, cannot be read or are of other pages.
+    pub(crate) fn layout_of<'a>(&self, resources: &'a [Resource]) -> Result<Layout, DecodeError> {
+        let named = |resource: &'a Resource| (resource.hash(), resource.bytes());
+        let known: HashMap<_, _> = resources.iter().map(named).collect();
+        let bytes = |hash: ResourceHash| {
+            known.get(&hash).copied().ok_or(DecodeError::Malformed("a resource is missing"))
+        };
+        let layout = LayoutResource::read(bytes(self.layout)?)?;
+        if (layout.page_size, layout.pages) != (self.page_size, self.pages) {
+            return Err(DecodeError::Malformed("a layout of other pages"));
+        }
+        let read = |hash| Ok((hash, Arc::new(read_charts(bytes(hash)?)?)));
+        let charts: Result<HashMap<_, _>, _> = layout.charts().into_iter().map(read).collect();
+        let charts = charts?;
+        Ok(layout.layout(|hash| charts.get(&hash).cloned()))
+    }
+
+    /// The shape, if it can be one.
+    ///
+    /// # Errors
+    /// A size out of its range, or a limit that is exceeded.
+    pub(crate) fn validated(self) -> Result<Self, DecodeError> {
+        if self.page_size == 0 || self.pages == 0 {
+            return Err(DecodeError::Malformed("a lightmap without lumels"));
+        }
+        let (side, most) = (self.page_size as usize, limits::PAGE_LUMELS as usize);
+        DecodeError::limit("lumels of a page along a side", side, most)?;
+        let lumels = side.pow(2).saturating_mul(self.pages as usize);
+        DecodeError::limit("lumels of a field", lumels, limits::FIELD_LUMELS)?;
+        let tiles = per_side(self.page_size).pow(2) as usize * self.pages as usize;
+        DecodeError::limit("regions of a field", tiles, limits::REGIONS)?;
+        Ok(self)
+    }
+}

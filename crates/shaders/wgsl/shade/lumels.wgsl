@@ -1,0 +1,23 @@
+// Light at lumels, of surfaces that have some.
+
+#import field/bindings
+#import shade/pass_bindings
+
+// What a vertex has in place of a rectangle where it has no lumels.
+const NO_LUMELS: u32 = 0xffffffffu;
+
+// Where the lumels of a point lie.
+struct Lumels {
+    // The number of a rectangle, or NO_LUMELS.
+    rectangle: u32,
+    // Lumels from its corner.
+    at: vec2f,
+}
+
+// Irradiance at a point that has lumels, lux.
+fn lumel_light(lumels: Lumels) -> vec3f {
+    let corner = rectangles[lumels.rectangle].corner;
+    let layer = rectangles[lumels.rectangle].layer;
+    let place = (corner + lumels.at) / vec2f(textureDimensions(pages));
+    return textureSampleLevel(pages, atlas_sampler, place, layer, 0.0).rgb * fields.lumel_scale;
+}

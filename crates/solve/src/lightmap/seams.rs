@@ -1,0 +1,363 @@
+//! Seams: where the charts of a smooth surface meet, both sides get the same light.
+//!
+//! Both sides of such an edge are read from lumels of their own. Lumels about seams are changed as
+//! little as possible so that what is read on both sides is equal, in the sense of least squares:
+//! Σ m (x − d)² + λ Σ (a·x − b·x)², over lumels x that were d, and points of edges that a and b read
+//! (after Iwanicki 2013, "Lighting Technology of The Last of Us"). Lumels without light of their own
+//! yield first. The equations are solved by conjugate gradients.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+use glam::{Vec2, Vec3};
+use lumencast_light::{Layout, Lightmap, Surface, luminance};
+use lumencast_scene::Snapshot;
+use rayon::prelude::*;
+
+use super::places::{PlacedSurface, surfaces};
+
+/// λ: what a difference between both sides weighs, beside a lumel's own light.
+const WEIGHT: f32 = 64.0;
+/// m of a lumel without light of its own.
+const YIELDING: f32 = 1e-2;
+/// Steps of conjugate gradients.
+const STEPS: u32 = 48;
+/// Points of an edge for each lumel of its length, at which it is closed, and at which that is judged.
+const POINTS: f32 = 2.0;
+const JUDGED: f32 = 5.0;
+/// Surfaces are smooth across an edge whose normals there are at most so different.
+const SMOOTH: f32 = 1e-3;
+/// Edges whose sides lie nearer to each other on the page are inside a chart, lumels.
+const SAME: f32 = 1.0 / 128.0;
+
+/// The points at which seams are closed.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Seams {
+    /// The lumels that take part, by their index among those of all pages.
+    lumels: Vec<u32>,
+    /// Of each point, the lumels that both sides read, by their index in `lumels`, and how much: those
+    /// of one side above 0, those of the other below.
+    points: Vec<[(u32, f32); 8]>,
+}
+
+/// A side of an edge: its ends on a page, in the order of their positions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Side {
+    page: u32,
+    ends: [Vec2; 2],
+    normals: [Vec3; 2],
+}
+
+impl Seams {
+    /// The seams of a layout's surfaces in a scene.
+    pub(crate) fn new(scene: &Snapshot, layout: &Layout) -> Self {
+        Self::at(scene, layout, POINTS)
+    }
+
+    /// The same, at so many points for each lumel of their length.
+    fn at(scene: &Snapshot, layout: &Layout, points: f32) -> Self {
+        let mut seams = Self::default();
+        let mut known = HashMap::new();
+        let mut open: HashMap<[[u32; 3]; 2], Side> = HashMap::new();
+        let mut instance = None;
+        for back in [false, true] {
+            let of_side = surfaces(scene, layout).filter(|(surface, _)| surface.id.back == back);
+            for (surface, placed) in of_side {
+                let of = (surface.id.node, surface.id.copy, back);
+                if instance.replace(of) != Some(of) {
+                    open.clear();
+                }
+                for triangle in 0..surface.charts.triangles.len() as u32 {
+                    for (key, side) in sides(surface, &placed, triangle) {
+                        match open.entry(key) {
+                            Entry::Vacant(entry) => drop(entry.insert(side)),
+                            Entry::Occupied(mut entry) => {
+                                let both = [*entry.get(), side];
+                                seams.add(layout, &mut known, both, points);
+                                entry.insert(side);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        seams
+    }
+
+    /// Number of points at which seams are closed.
+    #[cfg(test)]
+    fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Adds an edge, if it is a seam. `known` has the places of lumels in the list of those that take
+    /// part.
+    fn add(
+        &mut self,
+        layout: &Layout,
+        known: &mut HashMap<u32, u32>,
+        [one, other]: [Side; 2],
+        points: f32,
+    ) {
+        let alike = |k: usize| one.normals[k].distance_squared(other.normals[k]) < SMOOTH;
+        let apart = |k: usize| one.ends[k].distance(other.ends[k]);
+        let is_inside = one.page == other.page && apart(0).max(apart(1)) < SAME;
+        if is_inside || !(alike(0) && alike(1)) {
+            return;
+        }
+        let length = |side: Side| side.ends[0].distance(side.ends[1]);
+        let count = (points * length(one).max(length(other))).ceil().max(1.0) as u32;
+        let mut local = |(lumel, weight): (usize, f32)| {
+            let lumel = lumel as u32;
+            let number = *known.entry(lumel).or_insert_with(|| {
+                self.lumels.push(lumel);
+                self.lumels.len() as u32 - 1
+            });
+            (number, weight)
+        };
+        for k in 0..=count {
+            let share = k as f32 / count as f32;
+            let taps = |side: Side| layout.taps(side.page, side.ends[0].lerp(side.ends[1], share));
+            let ([a, b, c, d], [e, f, g, h]) = (taps(one), taps(other));
+            let minus = |(lumel, weight): (usize, f32)| (lumel, -weight);
+            let taps = [a, b, c, d, minus(e), minus(f), minus(g), minus(h)];
+            self.points.push(taps.map(&mut local));
+        }
+    }
+
+    /// Closes the seams of the light of all pages. `is_known` tells by its index whether a lumel's
+    /// light is its own. Lumels that take no part stay as they are.
+    pub(crate) fn apply(&self, light: &mut [Vec3], is_known: impl Fn(usize) -> bool) {
+        if self.points.is_empty() {
+            return;
+        }
+        let masses: Vec<f32> = self
+            .lumels
+            .iter()
+            .map(|l| if is_known(*l as usize) { 1.0 } else { YIELDING })
+            .collect();
+        let own: Vec<Vec3> = self.lumels.iter().map(|l| light[*l as usize]).collect();
+        let closed = self.solved(&masses, own);
+        for (lumel, value) in self.lumels.iter().zip(closed) {
+            // Less than nothing is no light.
+            light[*lumel as usize] = value.max(Vec3::ZERO);
+        }
+    }
+
+    /// The least squares, from the lumels as they are.
+    fn solved(&self, masses: &[f32], own: Vec<Vec3>) -> Vec<Vec3> {
+        let inverse: Vec<f32> = self.diagonal(masses).into_iter().map(|d| 1.0 / d).collect();
+        let mut x = own;
+        // (M + λ CᵀC) x = M d: at x = d the residual is −λ CᵀC d.
+        let mut residual = self.differences(&x);
+        residual.par_iter_mut().for_each(|r| *r = -*r);
+        let mut direction: Vec<Vec3> =
+            residual.iter().zip(&inverse).map(|(r, i)| *r * *i).collect();
+        let mut rho = dot(&residual, &direction);
+        for _ in 0..STEPS {
+            let mut image = self.differences(&direction);
+            for ((image, mass), d) in image.iter_mut().zip(masses).zip(&direction) {
+                *image += *mass * *d;
+            }
+            let alpha = quotient(rho, dot(&direction, &image));
+            for (k, d) in direction.iter().enumerate() {
+                x[k] += alpha * *d;
+                residual[k] -= alpha * image[k];
+            }
+            let preconditioned = |(r, i): (&Vec3, &f32)| *r * *i;
+            let next: Vec<Vec3> = residual.iter().zip(&inverse).map(preconditioned).collect();
+            let new = dot(&residual, &next);
+            let beta = quotient(new, rho);
+            rho = new;
+            for (d, z) in direction.iter_mut().zip(&next) {
+                *d = *z + beta * *d;
+            }
+        }
+        x
+    }
+
+    /// λ CᵀC x.
+    fn differences(&self, x: &[Vec3]) -> Vec<Vec3> {
+        let difference = |taps: &[(u32, f32); 8]| -> Vec3 {
+            WEIGHT * taps.iter().map(|(lumel, weight)| *weight * x[*lumel as usize]).sum::<Vec3>()
+        };
+        let at_points: Vec<Vec3> = self.points.par_iter().map(difference).collect();
+        let mut sum = vec![Vec3::ZERO; x.len()];
+        for (taps, difference) in self.points.iter().zip(at_points) {
+            for (lumel, weight) in taps {
+                sum[*lumel as usize] += *weight * difference;
+            }
+        }
+        sum
+    }
+
+    /// The diagonal of M + λ CᵀC.
+    fn diagonal(&self, masses: &[f32]) -> Vec<f32> {
+        let mut diagonal = masses.to_vec();
+        for (lumel, weight) in self.points.iter().flatten() {
+            diagonal[*lumel as usize] += WEIGHT * weight * weight;
+        }
+        diagonal
+    }
+}
+
+/// By how much the light that both sides of a lightmap's seams read differs, as shares of what they read,
+/// at points spread over all seams.
+pub fn seam_differences(scene: &Snapshot, lightmap: &Lightmap) -> Vec<f32> {
+    let seams = Seams::at(scene, &lightmap.layout, JUDGED);
+    let read = |taps: &[(u32, f32)]| -> Vec3 {
+        let light = |lumel: u32| lightmap.irradiance[seams.lumels[lumel as usize] as usize];
+        taps.iter().map(|(lumel, weight)| weight.abs() * light(*lumel)).sum()
+    };
+    let difference = |taps: &[(u32, f32); 8]| {
+        let (one, other) = taps.split_at(4);
+        let [a, b] = [read(one), read(other)].map(luminance);
+        let most = a.max(b);
+        (most > 0.0).then(|| (a - b).abs() / most)
+    };
+    seams.points.iter().filter_map(difference).collect()
+}
+
+/// The sides of a triangle's edges, with what names the edge: the positions of its ends, to the bit.
+fn sides<'a>(
+    surface: &'a Surface,
+    placed: &'a PlacedSurface<'_>,
+    triangle: u32,
+) -> impl Iterator<Item = ([[u32; 3]; 2], Side)> + 'a {
+    let corners = surface.charts.corners(triangle).into_iter();
+    corners.flat_map(move |corners| {
+        let at = |k: usize| {
+            let mut weights = Vec3::ZERO;
+            weights[k] = 1.0;
+            placed.at(triangle, weights)
+        };
+        let ends = [0, 1, 2].map(|k| {
+            let (position, normal) = at(k);
+            let bits = (position + 0.0).to_array().map(f32::to_bits);
+            (bits, normal, surface.rectangles[corners[k].rectangle as usize], corners[k].at)
+        });
+        [(0, 1), (1, 2), (2, 0)].into_iter().filter_map(move |(i, j)| {
+            let (mut a, mut b) = (ends[i], ends[j]);
+            if b.0 < a.0 {
+                std::mem::swap(&mut a, &mut b);
+            }
+            let on_page = |end: &([u32; 3], Vec3, _, Vec2)| {
+                let (_, _, lumencast_light::Rectangle { corner, .. }, at) = end;
+                corner.as_vec2() + *at
+            };
+            let side =
+                Side { page: a.2.page, ends: [on_page(&a), on_page(&b)], normals: [a.1, b.1] };
+            (a.0 != b.0).then_some(([a.0, b.0], side))
+        })
+    })
+}
+
+/// Channel by channel.
+fn dot(a: &[Vec3], b: &[Vec3]) -> Vec3 {
+    a.par_iter().zip(b).map(|(a, b)| *a * *b).sum()
+}
+
+/// 0 where nothing is left to do.
+fn quotient(a: Vec3, b: Vec3) -> Vec3 {
+    Vec3::select(b.cmpgt(Vec3::ZERO), a / b.max(Vec3::splat(f32::MIN_POSITIVE)), Vec3::ZERO)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::{Affine3A, UVec2};
+    use lumencast_light::{ChartVertex, Charts, Rectangle, SurfaceId};
+    use lumencast_scene::Primitive;
+    use lumencast_testkit::scenes::{Stage, lambert};
+
+    use super::*;
+
+    /// Two squares of a plane, side by side at x = 1, one primitive of four triangles; each is a chart
+    /// of 4 × 4 lumels and of another scale on the page.
+    fn halves(bend: f32) -> (Snapshot, Layout) {
+        let mut stage = Stage::default();
+        let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
+        let mut scenery = Stage::default();
+        scenery.quad(Vec3::ZERO, Vec3::X, Vec3::Y, grey);
+        let quad: Primitive = scenery.snapshot().instances[0].mesh.primitives[0].clone();
+        let mut both = quad.clone();
+        both.vertices.positions = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+            .into_iter()
+            .chain([(1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0)])
+            .map(|(x, y)| Vec3::new(x, y, bend * (x - 1.0_f32).max(0.0)))
+            .collect();
+        let bent = Vec3::new(-bend, 0.0, 1.0).normalize();
+        both.vertices.normals = [Vec3::Z; 4].into_iter().chain([bent; 4]).collect();
+        both.vertices.tangents.clear();
+        both.triangles = vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+        stage.primitive(both, Affine3A::IDENTITY);
+        let at = |source, x: f32, y: f32| ChartVertex { source, rectangle: 0, at: Vec2::new(x, y) };
+        let square = |first: u32, low: Vec2, side: f32| {
+            let ends = [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)];
+            ends.into_iter().zip(first..).map(move |((x, y), k)| at(k, low.x + x, low.y + y))
+        };
+        let charts = Charts {
+            sizes: vec![UVec2::splat(32)],
+            vertices: square(0, Vec2::splat(3.2), 4.3)
+                .chain(square(4, Vec2::new(15.6, 12.1), 7.7))
+                .collect(),
+            triangles: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]],
+        };
+        let surface = Surface {
+            id: SurfaceId::default(),
+            charts: Arc::new(charts),
+            rectangles: vec![Rectangle::default()],
+        };
+        (Snapshot::clone(&stage.snapshot()), Layout::new(32, 1, vec![surface]))
+    }
+
+    /// What both sides of the seam read, from end to end.
+    fn read(layout: &Layout, light: &[Vec3]) -> Vec<[f32; 2]> {
+        let at = |triangle, weights| {
+            let (page, at) = layout.surfaces()[0].at(triangle, weights).unwrap();
+            layout.taps(page, at).into_iter().map(|(l, w)| w * light[l].x).sum::<f32>()
+        };
+        let steps = (0..=50).map(|k| k as f32 / 50.0);
+        steps
+            .map(|t| [at(0, Vec3::new(0.0, 1.0 - t, t)), at(3, Vec3::new(1.0 - t, 0.0, t))])
+            .collect()
+    }
+
+    fn worst(pairs: &[[f32; 2]]) -> f32 {
+        pairs.iter().map(|[a, b]| (a - b).abs() / a.max(*b)).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn both_sides_read_the_same_and_the_rest_stays() {
+        let (scene, layout) = halves(0.0);
+        let seams = Seams::new(&scene, &layout);
+        assert!((10..=40).contains(&seams.len()), "{}", seams.len());
+        let light = |k: usize| Vec3::splat(if k % 32 < 12 { 1.0 } else { 1.2 });
+        let noise = |k: usize| 0.1 * ((k * 7919) % 13) as f32 / 13.0;
+        let before: Vec<Vec3> = (0..32 * 32).map(|k| light(k) + noise(k)).collect();
+        let mut after = before.clone();
+        seams.apply(&mut after, |k| k % 32 != 8);
+        let (was, is) = (worst(&read(&layout, &before)), worst(&read(&layout, &after)));
+        assert!(was > 0.1 && is < 0.01, "{was} → {is}");
+        let changed = before.iter().zip(&after).filter(|(a, b)| a != b).count();
+        assert!(changed < 60, "{changed}");
+        let moved = before.iter().zip(&after).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+        assert!(moved < 0.5, "no lumel is driven far: {moved}");
+    }
+
+    /// Where a surface is bent, light may differ.
+    #[test]
+    fn edges_that_are_sharp_are_left_alone() {
+        let (scene, layout) = halves(1.0);
+        assert_eq!(Seams::new(&scene, &layout).len(), 0);
+    }
+
+    #[test]
+    fn light_without_seams_stays() {
+        let (scene, layout) = halves(0.0);
+        let mut even = vec![Vec3::splat(2.0); 32 * 32];
+        Seams::new(&scene, &layout).apply(&mut even, |_| true);
+        assert!(even.iter().all(|e| e.abs_diff_eq(Vec3::splat(2.0), 1e-5)));
+    }
+}
