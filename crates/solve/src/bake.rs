@@ -193,7 +193,7 @@ impl Course {
         while samples < most {
             let now = samples_a_pass.min(most - samples);
             for id in &fields {
-                let turn = Turn { previous: None, samples: now, pass };
+                let turn = Turn { previous: None, samples: now, lumels: None, pass };
                 let Some(Request { job, asked }) = all.job(*id, scene, turn) else { continue };
                 let ticket = gatherer.submit(job);
                 let gathered = gatherer.wait(ticket).ok_or(SolveError::Gather)?;

@@ -21,6 +21,9 @@ pub struct Turn {
     pub previous: Option<Arc<Light>>,
     /// Samples a receiver.
     pub samples: u32,
+    /// Samples in all of a lightmap's lumels, those whose turn it is; each takes [`Turn::samples`]
+    /// unless it is given.
+    pub lumels: Option<u64>,
     /// Gives other directions each time.
     pub pass: u64,
 }

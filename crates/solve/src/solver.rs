@@ -78,8 +78,7 @@ impl Solver {
     pub fn set_lightmap(&mut self, scene: &Snapshot, laid_out: Option<&LaidOut>) {
         self.fields.retain(|field| field.as_volume().is_some());
         if let Some(laid_out) = laid_out {
-            let ratio = self.options.blend.ratio;
-            let lightmap = LightmapSolver::new(self.next_id(), scene, laid_out, ratio);
+            let lightmap = LightmapSolver::new(self.next_id(), scene, laid_out, self.options.blend);
             self.fields.push(FieldSolver::Lightmap(lightmap));
         }
         self.list_light();
@@ -143,9 +142,15 @@ impl Solver {
         let (low, high) = (u64::from(field.0 & 0xff), u64::from(field.0 >> 8));
         let seed = (turn.pass << 8 | low) ^ (high << 40);
         let solver = self.field_mut(field)?;
-        let job = solver.job(scene.clone(), turn.samples);
+        let probes = solver.probe_count();
+        let job = match (solver, turn.lumels) {
+            (FieldSolver::Lightmap(lightmap), Some(samples)) => {
+                lightmap.next_job(scene.clone(), samples)
+            }
+            (solver, _) => solver.job(scene.clone(), turn.samples),
+        };
         let job = Job { previous: turn.previous, bounces, clamp, seed, ..job };
-        let what = What::Light { budgets: job.budgets.clone(), probes: solver.probe_count() };
+        let what = What::Light { budgets: job.budgets.clone(), probes };
         Some(Request { job, asked: Asked { field, what } })
     }
 

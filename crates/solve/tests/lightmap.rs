@@ -8,12 +8,13 @@ use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job};
 use lumencast_light::{FieldId, Lightmap};
 use lumencast_scene::{Environment, LightmapSpec, Material, Snapshot};
+use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{LightmapSolver, spread, with_backs};
 use lumencast_testkit::scenes::{Stage, lambert};
 use std::sync::Arc;
 
-/// The least weight of an update where all are averaged.
-const MEAN: f32 = f32::MIN_POSITIVE;
+/// All updates are averaged.
+const MEAN: BlendSettings = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
 
 fn tracer() -> CpuPathTracer {
     CpuPathTracer::new(Options::default()).expect("threads")
@@ -60,6 +61,53 @@ fn a_furnace_is_as_bright_everywhere() {
         let ratio = irradiance / expected;
         assert!((ratio - 1.0).abs().max_element() < 0.02, "{ratio}");
     }
+}
+
+/// A closed room whose walls shine, so brightly.
+fn furnace(emission: f32) -> Snapshot {
+    let mut stage = Stage::default();
+    let wall = stage.material(lambert(Vec3::splat(0.5), Vec3::splat(emission)));
+    stage.room(Vec3::ZERO, Vec3::new(4.0, 2.0, 3.0), wall);
+    Snapshot::clone(&stage.snapshot())
+}
+
+/// Live light: a sixteenth of the lumels, gathered at first, lights all of them; and so it does when the
+/// light has changed.
+#[test]
+fn a_glance_at_all_pages_lights_them() {
+    let mut scene = Arc::new(furnace(1.0));
+    let laid_out = laid(&scene);
+    let mut solver = LightmapSolver::new(FieldId(0), &scene, &laid_out, BlendSettings::default());
+    let mut tracer = tracer();
+    let lumels = solver.lumel_count() as u64;
+    let mut gather = |solver: &mut LightmapSolver, scene: &Arc<Snapshot>, samples: u64| {
+        let mut spent = 0;
+        while spent < samples {
+            let job = solver.next_job(scene.clone(), samples / 8);
+            let job = Job { bounces: 12, seed: spent, ..job };
+            spent += job.samples();
+            let budgets = job.budgets.clone();
+            let ticket = tracer.submit(job);
+            solver.take(&tracer.wait(ticket).expect("light"), &budgets);
+            solver.solve(true);
+        }
+    };
+    let worst = |solver: &LightmapSolver, scene: &Snapshot, emission: f32| {
+        let right = 2.0 * PI * emission;
+        let read = irradiances(scene, solver.lightmap(), 2000);
+        read.iter().map(|e| (e.x / right - 1.0).abs()).fold(0.0, f32::max)
+    };
+    // 16 samples of every sixteenth lumel, and of more along the borders of charts.
+    gather(&mut solver, &scene, 2 * lumels);
+    assert!(worst(&solver, &scene, 1.0) < 0.05, "{}", worst(&solver, &scene, 1.0));
+    gather(&mut solver, &scene, 8 * lumels);
+    assert!(worst(&solver, &scene, 1.0) < 0.04, "{}", worst(&solver, &scene, 1.0));
+
+    scene = Arc::new(Snapshot { version: scene.version + 1, ..furnace(3.0) });
+    solver.expect_change();
+    assert!(worst(&solver, &scene, 3.0) > 0.5, "nothing has been gathered");
+    gather(&mut solver, &scene, 2 * lumels);
+    assert!(worst(&solver, &scene, 3.0) < 0.05, "{}", worst(&solver, &scene, 3.0));
 }
 
 /// Under an even sky: a plate that stands free has lumels on both sides and is as bright as the sky; a

@@ -11,6 +11,7 @@ use lumencast_gather::path_trace::{CpuPathTracer, Levels, Options};
 use lumencast_gather::{Gather, Job, Receiver};
 use lumencast_light::{FieldId, Lightmap, Place};
 use lumencast_scene::Snapshot;
+use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{LightmapSolver, seam_differences, spread};
 use serde_json::json;
 
@@ -89,7 +90,8 @@ impl BenchLightmap {
             .context("the scene has no still surface that lumels can lie on")?;
         let layout_seconds = start.elapsed().as_secs_f64();
 
-        let mut solver = LightmapSolver::new(FieldId(0), &snapshot, &laid_out, f32::MIN_POSITIVE);
+        let mean = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
+        let mut solver = LightmapSolver::new(FieldId(0), &snapshot, &laid_out, mean);
         let start = Instant::now();
         self.gather(&mut solver, &snapshot, &mut tracer)?;
         let gather_seconds = start.elapsed().as_secs_f64();

@@ -11,6 +11,8 @@ use rayon::prelude::*;
 
 /// Passes; steps are 1, 2, 4.
 const PASSES: u32 = 3;
+/// Lumels so far off count for a lumel, or a little less far.
+pub(crate) const REACH: u32 = 16;
 /// The B3 spline.
 const KERNEL: [f32; 5] = [1.0 / 16.0, 1.0 / 4.0, 3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 /// Standard deviations by which light may differ.
@@ -20,7 +22,8 @@ const STRETCH: f32 = 1.5;
 /// Power of the cosine between normals.
 const NORMAL_POWER: i32 = 32;
 
-/// A lumel that is filtered.
+/// A lumel that is filtered. One that nothing is known of has an infinite variance: it takes the light
+/// of those about it, and gives none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Noisy {
     /// World, metres.
@@ -75,7 +78,7 @@ fn filtered(own: &Noisy, about: impl Iterator<Item = (Noisy, f32, f32)>, near: f
     for (lumel, kernel, steps) in about {
         let apart = lumel.position.distance(own.position);
         let facing = lumel.normal.dot(own.normal).max(0.0).powi(NORMAL_POWER);
-        if apart > near * steps || facing == 0.0 {
+        if apart > near * steps || facing == 0.0 || lumel.variance == f32::INFINITY {
             continue;
         }
         let spread = DEVIATIONS * (own.variance + lumel.variance).max(0.0).sqrt();
@@ -86,7 +89,9 @@ fn filtered(own: &Noisy, about: impl Iterator<Item = (Noisy, f32, f32)>, near: f
         variance += weight * weight * lumel.variance;
         weights += weight;
     }
-    // The lumel itself is among them.
+    if weights == 0.0 {
+        return *own;
+    }
     Noisy { irradiance: sum / weights, variance: variance / (weights * weights), ..*own }
 }
 
@@ -137,6 +142,25 @@ mod tests {
         let mut clean = page(slope, 0.0);
         filter(&mut clean, SIDE, 0.1);
         assert!(error(&clean, slope) < 1e-3, "{}", error(&clean, slope));
+    }
+
+    /// Of every sixteenth lumel something is known: the others lie between.
+    #[test]
+    fn what_is_not_known_is_interpolated() {
+        let slope = |number: u32| 10.0 + (number % SIDE) as f32 / 8.0;
+        let mut sparse = page(slope, 0.1);
+        for (lumel, number) in sparse.iter_mut().flatten().zip(0..) {
+            if number % 4 != 0 || number / SIDE % 4 != 0 {
+                (lumel.irradiance, lumel.variance) = (Vec3::splat(1e4), f32::INFINITY);
+            }
+        }
+        filter(&mut sparse, SIDE, 0.1);
+        assert!(sparse.iter().flatten().all(|lumel| lumel.variance.is_finite()));
+        assert!(error(&sparse, slope) < 0.5, "{}", error(&sparse, slope));
+        let mut unknown = page(slope, 0.1);
+        unknown.iter_mut().flatten().for_each(|lumel| lumel.variance = f32::INFINITY);
+        filter(&mut unknown, SIDE, 0.1);
+        assert!(unknown.iter().flatten().all(|lumel| lumel.variance == f32::INFINITY));
     }
 
     /// Lumels that lie beside each other on the page alone, and those of a wall beside a floor, do not

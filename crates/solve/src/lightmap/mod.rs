@@ -1,72 +1,80 @@
 //! Lumels while their light is computed.
 
 mod backs;
+mod cells;
 mod fill;
 mod filter;
 mod places;
 mod points;
 mod seams;
+mod sums;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{UVec2, Vec3};
 use lumencast_charts::LaidOut;
 use lumencast_gather::{Budget, Gathered, Job, Receiver};
-use lumencast_light::{Field, FieldId, Light, Lightmap, luminance};
+use lumencast_light::{Field, FieldId, Light, Lightmap};
 use lumencast_scene::Snapshot;
+use rayon::prelude::*;
 
+use crate::blend::BlendSettings;
 pub use backs::with_backs;
-use filter::{Noisy, filter};
-use places::lumel_places;
+use cells::{BLOCK, Block, Cells};
+use filter::{Noisy, REACH, filter};
+use places::{LumelPlace, lumel_places};
 pub use points::spread;
 use seams::Seams;
 pub use seams::seam_differences;
+use sums::{Sum, have_changed};
 
-/// Share of backs, by winding, above which a lumel lies within something: its light is that of the
-/// lumels about it.
-const BURIED_ABOVE: f32 = 0.5;
-
-/// Samples that lumels count as resting on, at most, once a change is expected.
-const EXPECTING: f32 = 32.0;
+/// What a lumel has in place of a receiver where no surface covers it.
+const NO_RECEIVER: u32 = u32::MAX;
 
 /// What makes light of lumels' sums.
 #[derive(Clone, Debug)]
 pub struct LightmapSolver {
-    /// Least weight of an update ([`crate::blend::BlendSettings::ratio`]).
-    ratio: f32,
+    settings: BlendSettings,
     texel: f32,
-    /// Lumels that lie on surfaces, by their index among those of all pages; one a receiver.
-    lumels: Vec<u32>,
+    cells: Cells,
+    /// Lumels that lie on surfaces, by their index among those of all pages; one a receiver, cell by
+    /// cell.
+    lumels: Arc<[u32]>,
     receivers: Arc<[Receiver]>,
+    /// The receivers of the lumels of all pages.
+    receiver_of: Arc<[u32]>,
     sums: Vec<Sum>,
     seams: Arc<Seams>,
+    /// Blocks of which more is known than is solved.
+    news: BTreeSet<Block>,
+    /// Blocks without surfaces beside those that have some: they are solved with these.
+    beside: Arc<BTreeMap<Block, Vec<Block>>>,
     lightmap: Lightmap,
 }
 
-/// What has arrived at a lumel.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sum {
-    /// Sum over samples of irradiance, lux.
-    sum: Vec3,
-    /// Sum over samples of the square of its luminance.
-    squares: f32,
-    samples: f32,
-    /// Samples that met the back of a surface first.
-    backs: f32,
-}
-
 impl LightmapSolver {
-    /// Lumels of a scene, dark. Updates are averaged, and weigh no less than `ratio`.
-    pub fn new(id: FieldId, scene: &Snapshot, laid_out: &LaidOut, ratio: f32) -> Self {
-        let places = lumel_places(scene, &laid_out.layout);
+    /// Lumels of a scene, dark.
+    pub fn new(id: FieldId, scene: &Snapshot, laid_out: &LaidOut, settings: BlendSettings) -> Self {
+        let layout = Arc::new(laid_out.layout.clone());
+        let mut places = lumel_places(scene, &layout);
+        let cells = Cells::new(&mut places, layout.page_size);
+        let mut receiver_of = vec![NO_RECEIVER; layout.lumel_count()];
+        for (place, receiver) in places.iter().zip(0..) {
+            receiver_of[place.lumel as usize] = receiver;
+        }
         Self {
-            ratio: ratio.clamp(f32::MIN_POSITIVE, 1.0),
+            settings,
             texel: laid_out.texel,
+            cells,
             lumels: places.iter().map(|place| place.lumel).collect(),
             receivers: places.iter().map(|p| Receiver::point(p.position, p.normal)).collect(),
+            receiver_of: receiver_of.into(),
             sums: vec![Sum::default(); places.len()],
-            seams: Arc::new(Seams::new(scene, &laid_out.layout)),
-            lightmap: Lightmap::dark(id, Arc::new(laid_out.layout.clone())),
+            seams: Arc::new(Seams::new(scene, &layout)),
+            news: BTreeSet::new(),
+            beside: Arc::new(empty_beside(&places, layout.page_size)),
+            lightmap: Lightmap::dark(id, layout),
         }
     }
 
@@ -89,57 +97,102 @@ impl LightmapSolver {
         Job::new(scene, self.receivers.clone(), samples)
     }
 
-    /// The scene was edited: what is known counts less from now on.
-    pub(crate) fn expect_change(&mut self) {
-        self.sums.iter_mut().for_each(|sum| sum.keep(EXPECTING));
+    /// What to gather next where light is live: about so many samples in all, of those lumels whose turn
+    /// it is.
+    pub fn next_job(&mut self, scene: Arc<Snapshot>, samples: u64) -> Job {
+        let budgets = self.cells.budgets(samples, scene.version);
+        Job::with_budgets(scene, self.receivers.clone(), budgets)
     }
 
-    /// Adds what was gathered; `budgets` are those of the job. What is not finite does not count.
+    /// The scene was edited: light may be another from now on.
+    pub fn expect_change(&mut self) {
+        self.cells.expect_change();
+    }
+
+    /// Adds what was gathered; `budgets` are those of the job. What is not finite does not count. Where
+    /// a cell's lumels together tell that light is another, what was known of the cell is forgotten.
     pub fn take(&mut self, gathered: &Gathered, budgets: &[Budget]) {
-        for (budget, found) in budgets.iter().zip(gathered.sums.iter()) {
-            let (Some(sum), Some(squares)) = (found.sum.first(), found.squares.first()) else {
-                continue;
-            };
-            if sum.is_finite() && squares.is_finite() {
-                let samples = found.count as f32;
-                let known = &mut self.sums[budget.receiver as usize];
-                known.keep(samples * (1.0 - self.ratio) / self.ratio);
-                known.sum += *sum;
-                known.squares += squares;
-                known.samples += samples;
-                known.backs += found.back_face_fraction * samples;
+        let found: Vec<(usize, Sum)> = budgets
+            .iter()
+            .zip(gathered.sums.iter())
+            .filter_map(|(budget, found)| Some((budget.receiver as usize, Sum::of(&found)?)))
+            .collect();
+        let page_size = self.lightmap.layout.page_size;
+        let cell = |(receiver, _): &(usize, Sum)| self.cells.cell_of(*receiver as u32);
+        let of_cells: Vec<&[(usize, Sum)]> = found.chunk_by(|a, b| cell(a) == cell(b)).collect();
+        for of_cell in of_cells {
+            let (first, _) = of_cell[0];
+            let known = of_cell.iter().map(|(receiver, new)| (&self.sums[*receiver], new));
+            if have_changed(known, self.settings.significance) {
+                let cell = self.cells.receivers_of(self.cells.cell_of(first as u32));
+                self.sums[cell].fill(Sum::default());
             }
+            for (receiver, new) in of_cell {
+                self.sums[*receiver].add(new, self.settings.ratio);
+            }
+            let block = Block::of(self.lumels[first], page_size);
+            self.news.extend(self.beside.get(&block).into_iter().flatten());
+            self.news.insert(block);
         }
     }
 
-    /// Makes light of what has been taken in: filtered on the surface where `filtered`, spread to where
-    /// nothing is known, and the same on both sides of seams.
+    /// Makes light of what has been taken in since the last time: filtered on the surface where
+    /// `filtered`, spread to where nothing is known, and the same on both sides of seams.
     pub fn solve(&mut self, filtered: bool) {
-        let Self { lumels, receivers, sums, texel, lightmap, .. } = self;
-        let size = lightmap.layout.page_size;
-        let mut known: Vec<Option<Noisy>> = vec![None; lightmap.irradiance.len()];
-        for ((lumel, receiver), sum) in lumels.iter().zip(receivers.iter()).zip(sums.iter()) {
-            let Receiver::Lumel { position, normal, .. } = *receiver else { continue };
-            known[*lumel as usize] = sum.known().map(|(irradiance, variance)| Noisy {
-                position,
-                normal,
-                irradiance,
-                variance,
-            });
-        }
-        let page_lumels = (size as usize).pow(2);
-        let pages = known.chunks(page_lumels).zip(lightmap.irradiance.chunks_mut(page_lumels));
-        for (page, light) in pages {
-            let mut page = page.to_vec();
-            if filtered {
-                filter(&mut page, size, *texel);
+        let news: Vec<Block> = std::mem::take(&mut self.news).into_iter().collect();
+        let solved: Vec<Vec<Vec3>> =
+            news.par_iter().map(|block| self.solved(block, filtered)).collect();
+        let size = self.lightmap.layout.page_size;
+        for (block, light) in news.iter().zip(solved) {
+            for (row, light) in (block.corner().y..size).zip(light.chunks(BLOCK as usize)) {
+                let columns = (size - block.corner().x).min(BLOCK) as usize;
+                let at = UVec2::new(block.corner().x, row);
+                let first = self.lightmap.layout.index(block.page, at);
+                self.lightmap.irradiance[first..first + columns].copy_from_slice(&light[..columns]);
             }
-            for (light, lumel) in light.iter_mut().zip(&page) {
-                *light = lumel.map_or(Vec3::ZERO, |lumel| lumel.irradiance);
-            }
-            fill::fill(light, size, |number| page[number].is_some());
         }
-        self.seams.apply(&mut lightmap.irradiance, |lumel| known[lumel].is_some());
+        let seams = self.seams.about(|lumel| news.binary_search(&Block::of(lumel, size)).is_ok());
+        let is_known = |lumel: &u32| self.known(*lumel).is_some_and(|l| l.variance < f32::INFINITY);
+        let known: Vec<bool> = seams.lumels().iter().map(is_known).collect();
+        seams.apply(&mut self.lightmap.irradiance, &known);
+    }
+
+    /// The light of a block, row by row of [`BLOCK`] lumels, with those about it that count for it.
+    fn solved(&self, block: &Block, filtered: bool) -> Vec<Vec3> {
+        let size = self.lightmap.layout.page_size as i32;
+        let side = BLOCK + 2 * REACH;
+        let low = block.corner().as_ivec2() - REACH as i32;
+        let mut window: Vec<Option<Noisy>> = (0..side * side)
+            .map(|k| {
+                let at = low + UVec2::new(k % side, k / side).as_ivec2();
+                let is_on_page = at.min_element() >= 0 && at.max_element() < size;
+                let index =
+                    is_on_page.then(|| self.lightmap.layout.index(block.page, at.as_uvec2()));
+                self.known(index? as u32)
+            })
+            .collect();
+        if filtered {
+            filter(&mut window, side, self.texel);
+        }
+        let known = |lumel: &Option<Noisy>| lumel.filter(|lumel| lumel.variance < f32::INFINITY);
+        let mut light: Vec<Vec3> = window
+            .iter()
+            .map(|lumel| known(lumel).map_or(Vec3::ZERO, |lumel| lumel.irradiance))
+            .collect();
+        fill::fill(&mut light, side, |number| known(&window[number]).is_some());
+        let rows = light.chunks(side as usize).skip(REACH as usize).take(BLOCK as usize);
+        rows.flat_map(|row| &row[REACH as usize..(REACH + BLOCK) as usize]).copied().collect()
+    }
+
+    /// What is known of a lumel; nothing where no surface covers it, or where it lies within something.
+    fn known(&self, lumel: u32) -> Option<Noisy> {
+        let receiver = self.receiver_of[lumel as usize];
+        let Receiver::Lumel { position, normal, .. } = *self.receivers.get(receiver as usize)?
+        else {
+            return None;
+        };
+        let (irradiance, variance) = self.sums[receiver as usize].known()?;
+        Some(Noisy { position, normal, irradiance, variance })
     }
 
     /// Irradiances that light has at the lumels that surfaces cover.
@@ -156,29 +209,12 @@ impl LightmapSolver {
     }
 }
 
-impl Sum {
-    /// Counts as resting on so many samples at most.
-    fn keep(&mut self, most: f32) {
-        if self.samples > most {
-            let share = most / self.samples;
-            self.sum *= share;
-            self.squares *= share;
-            self.backs *= share;
-            self.samples = most;
-        }
-    }
-
-    fn is_buried(&self) -> bool {
-        self.backs > BURIED_ABOVE * self.samples
-    }
-
-    /// Irradiance and the variance of its luminance; nothing where that is unknown.
-    fn known(&self) -> Option<(Vec3, f32)> {
-        if self.samples == 0.0 || self.is_buried() {
-            return None;
-        }
-        let mean = self.sum / self.samples;
-        let scatter = (self.squares / self.samples - luminance(mean).powi(2)).max(0.0);
-        Some((mean, scatter / self.samples))
-    }
+/// The blocks in which no surface lies, beside those in which some do.
+fn empty_beside(places: &[LumelPlace], page_size: u32) -> BTreeMap<Block, Vec<Block>> {
+    let covered: BTreeSet<Block> = places.iter().map(|p| Block::of(p.lumel, page_size)).collect();
+    let empty = |block: &Block| {
+        let beside = block.beside(page_size).filter(|beside| !covered.contains(beside));
+        (*block, beside.collect())
+    };
+    covered.iter().map(empty).filter(|(_, beside): &(_, Vec<_>)| !beside.is_empty()).collect()
 }

@@ -90,6 +90,29 @@ impl Seams {
         self.points.len()
     }
 
+    /// The lumels that take part, by their index among those of all pages.
+    pub(crate) fn lumels(&self) -> &[u32] {
+        &self.lumels
+    }
+
+    /// Those that new lumels take part in.
+    pub(crate) fn about(&self, is_new: impl Fn(u32) -> bool) -> Self {
+        let new: Vec<bool> = self.lumels.iter().map(|lumel| is_new(*lumel)).collect();
+        let is_about = |point: &&[(u32, f32); 8]| point.iter().any(|(l, _)| new[*l as usize]);
+        let mut about = Self::default();
+        let mut known = vec![None; self.lumels.len()];
+        for point in self.points.iter().filter(is_about) {
+            about.points.push(point.map(|(lumel, weight)| {
+                let number = *known[lumel as usize].get_or_insert_with(|| {
+                    about.lumels.push(self.lumels[lumel as usize]);
+                    about.lumels.len() as u32 - 1
+                });
+                (number, weight)
+            }));
+        }
+        about
+    }
+
     /// Adds an edge, if it is a seam. `known` has the places of lumels in the list of those that take
     /// part.
     fn add(
@@ -125,17 +148,14 @@ impl Seams {
         }
     }
 
-    /// Closes the seams of the light of all pages. `is_known` tells by its index whether a lumel's
+    /// Closes the seams of the light of all pages. `known`: of each lumel that takes part whether its
     /// light is its own. Lumels that take no part stay as they are.
-    pub(crate) fn apply(&self, light: &mut [Vec3], is_known: impl Fn(usize) -> bool) {
+    pub(crate) fn apply(&self, light: &mut [Vec3], known: &[bool]) {
         if self.points.is_empty() {
             return;
         }
-        let masses: Vec<f32> = self
-            .lumels
-            .iter()
-            .map(|l| if is_known(*l as usize) { 1.0 } else { YIELDING })
-            .collect();
+        let mass = |is_known: &bool| if *is_known { 1.0 } else { YIELDING };
+        let masses: Vec<f32> = known.iter().map(mass).collect();
         let own: Vec<Vec3> = self.lumels.iter().map(|l| light[*l as usize]).collect();
         let closed = self.solved(&masses, own);
         for (lumel, value) in self.lumels.iter().zip(closed) {
@@ -337,7 +357,8 @@ mod tests {
         let noise = |k: usize| 0.1 * ((k * 7919) % 13) as f32 / 13.0;
         let before: Vec<Vec3> = (0..32 * 32).map(|k| light(k) + noise(k)).collect();
         let mut after = before.clone();
-        seams.apply(&mut after, |k| k % 32 != 8);
+        let known: Vec<bool> = seams.lumels().iter().map(|lumel| lumel % 32 != 8).collect();
+        seams.apply(&mut after, &known);
         let (was, is) = (worst(&read(&layout, &before)), worst(&read(&layout, &after)));
         assert!(was > 0.1 && is < 0.01, "{was} → {is}");
         let changed = before.iter().zip(&after).filter(|(a, b)| a != b).count();
@@ -353,11 +374,30 @@ mod tests {
         assert_eq!(Seams::new(&scene, &layout).len(), 0);
     }
 
+    /// Where some lumels are new, seams are closed there alone.
+    #[test]
+    fn seams_are_closed_about_new_lumels() {
+        let (scene, layout) = halves(0.0);
+        let seams = Seams::new(&scene, &layout);
+        assert_eq!(seams.about(|_| false).len(), 0);
+        assert_eq!(seams.about(|_| true).len(), seams.len());
+        let some = seams.about(|lumel| lumel / 32 > 16);
+        assert!(0 < some.len() && some.len() < seams.len(), "{}", some.len());
+        let before: Vec<Vec3> =
+            (0..32 * 32).map(|k| Vec3::splat(if k % 32 < 12 { 1.0 } else { 1.2 })).collect();
+        let mut after = before.clone();
+        some.apply(&mut after, &vec![true; some.lumels().len()]);
+        let [was, is] = [&before, &after].map(|light| read(&layout, light));
+        let closed = is.iter().filter(|[a, b]| (a - b).abs() < 0.01).count();
+        assert!(worst(&was) > 0.1 && (5..45).contains(&closed), "{closed} of 51");
+    }
+
     #[test]
     fn light_without_seams_stays() {
         let (scene, layout) = halves(0.0);
         let mut even = vec![Vec3::splat(2.0); 32 * 32];
-        Seams::new(&scene, &layout).apply(&mut even, |_| true);
+        let seams = Seams::new(&scene, &layout);
+        seams.apply(&mut even, &vec![true; seams.lumels().len()]);
         assert!(even.iter().all(|e| e.abs_diff_eq(Vec3::splat(2.0), 1e-5)));
     }
 }
