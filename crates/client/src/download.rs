@@ -112,7 +112,7 @@ pub async fn download(
 
 /// What a server has beside a scene: `https://host/base/scene` is the address of a scene, and a reverse
 /// proxy has the server under `base`.
-fn beside(scene: &str, path: &str) -> Result<Url, url::ParseError> {
+pub(crate) fn beside(scene: &str, path: &str) -> Result<Url, url::ParseError> {
     let mut base = Url::parse(scene)?;
     take_scene(&mut base);
     base.join(path)

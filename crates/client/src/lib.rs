@@ -24,6 +24,7 @@ mod download;
 mod error;
 mod plan;
 mod replica;
+mod resources;
 mod session;
 mod statistics;
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use lumencast_cache::{Cache, CurrentLight, SceneEvent};
-use lumencast_codec::{Catalog, LightTrack, StateFrame, limits, tracks};
+use lumencast_codec::{Catalog, LightTrack, ResourceHash, StateFrame, limits, tracks};
 use lumencast_scene::Edit;
 use lumencast_transport::{
     Client, ConnectOptions, ConnectionState, Error, Frame, ReadOptions, TrackReader,
@@ -16,6 +16,7 @@ use tokio::task::{AbortHandle, JoinSet};
 
 use crate::error::ClientError;
 use crate::plan::plan;
+use crate::resources::read_resources;
 use crate::statistics::{Meter, Statistics};
 
 /// State frames count for so long: every one of them tells something.
@@ -42,7 +43,7 @@ pub struct Session {
 }
 
 /// What the session and its tasks share.
-struct Shared {
+pub(crate) struct Shared {
     began: Instant,
     known: Mutex<Known>,
     /// Changes when another catalog has come.
@@ -68,6 +69,28 @@ impl Shared {
     /// Seconds on the cache's clock.
     fn seconds(&self, at: Instant) -> f64 {
         at.saturating_duration_since(self.began).as_secs_f64()
+    }
+
+    /// Tells when anything has come.
+    pub(crate) fn subscribe(&self) -> watch::Receiver<()> {
+        self.news.subscribe()
+    }
+
+    /// Names of resources that are to be fetched.
+    pub(crate) fn wanted_resources(&self) -> Vec<ResourceHash> {
+        self.lock().cache.wanted_resources()
+    }
+
+    /// Takes a resource in.
+    pub(crate) fn add_resource(&self, bytes: &[u8]) {
+        let mut known = self.lock();
+        known.meter.received += bytes.len() as u64;
+        if let Err(error) = known.cache.add_resource(bytes) {
+            tracing::debug!(%error, "a resource is dropped");
+            known.meter.dropped += 1;
+        }
+        drop(known);
+        self.news.send_replace(());
     }
 
     /// Takes a frame in.
@@ -114,6 +137,7 @@ impl Session {
         tasks.spawn(read_catalog(client.clone(), shared.clone()));
         tasks.spawn(read_state(client.clone(), shared.clone()));
         tasks.spawn(read_light(client.clone(), shared.clone()));
+        tasks.spawn(read_resources(url.to_owned(), shared.clone()));
         let mut catalogs = shared.catalogs.subscribe();
         let first = catalogs.wait_for(|count| *count > 0);
         let came = matches!(tokio::time::timeout(CATALOG_WAIT, first).await, Ok(Ok(_)));
@@ -145,10 +169,14 @@ impl Session {
     }
 
     /// Waits until the state and the light of every region are of this tick or later
-    /// ([`Cache::has_reached`]), for as long as it takes.
+    /// ([`Cache::has_reached`]), and what fields name has come, for as long as it takes.
     pub async fn reached(&self, tick: u64) {
         let mut news = self.shared.news.subscribe();
-        while !self.shared.lock().cache.has_reached(tick) {
+        let has_all = || {
+            let cache = &self.shared.lock().cache;
+            cache.has_reached(tick) && cache.wanted_resources().is_empty()
+        };
+        while !has_all() {
             // The sender lives as long as this session.
             let _ = news.changed().await;
         }

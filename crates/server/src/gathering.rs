@@ -32,6 +32,12 @@ struct UnderWay {
     moment: Moment,
 }
 
+impl UnderWay {
+    fn is_waited_for(&self) -> bool {
+        self.asked.lumel_samples().is_none()
+    }
+}
+
 /// What became of a job; nothing was gathered where it has failed.
 pub(crate) struct Brought {
     pub(crate) asked: Asked,
@@ -50,9 +56,9 @@ impl Gathering {
         self.under_way.iter().any(|job| job.asked.field == field)
     }
 
-    /// Whether any job is under way.
-    pub(crate) fn is_busy(&self) -> bool {
-        !self.under_way.is_empty()
+    /// Whether any job is under way that ticks wait for.
+    pub(crate) fn is_late(&self) -> bool {
+        self.under_way.iter().any(UnderWay::is_waited_for)
     }
 
     pub(crate) fn submit(&mut self, request: Request, moment: Moment) {
@@ -77,7 +83,7 @@ impl Gathering {
         brought
     }
 
-    /// Waits for the jobs that were submitted in a tick, and tells what is done.
+    /// Waits for the jobs that were submitted in a tick, but for those of lumels, and tells what is done.
     pub(crate) fn wait(&mut self, tick: u64, patience: Patience) -> Vec<Brought> {
         match patience {
             Patience::Endless => {
@@ -91,9 +97,8 @@ impl Gathering {
             }
             Patience::Until(deadline) => {
                 let mut brought = self.poll();
-                while self.under_way.iter().any(|job| job.moment.tick == tick)
-                    && Instant::now() < deadline
-                {
+                let is_of_now = |job: &UnderWay| job.moment.tick == tick && job.is_waited_for();
+                while self.under_way.iter().any(is_of_now) && Instant::now() < deadline {
                     std::thread::sleep(POLL_INTERVAL);
                     brought.extend(self.poll());
                 }

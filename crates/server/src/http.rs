@@ -1,16 +1,20 @@
 //! What the server says over HTTP: the page, the scene's files, its health and its counters.
 
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
 use axum::Router;
+use axum::body::Bytes;
 use axum::extract::{Path, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::middleware::map_response;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+
+use lumencast_codec::ResourceHash;
 
 use crate::files::{FileSet, respond};
 use crate::metrics::Metrics;
@@ -34,6 +38,8 @@ pub(crate) struct Shared {
     pub(crate) page: FileSet,
     /// The scene's files; grows when an edit adds another glTF.
     pub(crate) scene_files: RwLock<FileSet>,
+    /// What shapes of fields name, by hash; grows with them.
+    pub(crate) resources: RwLock<HashMap<ResourceHash, Bytes>>,
     /// Name of the scene and of its broadcast.
     pub(crate) scene: String,
     /// The scene's glTF file under `/scene/`.
@@ -72,6 +78,7 @@ pub(crate) fn router(shared: Arc<Shared>) -> Router {
         .route("/", get(index))
         .route("/lumencast.json", get(start))
         .route("/scene/{*name}", get(scene_file))
+        .route("/resources/{hash}", get(resource))
         .route("/healthz", get(health))
         .route("/metrics", get(metrics))
         .route("/{*name}", get(page_file))
@@ -128,6 +135,17 @@ async fn scene_file(
         files.get(&name).cloned()
     };
     respond(&name, contents, &asked).await
+}
+
+/// Layouts and charts of lightmaps (docs/wire.md, "Resources"). What is in one never changes.
+async fn resource(State(shared): State<Arc<Shared>>, Path(hash): Path<String>) -> Response {
+    let resources = shared.resources.read().unwrap_or_else(PoisonError::into_inner);
+    let bytes = hash.parse().ok().and_then(|hash| resources.get(&hash).cloned());
+    let Some(bytes) = bytes else { return StatusCode::NOT_FOUND.into_response() };
+    let forever = "public, max-age=31536000, immutable";
+    let head =
+        [(header::CONTENT_TYPE, "application/octet-stream"), (header::CACHE_CONTROL, forever)];
+    (head, bytes).into_response()
 }
 
 async fn health(State(shared): State<Arc<Shared>>) -> Response {

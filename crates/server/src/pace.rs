@@ -50,12 +50,14 @@ impl Default for SampleRange {
     }
 }
 
-/// Chooses the samples of the next tick from what the last ones took, so that a tick fills
-/// [`Budget::SHARE`] of its period. It falls at once and rises slowly: a late tick is seen, an
+/// Chooses the samples of the next tick from what the last ones took, so that a tick fills a share of
+/// its period. It falls at once and rises slowly: a late tick is seen, an
 /// unused millisecond is not.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
     period: f64,
+    /// Share of the period that a tick aims to fill. The rest takes up the jitter of the machine.
+    share: f64,
     range: SampleRange,
     samples: u32,
     /// Seconds of gathering for one sample of every probe, smoothed.
@@ -63,8 +65,10 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// Share of the period that a tick aims to fill. The rest takes up the jitter of the machine.
+    /// The share of ticks that have the machine for themselves.
     pub const SHARE: f64 = 0.85;
+    /// The same where lumels are gathered at beside them.
+    pub const SHARE_BESIDE_LUMELS: f64 = 0.4;
     /// Largest growth of the number of samples from one tick to the next.
     const RISE: f64 = 1.25;
     /// Smallest cut after a late tick.
@@ -75,7 +79,13 @@ impl Budget {
     /// Begins with the fewest samples.
     pub fn new(period: f64, range: SampleRange) -> Self {
         let range = SampleRange { min: range.min.max(1), max: range.max.max(range.min).max(1) };
-        Self { period, range, samples: range.min, cost: None }
+        Self { period, share: Self::SHARE, range, samples: range.min, cost: None }
+    }
+
+    /// The same for ticks that aim to fill another share of their period.
+    #[must_use]
+    pub fn filling(self, share: f64) -> Self {
+        Self { share, ..self }
     }
 
     /// Samples a probe for the next tick.
@@ -107,7 +117,7 @@ impl Budget {
         };
         self.cost = Some(cost);
 
-        let room = Self::SHARE * self.period - (total - gather).max(0.0);
+        let room = self.share * self.period - (total - gather).max(0.0);
         let fitting = (room / cost.max(1e-9)).max(0.0);
         let samples = f64::from(self.samples);
         let mut next = fitting.min(samples * Self::RISE + 1.0);
@@ -117,6 +127,45 @@ impl Budget {
         // `as` saturates, and NaN becomes 0: both are then brought into the range.
         self.samples = (next as u32).clamp(self.range.min, self.range.max);
         late
+    }
+}
+
+/// Chooses how many samples lumels take in a tick, so that they fill [`LumelPace::SHARE`] of its period,
+/// beside the tick.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LumelPace {
+    period: f64,
+    samples: u64,
+    is_fixed: bool,
+}
+
+impl LumelPace {
+    /// Share of the period in which lumels are gathered at.
+    const SHARE: f64 = 0.45;
+    /// Samples of the first tick, and of any at least: few, for machines that are slow.
+    const LEAST: u64 = 1024;
+    /// Largest growth from one tick to the next.
+    const RISE: f64 = 1.5;
+
+    /// Begins with few samples; or always takes so many.
+    pub(crate) fn new(period: f64, fixed: Option<u64>) -> Self {
+        let samples = fixed.unwrap_or(Self::LEAST);
+        Self { period, samples, is_fixed: fixed.is_some() }
+    }
+
+    /// Samples of the next tick.
+    pub(crate) fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Takes note of a job of so many samples that took so many seconds.
+    pub(crate) fn record(&mut self, samples: u64, seconds: f64) {
+        if self.is_fixed || samples == 0 {
+            return;
+        }
+        let fitting = samples as f64 * Self::SHARE * self.period / seconds.max(1e-9);
+        let most = self.samples as f64 * Self::RISE;
+        self.samples = (fitting.min(most) as u64).max(Self::LEAST);
     }
 }
 
@@ -176,6 +225,22 @@ mod tests {
         let before = budget.samples();
         run(&mut budget, 1, 1e-5, 0.0);
         assert!(budget.samples() <= before + before / 4 + 1);
+    }
+
+    #[test]
+    fn lumels_fill_their_share() {
+        let mut pace = LumelPace::new(PERIOD, None);
+        for _ in 0..30 {
+            let samples = pace.samples();
+            pace.record(samples, samples as f64 * 1e-6);
+        }
+        let expected = (LumelPace::SHARE * PERIOD * 1e6) as u64;
+        assert!(pace.samples().abs_diff(expected) < expected / 100, "{}", pace.samples());
+        pace.record(pace.samples(), 1.0);
+        assert_eq!(pace.samples(), LumelPace::LEAST, "it falls at once");
+        let mut fixed = LumelPace::new(PERIOD, Some(77));
+        fixed.record(77, 1.0);
+        assert_eq!(fixed.samples(), 77);
     }
 
     #[test]

@@ -1,11 +1,11 @@
 //! Frames onto their tracks.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Arc, PoisonError};
 
 use bytes::Bytes;
 use lumencast_codec::tracks::{self, LightTrack};
-use lumencast_codec::{Catalog, EncodedRegion};
+use lumencast_codec::{Catalog, EncodedRegion, Resource, ResourceHash};
 use lumencast_transport::{Broadcast, TrackWriter};
 
 use crate::http::Shared;
@@ -14,6 +14,8 @@ use crate::http::Shared;
 pub trait Outlet {
     /// Whether anyone reads this region of this field: what nobody reads is not encoded.
     fn is_watched(&self, field: u32, region: u32) -> bool;
+    /// Takes what the next catalog's shapes name by hash.
+    fn resources(&mut self, _resources: Vec<Resource>) {}
     /// Takes a catalog that replaces the one before.
     fn catalog(&mut self, catalog: &Catalog);
     /// Takes a state frame; it begins a group where it is a snapshot.
@@ -74,6 +76,11 @@ impl Outlet for Publisher {
         (0..tracks::LAYERS).filter_map(layer).any(TrackWriter::is_used)
     }
 
+    fn resources(&mut self, resources: Vec<Resource>) {
+        let mut known = self.shared.resources.write().unwrap_or_else(PoisonError::into_inner);
+        *known = by_hash(resources);
+    }
+
     fn catalog(&mut self, catalog: &Catalog) {
         // Tracks come first, so that readers of the catalog find them.
         self.follow(catalog);
@@ -90,6 +97,12 @@ impl Outlet for Publisher {
             write(track, frame.bytes, frame.new_group, &self.shared);
         }
     }
+}
+
+/// Resources as clients ask for them.
+pub(crate) fn by_hash(resources: Vec<Resource>) -> HashMap<ResourceHash, Bytes> {
+    let named = |resource: Resource| (resource.hash(), resource.into_bytes().into());
+    resources.into_iter().map(named).collect()
 }
 
 /// A frame that cannot be written is lost as one lost on the way would be: clients wait for the
@@ -146,6 +159,7 @@ mod tests {
             metrics: Metrics::default(),
             page: Default::default(),
             scene_files: Default::default(),
+            resources: Default::default(),
             scene: "room".into(),
             root: "room.glb".into(),
             tick: AtomicU64::new(0),

@@ -45,6 +45,11 @@ impl Published {
         solver.ids().filter_map(published).collect()
     }
 
+    /// The field has another layout, which is coded anew; its updates are numbered on.
+    pub(crate) fn restart(&mut self, field: &Field) {
+        self.encoder = FieldEncoder::new(field);
+    }
+
     /// The field as the catalog lists it.
     pub(crate) fn describe(&self, field: &Field, source: &str) -> FieldInfo {
         self.encoder.describe(field, source)

@@ -4,19 +4,20 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use lumencast_charts::LaidOut;
 use lumencast_codec::{
-    AcceptedEdit, Catalog, EncodedRegion, Epoch, FieldInfo, RefusedEdit, SceneInfo, SceneState,
-    StateFrame, check_volumes, limits,
+    AcceptedEdit, Catalog, EncodedRegion, Epoch, FieldInfo, RefusedEdit, Resource, SceneInfo,
+    SceneState, StateFrame, check_volumes, layout_resources, limits,
 };
 use lumencast_gather::Gather;
-use lumencast_light::{FieldId, Light};
+use lumencast_light::{FieldId, Light, Lightmap};
 use lumencast_scene::{Edit, FileRead, Scene, Script, Snapshot, VolumeSpec};
 use lumencast_solve::{FitEffort, GatherOptions, Solver, Turn, volumes};
 
 use crate::error::ServerError;
 use crate::gathering::{Brought, Gathering, Patience};
 use crate::inbox::{Mail, Received, refusal};
-use crate::pace::{Budget, SampleRange};
+use crate::pace::{Budget, LumelPace, SampleRange};
 use crate::publish::Outlet;
 use crate::published::{Moment, Published};
 use crate::report::{Report, Stage, Stopwatch};
@@ -36,6 +37,10 @@ pub struct TickOptions {
     pub feedback: bool,
     /// Volumes in place of the scene's own, or of the default one.
     pub volumes: Vec<VolumeSpec>,
+    /// Lumels of still surfaces, if there are to be some.
+    pub lightmap: Option<LaidOut>,
+    /// Samples of all lumels in a tick: as many as there is time for beside probes, unless it is given.
+    pub lumel_samples: Option<u64>,
     /// Edits at set times.
     pub script: Option<Script>,
     /// What computes the light, for the catalog ([`lumencast_codec::FieldInfo::source`]).
@@ -51,6 +56,8 @@ impl Default for TickOptions {
             gather: GatherOptions::default(),
             feedback: false,
             volumes: Vec::new(),
+            lightmap: None,
+            lumel_samples: None,
             script: None,
             source: String::new(),
         }
@@ -87,6 +94,9 @@ pub struct Tick {
     published: Vec<Published>,
     options: TickOptions,
     budget: Budget,
+    lumel_pace: LumelPace,
+    /// The version of the scene that lumels follow.
+    followed: Option<u64>,
     epoch: Epoch,
     number: u64,
     /// The scales that clients know from the catalog.
@@ -125,10 +135,16 @@ impl Tick {
             options.volumes.clone()
         };
         check_volumes(&volumes)?;
-        let solver = Solver::new(&volumes, options.gather)?;
+        let mut solver = Solver::new(&volumes, options.gather)?;
+        solver.set_lightmap(&scene.snapshot(), options.lightmap.as_ref());
         let published = Published::all(&solver, Vec::new());
         let told_scales = vec![None; published.len()];
-        let budget = Budget::new(options.period, options.samples);
+        let share = match options.lightmap {
+            Some(_) => Budget::SHARE_BESIDE_LUMELS,
+            None => Budget::SHARE,
+        };
+        let budget = Budget::new(options.period, options.samples).filling(share);
+        let lumel_pace = LumelPace::new(options.period, options.lumel_samples);
         let last = Report::default();
         Ok(Self {
             scene,
@@ -138,6 +154,8 @@ impl Tick {
             published,
             options,
             budget,
+            lumel_pace,
+            followed: None,
             epoch,
             number: 0,
             told_scales,
@@ -196,6 +214,15 @@ impl Tick {
         self.gathering.keep(|id| self.solver.ids().any(|there| there == id));
         self.fields_are_news = true;
         Ok(())
+    }
+
+    /// What the fields' shapes name by hash: layouts of lumels, and their charts.
+    pub fn resources(&self) -> Vec<Resource> {
+        let of_lightmap = |lightmap: &Lightmap| {
+            let (layout, charts) = layout_resources(&lightmap.layout);
+            [layout].into_iter().chain(charts)
+        };
+        self.light().lightmaps().flat_map(of_lightmap).collect()
     }
 
     /// The light as it was last published.
@@ -259,6 +286,7 @@ impl Tick {
         outlet.state(state, is_snapshot);
         report.seconds[Stage::Publish as usize] = watch.lap();
 
+        self.follow(&scene, outlet);
         let (brought, build) = self.gather(&scene, patience);
         let gathering = watch.lap();
         report.seconds[Stage::Accelerate as usize] = build.min(gathering);
@@ -293,6 +321,25 @@ impl Tick {
         report.scene_time = scene.time;
         self.last_now = Some(now);
         self.finish(watched, report)
+    }
+
+    /// Lets lumels of what has moved go.
+    fn follow(&mut self, scene: &Snapshot, outlet: &mut dyn Outlet) {
+        if self.followed.replace(scene.version) == Some(scene.version) {
+            return;
+        }
+        let others = self.solver.follow(scene);
+        for id in &others {
+            let field = self.solver.light().field(*id);
+            let published = self.published.iter_mut().find(|published| published.id == *id);
+            if let (Some(published), Some(field)) = (published, field) {
+                published.restart(field);
+            }
+        }
+        if !others.is_empty() {
+            outlet.resources(self.resources());
+            self.fields_are_news = true;
+        }
     }
 
     /// Applies the script's edits that are due and then the clients', each whole or not at all.
@@ -370,7 +417,8 @@ impl Tick {
         light.extend(more);
 
         let previous = self.options.feedback.then(|| Arc::new(self.light().clone()));
-        let turn = Turn { previous, samples: self.budget.samples(), pass: self.number };
+        let (samples, lumels) = (self.budget.samples(), Some(self.lumel_pace.samples()));
+        let turn = Turn { previous, samples, lumels, pass: self.number };
         for id in self.idle() {
             if let Some(job) = self.solver.job(id, scene, turn.clone()) {
                 self.looked.retain(|looked| *looked != id);
@@ -427,6 +475,9 @@ impl Tick {
                 continue;
             };
             self.solver.take(asked, gathered);
+            if let Some(samples) = asked.lumel_samples() {
+                self.lumel_pace.record(samples, gathered.trace_seconds);
+            }
             if let Some(published) = self.published_mut(asked.field) {
                 published.show(*moment);
             }
@@ -490,7 +541,7 @@ impl Tick {
         report.probes = probes as u64;
         report.buried = self.solver.buried_count() as u64;
         let (gather, total) = (report.stage(Stage::Gather), report.total_seconds());
-        report.late = if self.gathering.is_busy() {
+        report.late = if self.gathering.is_late() {
             self.budget.overrun()
         } else {
             self.budget.record(gather, total)

@@ -33,7 +33,7 @@ fn solver(fit: Option<FitOptions>) -> (Solver, Vec<(Asked, lumencast_gather::Gat
     for (asked, found) in gather(looks) {
         solver.take(&asked, &found);
     }
-    let turn = Turn { previous: None, samples: SAMPLES, pass: 0 };
+    let turn = Turn { previous: None, samples: SAMPLES, lumels: None, pass: 0 };
     let jobs = ids.iter().filter_map(|id| solver.job(*id, &snapshot, turn.clone())).collect();
     let brought = gather(jobs);
     (solver, brought)

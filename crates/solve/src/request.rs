@@ -42,13 +42,15 @@ pub(crate) enum What {
     Surfaces,
     /// Light at receivers, of which the first ones are probes.
     Light { budgets: Vec<Budget>, probes: usize },
+    /// Light at those lumels whose turn it was.
+    Lumels { budgets: Vec<Budget> },
 }
 
 impl Asked {
     /// Samples of probes that it takes in all.
     pub fn samples(&self) -> u64 {
         match &self.what {
-            What::Surfaces => 0,
+            What::Surfaces | What::Lumels { .. } => 0,
             What::Light { budgets, probes } => {
                 budgets.iter().take(*probes).map(|budget| u64::from(budget.samples)).sum()
             }
@@ -57,6 +59,17 @@ impl Asked {
 
     /// Whether light comes of it: otherwise only where surfaces are.
     pub fn is_light(&self) -> bool {
-        matches!(self.what, What::Light { .. })
+        !matches!(self.what, What::Surfaces)
+    }
+
+    /// Samples of lumels in their turn; nothing where it is for something else. There are so many lumels
+    /// that nobody waits for them.
+    pub fn lumel_samples(&self) -> Option<u64> {
+        match &self.what {
+            What::Lumels { budgets } => {
+                Some(budgets.iter().map(|budget| u64::from(budget.samples)).sum())
+            }
+            What::Surfaces | What::Light { .. } => None,
+        }
     }
 }

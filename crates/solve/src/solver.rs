@@ -143,14 +143,15 @@ impl Solver {
         let seed = (turn.pass << 8 | low) ^ (high << 40);
         let solver = self.field_mut(field)?;
         let probes = solver.probe_count();
-        let job = match (solver, turn.lumels) {
+        let (job, is_turn) = match (solver, turn.lumels) {
             (FieldSolver::Lightmap(lightmap), Some(samples)) => {
-                lightmap.next_job(scene.clone(), samples)
+                (lightmap.next_job(scene.clone(), samples), true)
             }
-            (solver, _) => solver.job(scene.clone(), turn.samples),
+            (solver, _) => (solver.job(scene.clone(), turn.samples), false),
         };
         let job = Job { previous: turn.previous, bounces, clamp, seed, ..job };
-        let what = What::Light { budgets: job.budgets.clone(), probes };
+        let budgets = job.budgets.clone();
+        let what = if is_turn { What::Lumels { budgets } } else { What::Light { budgets, probes } };
         Some(Request { job, asked: Asked { field, what } })
     }
 
@@ -162,8 +163,27 @@ impl Solver {
         let Some(field) = self.field_mut(asked.field) else { return };
         match &asked.what {
             What::Surfaces => field.found(gathered),
-            What::Light { budgets, .. } => field.blend(gathered, budgets),
+            What::Light { budgets, .. } | What::Lumels { budgets } => {
+                field.blend(gathered, budgets);
+            }
         }
+    }
+
+    /// Lets lightmaps leave out what has moved ([`LightmapSolver::follow`]). The fields whose layout is
+    /// another one.
+    pub fn follow(&mut self, scene: &Snapshot) -> Vec<FieldId> {
+        let mut others = Vec::new();
+        for lightmap in self.fields.iter_mut().filter_map(FieldSolver::as_lightmap_mut) {
+            if lightmap.follow(scene) {
+                let fields = self.light.fields_mut().iter_mut();
+                let published = fields.filter_map(Field::as_lightmap_mut);
+                for published in published.filter(|published| published.id == lightmap.id()) {
+                    published.layout = lightmap.lightmap().layout.clone();
+                }
+                others.push(lightmap.id());
+            }
+        }
+        others
     }
 
     /// The scene was edited: light may be another from now on.
@@ -207,7 +227,9 @@ impl Solver {
     /// What arrives at lumels, filtered on the surface.
     pub(crate) fn solve_lightmaps(&mut self) {
         for lightmap in self.fields.iter_mut().filter_map(FieldSolver::as_lightmap_mut) {
-            lightmap.solve(true);
+            if !lightmap.solve(true) {
+                continue;
+            }
             let fields = self.light.fields_mut().iter_mut();
             let mut published = fields.filter_map(Field::as_lightmap_mut);
             if let Some(published) = published.find(|known| known.id == lightmap.id()) {

@@ -42,6 +42,37 @@ enum FieldKind {
     Volume,
 }
 
+/// Which kinds of fields hold live light.
+#[derive(Debug, Args)]
+pub(crate) struct LiveFieldsArguments {
+    /// What holds the light beside probes: lumels of still surfaces (lightmap,volume), for native
+    /// clients so far, or nothing (volume).
+    #[arg(
+        long,
+        value_name = "KIND,KIND",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "volume"
+    )]
+    fields: Vec<FieldKind>,
+    #[command(flatten)]
+    lightmap: LightmapArguments,
+}
+
+impl LiveFieldsArguments {
+    /// The lumels of a scene, if there are to be some and it has surfaces for them.
+    pub(crate) fn lumels(
+        &self,
+        scene: &mut Scene,
+        gatherer: &mut dyn Gather,
+    ) -> Result<Option<LaidOut>> {
+        match self.fields.contains(&FieldKind::Lightmap) {
+            true => charting::lay_out(&scene.snapshot(), self.lightmap.spec(scene), gatherer),
+            false => Ok(None),
+        }
+    }
+}
+
 /// Where light is to be computed.
 pub(crate) struct Wanted {
     pub(crate) volumes: Vec<VolumeSpec>,

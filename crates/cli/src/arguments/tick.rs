@@ -9,6 +9,7 @@ use lumencast_scene::{Scene, Script};
 use lumencast_server::{SampleRange, TickOptions};
 use lumencast_solve::blend::BlendSettings;
 
+use super::fields::LiveFieldsArguments;
 use super::gather::{GatherArguments, source};
 use super::scene::SceneArguments;
 use crate::values::{parse_positive, parse_rate, parse_samples, parse_share};
@@ -33,6 +34,8 @@ pub(crate) struct TickArguments {
     /// of few, as coarse as the probes are.
     #[arg(long)]
     feedback: bool,
+    #[command(flatten)]
+    fields: LiveFieldsArguments,
     /// A script of edits (JSON lines, {"at": seconds, "edit": …}), played by scene time.
     #[arg(long, value_name = "FILE")]
     pub(crate) edits: Option<PathBuf>,
@@ -47,6 +50,7 @@ impl TickArguments {
         gather: &GatherArguments,
         gatherer: &mut dyn Gather,
     ) -> Result<TickOptions> {
+        let lightmap = self.fields.lumels(scene, gatherer)?;
         let blend = BlendSettings { ratio: self.ratio, significance: self.significance };
         let feedback = if self.feedback { ", feedback" } else { "" };
         let gather = gather.options(blend, gather.reading.served());
@@ -57,6 +61,8 @@ impl TickArguments {
             gather,
             feedback: self.feedback,
             volumes: volumes.volumes(scene, gatherer)?,
+            lightmap,
+            lumel_samples: None,
             script: self.edits.as_deref().map(read_script).transpose()?,
         })
     }

@@ -9,13 +9,13 @@ mod points;
 mod seams;
 mod sums;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
-use glam::{UVec2, Vec3};
+use glam::{Affine3A, UVec2, Vec3};
 use lumencast_charts::LaidOut;
 use lumencast_gather::{Budget, Gathered, Job, Receiver};
-use lumencast_light::{Field, FieldId, Light, Lightmap};
+use lumencast_light::{Field, FieldId, Layout, Light, Lightmap, Surface};
 use lumencast_scene::Snapshot;
 use rayon::prelude::*;
 
@@ -50,6 +50,12 @@ pub struct LightmapSolver {
     news: BTreeSet<Block>,
     /// Blocks without surfaces beside those that have some: they are solved with these.
     beside: Arc<BTreeMap<Block, Vec<Block>>>,
+    /// Where all surfaces lie, those of instances that have moved too.
+    layout: Arc<Layout>,
+    /// The instances, by node and copy, and where they were when their lumels were placed.
+    placed: Arc<HashMap<(u32, u32), Affine3A>>,
+    /// Those that are elsewhere now.
+    moved: BTreeSet<(u32, u32)>,
     lightmap: Lightmap,
 }
 
@@ -74,6 +80,9 @@ impl LightmapSolver {
             seams: Arc::new(Seams::new(scene, &layout)),
             news: BTreeSet::new(),
             beside: Arc::new(empty_beside(&places, layout.page_size)),
+            placed: Arc::new(placed(scene, &layout)),
+            moved: BTreeSet::new(),
+            layout: layout.clone(),
             lightmap: Lightmap::dark(id, layout),
         }
     }
@@ -102,6 +111,29 @@ impl LightmapSolver {
     pub fn next_job(&mut self, scene: Arc<Snapshot>, samples: u64) -> Job {
         let budgets = self.cells.budgets(samples, scene.version);
         Job::with_budgets(scene, self.receivers.clone(), budgets)
+    }
+
+    /// Leaves out of the layout what has moved: its lumels are where it was. What is back where it was has
+    /// them again. Whether that is another layout.
+    pub fn follow(&mut self, scene: &Snapshot) -> bool {
+        let now: HashMap<(u32, u32), Affine3A> = scene
+            .instances
+            .iter()
+            .filter(|instance| instance.still)
+            .map(|instance| ((instance.node.0, instance.copy), instance.world_from_object))
+            .collect();
+        let is_elsewhere = |(id, place): &(&(u32, u32), &Affine3A)| now.get(id) != Some(place);
+        let moved: BTreeSet<(u32, u32)> =
+            self.placed.iter().filter(is_elsewhere).map(|(id, _)| *id).collect();
+        if moved == self.moved {
+            return false;
+        }
+        let Layout { page_size, pages, .. } = *self.layout;
+        let is_there = |surface: &&Surface| !moved.contains(&(surface.id.node, surface.id.copy));
+        let surfaces = self.layout.surfaces().iter().filter(is_there).cloned().collect();
+        self.lightmap.layout = Arc::new(Layout::new(page_size, pages, surfaces));
+        self.moved = moved;
+        true
     }
 
     /// The scene was edited: light may be another from now on.
@@ -137,8 +169,9 @@ impl LightmapSolver {
     }
 
     /// Makes light of what has been taken in since the last time: filtered on the surface where
-    /// `filtered`, spread to where nothing is known, and the same on both sides of seams.
-    pub fn solve(&mut self, filtered: bool) {
+    /// `filtered`, spread to where nothing is known, and the same on both sides of seams. Whether there
+    /// was anything new.
+    pub fn solve(&mut self, filtered: bool) -> bool {
         let news: Vec<Block> = std::mem::take(&mut self.news).into_iter().collect();
         let solved: Vec<Vec<Vec3>> =
             news.par_iter().map(|block| self.solved(block, filtered)).collect();
@@ -155,6 +188,7 @@ impl LightmapSolver {
         let is_known = |lumel: &u32| self.known(*lumel).is_some_and(|l| l.variance < f32::INFINITY);
         let known: Vec<bool> = seams.lumels().iter().map(is_known).collect();
         seams.apply(&mut self.lightmap.irradiance, &known);
+        !news.is_empty()
     }
 
     /// The light of a block, row by row of [`BLOCK`] lumels, with those about it that count for it.
@@ -207,6 +241,14 @@ impl LightmapSolver {
     pub fn lightmap(&self) -> &Lightmap {
         &self.lightmap
     }
+}
+
+/// Where the instances stand whose surfaces have lumels.
+fn placed(scene: &Snapshot, layout: &Layout) -> HashMap<(u32, u32), Affine3A> {
+    let with_lumels: BTreeSet<(u32, u32)> =
+        layout.surfaces().iter().map(|surface| (surface.id.node, surface.id.copy)).collect();
+    let all = scene.instances.iter().map(|i| ((i.node.0, i.copy), i.world_from_object));
+    all.filter(|(id, _)| with_lumels.contains(id)).collect()
 }
 
 /// The blocks in which no surface lies, beside those in which some do.
