@@ -95,8 +95,9 @@ impl BenchLightmap {
         let start = Instant::now();
         self.gather(&mut solver, &snapshot, &mut tracer)?;
         let gather_seconds = start.elapsed().as_secs_f64();
-        solver.solve(false);
-        let gathered = solver.lightmap().clone();
+        let mut unfiltered = solver.clone();
+        unfiltered.solve(false);
+        let gathered = unfiltered.lightmap();
         let start = Instant::now();
         solver.solve(true);
         let filter_seconds = start.elapsed().as_secs_f64();
@@ -109,7 +110,7 @@ impl BenchLightmap {
         let places = spread(&snapshot, &laid_out.layout, POINTS);
         let reference = self.reference(&places, &snapshot, &mut tracer)?;
         let psnr = |lightmap: &Lightmap| reference.psnr(&places, lightmap);
-        let (as_gathered, filtered) = (psnr(&gathered), psnr(solver.lightmap()));
+        let (as_gathered, filtered) = (psnr(gathered), psnr(solver.lightmap()));
 
         let LaidOut { layout, texel, .. } = &laid_out;
         let judged = reference.irradiance.iter().flatten().count();

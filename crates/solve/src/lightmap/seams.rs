@@ -1,10 +1,11 @@
 //! Seams: where the charts of a smooth surface meet, both sides get the same light.
 //!
 //! Both sides of such an edge are read from lumels of their own. Lumels about seams are changed as
-//! little as possible so that what is read on both sides is equal, in the sense of least squares:
-//! Σ m (x − d)² + λ Σ (a·x − b·x)², over lumels x that were d, and points of edges that a and b read
-//! (after Iwanicki 2013, "Lighting Technology of The Last of Us"). Lumels without light of their own
-//! yield first. The equations are solved by conjugate gradients.
+//! little as possible so that what is read on both sides is equal (Iwanicki 2013, "Lighting Technology
+//! of The Last of Us", by least squares): of all x with a·x = b·x, at points of edges that a and b read,
+//! and x ≥ 0, about that which minimises Σ m (x − d)², over lumels that were d. Lumels without light of
+//! their own yield first. Projections onto one condition after another find it (Kaczmarz 1937): each is
+//! local, and light stays light.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -12,16 +13,16 @@ use std::collections::hash_map::Entry;
 use glam::{Vec2, Vec3};
 use lumencast_light::{Layout, Lightmap, Surface, luminance};
 use lumencast_scene::Snapshot;
-use rayon::prelude::*;
 
 use super::places::{PlacedSurface, surfaces};
 
-/// λ: what a difference between both sides weighs, beside a lumel's own light.
-const WEIGHT: f32 = 64.0;
 /// m of a lumel without light of its own.
-const YIELDING: f32 = 1e-2;
-/// Steps of conjugate gradients.
-const STEPS: u32 = 48;
+const YIELDING: f32 = 1.0 / 16.0;
+/// Rounds over all points, forwards and backwards.
+const ROUNDS: u32 = 24;
+/// Share of a difference that a projection takes away: a little less than all where points ask for more
+/// than their lumels can give.
+const RELAXED: f32 = 0.8;
 /// Points of an edge for each lumel of its length, at which it is closed, and at which that is judged.
 const POINTS: f32 = 2.0;
 const JUDGED: f32 = 5.0;
@@ -154,70 +155,31 @@ impl Seams {
         if self.points.is_empty() {
             return;
         }
-        let mass = |is_known: &bool| if *is_known { 1.0 } else { YIELDING };
-        let masses: Vec<f32> = known.iter().map(mass).collect();
-        let own: Vec<Vec3> = self.lumels.iter().map(|l| light[*l as usize]).collect();
-        let closed = self.solved(&masses, own);
-        for (lumel, value) in self.lumels.iter().zip(closed) {
-            // Less than nothing is no light.
-            light[*lumel as usize] = value.max(Vec3::ZERO);
-        }
-    }
-
-    /// The least squares, from the lumels as they are.
-    fn solved(&self, masses: &[f32], own: Vec<Vec3>) -> Vec<Vec3> {
-        let inverse: Vec<f32> = self.diagonal(masses).into_iter().map(|d| 1.0 / d).collect();
-        let mut x = own;
-        // (M + λ CᵀC) x = M d: at x = d the residual is −λ CᵀC d.
-        let mut residual = self.differences(&x);
-        residual.par_iter_mut().for_each(|r| *r = -*r);
-        let mut direction: Vec<Vec3> =
-            residual.iter().zip(&inverse).map(|(r, i)| *r * *i).collect();
-        let mut rho = dot(&residual, &direction);
-        for _ in 0..STEPS {
-            let mut image = self.differences(&direction);
-            for ((image, mass), d) in image.iter_mut().zip(masses).zip(&direction) {
-                *image += *mass * *d;
-            }
-            let alpha = quotient(rho, dot(&direction, &image));
-            for (k, d) in direction.iter().enumerate() {
-                x[k] += alpha * *d;
-                residual[k] -= alpha * image[k];
-            }
-            let preconditioned = |(r, i): (&Vec3, &f32)| *r * *i;
-            let next: Vec<Vec3> = residual.iter().zip(&inverse).map(preconditioned).collect();
-            let new = dot(&residual, &next);
-            let beta = quotient(new, rho);
-            rho = new;
-            for (d, z) in direction.iter_mut().zip(&next) {
-                *d = *z + beta * *d;
-            }
-        }
-        x
-    }
-
-    /// λ CᵀC x.
-    fn differences(&self, x: &[Vec3]) -> Vec<Vec3> {
-        let difference = |taps: &[(u32, f32); 8]| -> Vec3 {
-            WEIGHT * taps.iter().map(|(lumel, weight)| *weight * x[*lumel as usize]).sum::<Vec3>()
+        let yields = |is_known: &bool| if *is_known { 1.0 } else { 1.0 / YIELDING };
+        let yields: Vec<f32> = known.iter().map(yields).collect();
+        let mut x: Vec<Vec3> = self.lumels.iter().map(|lumel| light[*lumel as usize]).collect();
+        let strength = |point: &[(u32, f32); 8]| -> f32 {
+            point.iter().map(|(lumel, weight)| weight * weight * yields[*lumel as usize]).sum()
         };
-        let at_points: Vec<Vec3> = self.points.par_iter().map(difference).collect();
-        let mut sum = vec![Vec3::ZERO; x.len()];
-        for (taps, difference) in self.points.iter().zip(at_points) {
-            for (lumel, weight) in taps {
-                sum[*lumel as usize] += *weight * difference;
-            }
+        let strengths: Vec<f32> = self.points.iter().map(strength).collect();
+        for _ in 0..ROUNDS {
+            let points = || self.points.iter().zip(&strengths);
+            points().for_each(|(point, strength)| project(&mut x, &yields, point, *strength));
+            points().rev().for_each(|(point, strength)| project(&mut x, &yields, point, *strength));
         }
-        sum
+        for (lumel, value) in self.lumels.iter().zip(x) {
+            light[*lumel as usize] = value;
+        }
     }
+}
 
-    /// The diagonal of M + λ CᵀC.
-    fn diagonal(&self, masses: &[f32]) -> Vec<f32> {
-        let mut diagonal = masses.to_vec();
-        for (lumel, weight) in self.points.iter().flatten() {
-            diagonal[*lumel as usize] += WEIGHT * weight * weight;
-        }
-        diagonal
+/// Brings both sides of a point together.
+fn project(x: &mut [Vec3], yields: &[f32], point: &[(u32, f32); 8], strength: f32) {
+    let apart: Vec3 = point.iter().map(|(lumel, weight)| *weight * x[*lumel as usize]).sum();
+    let step = RELAXED / strength.max(f32::MIN_POSITIVE) * apart;
+    for (lumel, weight) in point {
+        let lumel = *lumel as usize;
+        x[lumel] = (x[lumel] - weight * yields[lumel] * step).max(Vec3::ZERO);
     }
 }
 
@@ -270,16 +232,6 @@ fn sides<'a>(
             (a.0 != b.0).then_some(([a.0, b.0], side))
         })
     })
-}
-
-/// Channel by channel.
-fn dot(a: &[Vec3], b: &[Vec3]) -> Vec3 {
-    a.par_iter().zip(b).map(|(a, b)| *a * *b).sum()
-}
-
-/// 0 where nothing is left to do.
-fn quotient(a: Vec3, b: Vec3) -> Vec3 {
-    Vec3::select(b.cmpgt(Vec3::ZERO), a / b.max(Vec3::splat(f32::MIN_POSITIVE)), Vec3::ZERO)
 }
 
 #[cfg(test)]

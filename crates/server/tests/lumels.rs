@@ -1,0 +1,247 @@
+//! Lumels while a scene is live: stepped by hand, without network.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+
+use glam::Vec3;
+use lumencast_charts::{LaidOut, laid_out, sheets};
+use lumencast_codec::{
+    Catalog, EncodedRegion, Epoch, FrameHead, LayoutResource, LightmapShape, LumelDecoder,
+    Resource, ResourceHash, read_charts,
+};
+use lumencast_gather::path_trace::{CpuPathTracer, Options};
+use lumencast_light::{Layout, Lightmap, SurfaceId, luminance};
+use lumencast_scene::{
+    AnimationId, Edit, LightSpec, LightmapSpec, NodeId, Playback, Scene, Snapshot, Transform,
+};
+use lumencast_server::{Mail, Outlet, Received, SampleRange, Tick, TickOptions};
+use lumencast_solve::{Bake, Effort, GatherOptions, bake};
+
+const PERIOD: f64 = 0.04;
+/// Ticks of a second and more, in which light has followed a change.
+const LONG: usize = 40;
+
+/// Keeps what a tick sends.
+#[derive(Default)]
+struct Kept {
+    catalogs: Vec<Catalog>,
+    /// What has come of resources by the time of each catalog.
+    resources: HashMap<ResourceHash, Resource>,
+    frames: Vec<(u32, EncodedRegion)>,
+}
+
+impl Outlet for Kept {
+    fn is_watched(&self, _: u32, _: u32) -> bool {
+        true
+    }
+
+    fn resources(&mut self, resources: Vec<Resource>) {
+        self.resources = resources.into_iter().map(|r| (r.hash(), r)).collect();
+    }
+
+    fn catalog(&mut self, catalog: &Catalog) {
+        self.catalogs.push(Catalog::decode(&catalog.encode()).expect("a catalog"));
+    }
+
+    fn state(&mut self, _: Vec<u8>, _: bool) {}
+
+    fn light(&mut self, field: u32, frame: EncodedRegion) {
+        self.frames.push((field, frame));
+    }
+}
+
+struct Stepped {
+    tick: Tick,
+    kept: Kept,
+    now: f64,
+}
+
+impl Stepped {
+    /// A cornell that stands still, with a small page.
+    fn new() -> Self {
+        let mut scene = Scene::builtin("cornell").expect("a built-in scene");
+        let options = TickOptions {
+            samples: SampleRange::fixed(4),
+            lightmap: Some(lumels(&scene.snapshot())),
+            lumel_samples: Some(8192),
+            ..TickOptions::default()
+        };
+        let tracer = CpuPathTracer::new(Options::default()).expect("threads");
+        let tick = Tick::new(scene, Box::new(tracer), options, Epoch(7)).expect("a tick");
+        let mut stepped = Self { tick, kept: Kept::default(), now: 0.0 };
+        let playback = Playback { playing: Some(false), ..Playback::default() };
+        stepped.edit(1, Edit::SetAnimation { animation: AnimationId(0), playback });
+        stepped
+    }
+
+    fn step(&mut self, mail: Mail) {
+        self.tick.step(self.now, mail, &mut self.kept);
+        self.now += PERIOD;
+    }
+
+    fn steps(&mut self, n: usize) {
+        (0..n).for_each(|_| self.step(Mail::default()));
+    }
+
+    fn edit(&mut self, seq: u64, edit: Edit) {
+        let received = Received { client: "a".into(), seq, edit, temporary: false };
+        let acks = BTreeMap::from([("a".into(), seq)]);
+        self.step(Mail { edits: vec![received], acks, ..Mail::default() });
+    }
+
+    fn node(&self, name: &str) -> NodeId {
+        self.tick.scene().nodes().find(|node| node.name == name).expect(name).id
+    }
+
+    fn lightmap(&self) -> &Lightmap {
+        self.tick.light().lightmaps().next().expect("lumels")
+    }
+
+    /// The shape that the catalog has now.
+    fn shape(&self) -> LightmapShape {
+        let catalog = self.tick.catalog();
+        let shape = catalog.fields.iter().find_map(|field| field.shape.as_lightmap());
+        shape.expect("a lightmap").clone()
+    }
+}
+
+fn lumels(scene: &Snapshot) -> LaidOut {
+    let sheets = sheets(scene, None, &|_| true).expect("charts").sheets;
+    laid_out(&sheets, LightmapSpec::Size(96)).expect("a layout")
+}
+
+/// The same light, computed once.
+fn converged(scene: &Arc<Snapshot>) -> Lightmap {
+    let lightmap = lumels(scene);
+    let effort = Effort::of_samples(512);
+    let (lightmap, options) = (Some(&lightmap), GatherOptions::default());
+    let wanted = Bake { scene, volumes: &[], lightmap, effort, options };
+    let mut tracer = CpuPathTracer::new(Options::default()).expect("threads");
+    let baked = bake(wanted, &mut tracer, |_| ()).expect("light");
+    baked.fields[0].as_lightmap().expect("lumels").clone()
+}
+
+/// Root of the mean square by which lumels differ, over the mean; of those that charts cover.
+fn difference(lightmap: &Lightmap, right: &Lightmap) -> f32 {
+    let (mut squares, mut sum, mut count) = (0.0, 0.0, 0.0);
+    for surface in right.layout.surfaces() {
+        for lumel in lumencast_charts::lumels(&surface.charts) {
+            let rectangle = surface.rectangles[lumel.rectangle as usize];
+            let index = right.layout.index(rectangle.page, rectangle.corner + lumel.at);
+            let of = |lightmap: &Lightmap| luminance(lightmap.irradiance[index]);
+            squares += (of(lightmap) - of(right)).powi(2);
+            sum += of(right);
+            count += 1.0;
+        }
+    }
+    (squares / count as f32).sqrt() / (sum / count as f32)
+}
+
+fn dim(node: NodeId, intensity: f32) -> Edit {
+    Edit::SetLight { node, light: LightSpec { intensity: Some(intensity), ..LightSpec::default() } }
+}
+
+fn moved(node: NodeId, x: f32) -> Edit {
+    let transform =
+        Transform { translation: Some(Vec3::new(x, 0.6, -0.3)), ..Transform::default() };
+    Edit::MoveNode { node, transform }
+}
+
+#[test]
+fn lumels_come_near_to_converged_light_and_follow_a_change() {
+    let mut stepped = Stepped::new();
+    let mut scene = Scene::builtin("cornell").expect("a built-in scene");
+    let right = converged(&scene.snapshot());
+    stepped.steps(4);
+    let coarse = difference(stepped.lightmap(), &right);
+    assert!(coarse < 0.5, "a coarse picture: {coarse}");
+    stepped.steps(2 * LONG);
+    let fine = difference(stepped.lightmap(), &right);
+    assert!(fine < 0.12 && fine < coarse, "{fine}, and at first {coarse}");
+
+    let lamp = stepped.node("lamp");
+    scene.apply(&dim(lamp, 40.0)).expect("an edit");
+    let right = converged(&scene.snapshot());
+    assert!(difference(stepped.lightmap(), &right) > 0.5, "the lamp is brighter");
+    stepped.edit(2, dim(lamp, 40.0));
+    stepped.steps(LONG);
+    let followed = difference(stepped.lightmap(), &right);
+    assert!(followed < 0.25, "{followed}");
+    stepped.steps(2 * LONG);
+    let followed = difference(stepped.lightmap(), &right);
+    assert!(followed < 0.12, "{followed}");
+}
+
+/// What is sent is what there is: layouts by their hash, before the catalog that names them, and light.
+#[test]
+fn frames_and_resources_are_what_clients_need() {
+    let mut stepped = Stepped::new();
+    stepped.steps(10);
+    let shape = stepped.shape();
+    let resources: HashMap<ResourceHash, Resource> =
+        stepped.tick.resources().into_iter().map(|r| (r.hash(), r)).collect();
+    assert_eq!(read(&shape.layout, &resources), *stepped.lightmap().layout);
+
+    let id = stepped.lightmap().id.0;
+    let mut shown = vec![Vec3::ZERO; shape.lumel_count()];
+    for tile in shape.tiles() {
+        let mut decoder = LumelDecoder::new(tile.size);
+        let of_tile =
+            stepped.kept.frames.iter().filter(|(f, frame)| (*f, frame.region) == (id, tile.id));
+        for (_, frame) in of_tile {
+            assert_eq!(frame.layer, 0);
+            let light = decoder.decode(&frame.bytes).expect("light");
+            for (row, light) in
+                tile.rows(shape.page_size).zip(light.irradiance.chunks(tile.size.x as usize))
+            {
+                shown[row].copy_from_slice(light);
+            }
+        }
+    }
+    let off = shown.iter().zip(&stepped.lightmap().irradiance);
+    let off = off.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+    let most = stepped.lightmap().irradiance.iter().map(|e| e.max_element()).fold(0.0, f32::max);
+    assert!(most > 0.0 && off < 1e-3 * most, "{off} of {most}");
+}
+
+fn read(hash: &ResourceHash, resources: &HashMap<ResourceHash, Resource>) -> Layout {
+    let layout = LayoutResource::read(resources[hash].bytes()).expect("a layout");
+    layout.layout(|charts| read_charts(resources.get(&charts)?.bytes()).ok().map(Arc::new))
+}
+
+/// A box that is moved has no lumels from that tick on, and has them again where it was.
+#[test]
+fn what_moves_loses_its_lumels() {
+    let mut stepped = Stepped::new();
+    stepped.steps(5);
+    let node = stepped.node("tall box");
+    let id = SurfaceId { node: node.0, ..SurfaceId::default() };
+    let has = |layout: &Layout| layout.surface(id).is_some();
+    let before = stepped.shape();
+    assert!(has(&stepped.lightmap().layout));
+    let home = stepped.tick.scene().nodes().find(|n| n.id == node).expect("the box").transform;
+    let updates = |stepped: &Stepped| -> Vec<u64> {
+        let id = stepped.lightmap().id.0;
+        let of_lumels = stepped.kept.frames.iter().filter(|(field, _)| *field == id);
+        of_lumels.map(|(_, f)| FrameHead::read(&f.bytes).expect("a head").info.update).collect()
+    };
+
+    stepped.edit(2, moved(node, 0.2));
+    assert!(!has(&stepped.lightmap().layout), "at once");
+    let shape = stepped.shape();
+    assert_ne!(shape.layout, before.layout);
+    let told = stepped.kept.catalogs.last().expect("a catalog");
+    let told = told.fields.iter().find_map(|field| field.shape.as_lightmap()).expect("lumels");
+    assert_eq!(told, &shape);
+    assert!(!has(&read(&shape.layout, &stepped.kept.resources)));
+    stepped.edit(3, moved(node, 0.3));
+    assert_eq!(stepped.shape(), shape, "it goes on moving");
+    stepped.steps(2);
+    let numbers = updates(&stepped);
+    assert!(numbers.is_sorted(), "updates are numbered on: {numbers:?}");
+    assert!(stepped.kept.frames.iter().any(|(_, frame)| frame.new_group));
+
+    stepped.edit(4, Edit::MoveNode { node, transform: home });
+    assert_eq!(stepped.shape(), before);
+    assert!(has(&stepped.lightmap().layout));
+}
