@@ -114,3 +114,37 @@ fn a_port_in_use_is_named() {
     run(&["serve", "cornell", "--listen", &address.to_string()])
         .failed_saying(&[&address.port().to_string(), "another program uses"]);
 }
+
+/// Lumels of a server: their layouts are had by hash, and clients see their light.
+#[test]
+fn lumels_are_cast_to_native_clients() {
+    let folder = Folder::new("live-lumels");
+    let [pages, picture] = ["pages", "a.exr"].map(|name| folder.0.join(name));
+    std::fs::create_dir(&pages).expect("a folder");
+    let text = |path: &std::path::Path| path.to_str().expect("text").to_owned();
+    let few = ["--volume", "2x2x2", "--lightmap", "64", "--fields", "lightmap,volume"];
+    let server = Serving::start("cornell", &few);
+    let url = server.url();
+    server.wait_for_metric("lumencast_ticks_total", |n| n > 20.0);
+
+    let report = run(&["inspect", &url, "--pages", &text(&pages), "--json"]);
+    assert_eq!(report.code, Some(0), "{report:?}");
+    let field = &report.json()["fields"][1];
+    assert_eq!((&field["kind"], &field["pages"]), (&"lightmap".into(), &1.into()));
+    assert!(field["lightmap"]["surfaces"].as_u64() >= Some(3), "{field}");
+    assert!(field["lightmap"]["illuminance"]["mean"].as_f64() > Some(0.1), "{field}");
+    assert!(pages.join("field1-page0.exr").is_file());
+
+    let hash = field["layout"].as_str().expect("a hash");
+    let layout = server.get(&format!("/resources/{hash}"));
+    assert_eq!(layout.status, 200);
+    assert!(layout.head.contains("immutable"), "{}", layout.head);
+    for other in [&hash.replace(char::is_numeric, "0"), "nothing", "..%2f..%2fetc%2fpasswd"] {
+        assert_eq!(server.get(&format!("/resources/{other}")).status, 404, "{other}");
+    }
+
+    let how = ["--lighting", "indirect", "--size", "32x24", "--exposure", "1", "--light", &url];
+    let drawn = run(&[&["render", "cornell", "-o", &text(&picture), "--json"], &how[..]].concat());
+    assert_eq!(drawn.code, Some(0), "{drawn:?}");
+    assert_eq!(drawn.json()["pages"], 1);
+}
