@@ -95,8 +95,6 @@ pub struct Tick {
     options: TickOptions,
     budget: Budget,
     lumel_pace: LumelPace,
-    /// The version of the scene that lumels follow.
-    followed: Option<u64>,
     epoch: Epoch,
     number: u64,
     /// The scales that clients know from the catalog.
@@ -155,7 +153,6 @@ impl Tick {
             options,
             budget,
             lumel_pace,
-            followed: None,
             epoch,
             number: 0,
             told_scales,
@@ -325,9 +322,6 @@ impl Tick {
 
     /// Lets lumels of what has moved go.
     fn follow(&mut self, scene: &Snapshot, outlet: &mut dyn Outlet) {
-        if self.followed.replace(scene.version) == Some(scene.version) {
-            return;
-        }
         let others = self.solver.follow(scene);
         for id in &others {
             let field = self.solver.light().field(*id);

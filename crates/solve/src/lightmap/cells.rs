@@ -6,7 +6,7 @@
 //! Both go block by block, so that little has to be solved anew, and blocks far from each other follow
 //! one another.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet, VecDeque};
 use std::ops::Range;
 
 use glam::{UVec2, Vec3};
@@ -25,6 +25,8 @@ const GLANCE: u32 = 4;
 /// Samples of a lumel in a glance, and in a turn.
 const GLANCE_SAMPLES: u32 = 16;
 const TURN_SAMPLES: u32 = 8;
+/// The same in a turn that was hurried.
+const HURRIED_SAMPLES: u32 = 32;
 
 /// A square of lumels that are gathered at together.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,6 +79,8 @@ pub(crate) struct Cells {
     cells: Vec<Cell>,
     next_glance: usize,
     next_turn: usize,
+    /// Cells whose turn comes before all others.
+    hurried: VecDeque<usize>,
     /// Glances that come before all turns.
     first: usize,
 }
@@ -109,10 +113,24 @@ impl Cells {
         self.first = self.cells.len();
     }
 
+    /// Lets the cells of these receivers have their turn next.
+    pub(crate) fn hurry(&mut self, receivers: impl Iterator<Item = u32>) {
+        let cells: BTreeSet<usize> = receivers.map(|receiver| self.cell_of(receiver)).collect();
+        self.hurried.extend(cells);
+    }
+
     /// What to gather next, about so many samples in all.
     pub(crate) fn budgets(&mut self, samples: u64, version: u64) -> Vec<Budget> {
         let mut budgets = Vec::new();
         let (mut glances, mut turns) = (0, 0);
+        while turns < samples
+            && let Some(cell) = self.hurried.pop_front()
+        {
+            let each = HURRIED_SAMPLES;
+            let receivers = self.cells[cell].receivers.clone();
+            turns += receivers.len() as u64 * u64::from(each);
+            budgets.extend(receivers.map(|receiver| Budget { receiver, samples: each }));
+        }
         while glances + turns < samples && !self.cells.is_empty() {
             let is_first = self.first > 0;
             self.first = self.first.saturating_sub(1);

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 use glam::{Affine3A, UVec2, Vec3};
-use lumencast_charts::LaidOut;
+use lumencast_charts::{LaidOut, lumels};
 use lumencast_gather::{Budget, Gathered, Job, Receiver};
 use lumencast_light::{Field, FieldId, Layout, Light, Lightmap, Surface};
 use lumencast_scene::Snapshot;
@@ -31,6 +31,21 @@ use sums::{Sum, have_changed};
 
 /// What a lumel has in place of a receiver where no surface covers it.
 const NO_RECEIVER: u32 = u32::MAX;
+
+/// What has moved gets lumels again once it has rested for so many seconds of scene time.
+const REST: f64 = 2.0;
+
+/// An instance, by its node and its number there.
+type InstanceId = (u32, u32);
+
+/// An instance that has moved.
+#[derive(Clone, Copy, Debug)]
+struct Moved {
+    /// Where it is; nothing where it is gone, or no longer still.
+    at: Option<Affine3A>,
+    /// Scene time since when, seconds.
+    since: f64,
+}
 
 /// What makes light of lumels' sums.
 #[derive(Clone, Debug)]
@@ -52,10 +67,12 @@ pub struct LightmapSolver {
     beside: Arc<BTreeMap<Block, Vec<Block>>>,
     /// Where all surfaces lie, those of instances that have moved too.
     layout: Arc<Layout>,
-    /// The instances, by node and copy, and where they were when their lumels were placed.
-    placed: Arc<HashMap<(u32, u32), Affine3A>>,
-    /// Those that are elsewhere now.
-    moved: BTreeSet<(u32, u32)>,
+    /// The instances, and where they were when their lumels were placed.
+    placed: HashMap<InstanceId, Affine3A>,
+    /// Those that are elsewhere now, or have lumels that wait for light.
+    moved: BTreeMap<InstanceId, Moved>,
+    /// The version of the scene that was followed last.
+    followed: Option<u64>,
     lightmap: Lightmap,
 }
 
@@ -80,8 +97,9 @@ impl LightmapSolver {
             seams: Arc::new(Seams::new(scene, &layout)),
             news: BTreeSet::new(),
             beside: Arc::new(empty_beside(&places, layout.page_size)),
-            placed: Arc::new(placed(scene, &layout)),
-            moved: BTreeSet::new(),
+            placed: placed(scene, &layout),
+            moved: BTreeMap::new(),
+            followed: None,
             layout: layout.clone(),
             lightmap: Lightmap::dark(id, layout),
         }
@@ -113,27 +131,96 @@ impl LightmapSolver {
         Job::with_budgets(scene, self.receivers.clone(), budgets)
     }
 
-    /// Leaves out of the layout what has moved: its lumels are where it was. What is back where it was has
-    /// them again. Whether that is another layout.
+    /// Leaves out of the layout what has moved: its lumels are where it was. What is back where it was,
+    /// or has rested where it is until its lumels there were gathered at, has them again. Whether that is
+    /// another layout.
     pub fn follow(&mut self, scene: &Snapshot) -> bool {
-        let now: HashMap<(u32, u32), Affine3A> = scene
+        let is_same = self.followed.replace(scene.version) == Some(scene.version);
+        if is_same && self.moved.is_empty() {
+            return false;
+        }
+        let now: HashMap<InstanceId, Affine3A> = scene
             .instances
             .iter()
             .filter(|instance| instance.still)
             .map(|instance| ((instance.node.0, instance.copy), instance.world_from_object))
             .collect();
-        let is_elsewhere = |(id, place): &(&(u32, u32), &Affine3A)| now.get(id) != Some(place);
-        let moved: BTreeSet<(u32, u32)> =
-            self.placed.iter().filter(is_elsewhere).map(|(id, _)| *id).collect();
-        if moved == self.moved {
-            return false;
+        let ids: Vec<InstanceId> = self.placed.keys().copied().collect();
+        let mut is_other = false;
+        for id in ids {
+            is_other |= self.follow_instance(id, now.get(&id).copied(), scene);
         }
+        if is_other {
+            let Layout { page_size, pages, .. } = *self.layout;
+            let is_there = |surface: &&Surface| !self.moved.contains_key(&instance_of(surface));
+            let surfaces = self.layout.surfaces().iter().filter(is_there).cloned().collect();
+            self.lightmap.layout = Arc::new(Layout::new(page_size, pages, surfaces));
+        }
+        is_other
+    }
+
+    /// Whether an instance that is at a place now, or gone, has lumels otherwise than before.
+    fn follow_instance(&mut self, id: InstanceId, at: Option<Affine3A>, scene: &Snapshot) -> bool {
+        let is_home = at == self.placed.get(&id).copied();
+        let Some(moved) = self.moved.get_mut(&id) else {
+            if !is_home {
+                self.moved.insert(id, Moved { at, since: scene.time });
+            }
+            return !is_home;
+        };
+        let comes = moved.at != at;
+        if comes {
+            *moved = Moved { at, since: scene.time };
+        }
+        let rests = scene.time - moved.since >= REST;
+        if comes && is_home {
+            self.hurry(id);
+        }
+        if is_home {
+            let is_known = self.receivers_of(id).all(|r| self.sums[r as usize].is_settled());
+            if is_known {
+                self.moved.remove(&id);
+            }
+            return is_known;
+        }
+        if let Some(at) = at.filter(|_| rests) {
+            self.placed.insert(id, at);
+            self.place_anew(id, scene);
+        }
+        false
+    }
+
+    /// Puts the lumels of an instance to where it is now.
+    fn place_anew(&mut self, id: InstanceId, scene: &Snapshot) {
+        let own = self.layout.surfaces().iter().filter(|surface| instance_of(surface) == id);
         let Layout { page_size, pages, .. } = *self.layout;
-        let is_there = |surface: &&Surface| !moved.contains(&(surface.id.node, surface.id.copy));
-        let surfaces = self.layout.surfaces().iter().filter(is_there).cloned().collect();
-        self.lightmap.layout = Arc::new(Layout::new(page_size, pages, surfaces));
-        self.moved = moved;
-        true
+        let places = lumel_places(scene, &Layout::new(page_size, pages, own.cloned().collect()));
+        let mut receivers = self.receivers.to_vec();
+        for LumelPlace { lumel, position, normal } in places {
+            let receiver = self.receiver_of[lumel as usize] as usize;
+            receivers[receiver] = Receiver::point(position, normal);
+            self.sums[receiver] = Sum::default();
+        }
+        self.receivers = receivers.into();
+        self.hurry(id);
+    }
+
+    /// Lets an instance's lumels be gathered at before all others.
+    fn hurry(&mut self, id: InstanceId) {
+        let own: Vec<u32> = self.receivers_of(id).collect();
+        self.cells.hurry(own.into_iter());
+    }
+
+    /// The receivers of an instance's lumels.
+    fn receivers_of(&self, id: InstanceId) -> impl Iterator<Item = u32> + '_ {
+        let own = self.layout.surfaces().iter().filter(move |surface| instance_of(surface) == id);
+        own.flat_map(|surface| {
+            lumels(&surface.charts).into_iter().map(|lumel| {
+                let rectangle = surface.rectangles[lumel.rectangle as usize];
+                let index = self.layout.index(rectangle.page, rectangle.corner + lumel.at);
+                self.receiver_of[index]
+            })
+        })
     }
 
     /// The scene was edited: light may be another from now on.
@@ -243,10 +330,13 @@ impl LightmapSolver {
     }
 }
 
+fn instance_of(surface: &Surface) -> InstanceId {
+    (surface.id.node, surface.id.copy)
+}
+
 /// Where the instances stand whose surfaces have lumels.
-fn placed(scene: &Snapshot, layout: &Layout) -> HashMap<(u32, u32), Affine3A> {
-    let with_lumels: BTreeSet<(u32, u32)> =
-        layout.surfaces().iter().map(|surface| (surface.id.node, surface.id.copy)).collect();
+fn placed(scene: &Snapshot, layout: &Layout) -> HashMap<InstanceId, Affine3A> {
+    let with_lumels: BTreeSet<InstanceId> = layout.surfaces().iter().map(instance_of).collect();
     let all = scene.instances.iter().map(|i| ((i.node.0, i.copy), i.world_from_object));
     all.filter(|(id, _)| with_lumels.contains(id)).collect()
 }

@@ -7,6 +7,8 @@ use lumencast_light::luminance;
 /// Share of backs, by winding, above which a lumel lies within something: its light is that of the
 /// lumels about it.
 const BURIED_ABOVE: f32 = 0.5;
+/// Samples of a lumel from which on its light is shown.
+const SETTLED: f32 = 24.0;
 /// By how much the squares of noise scatter more than those of a normal distribution do.
 const TAILS: f32 = 1.5;
 
@@ -46,6 +48,11 @@ impl Sum {
         self.squares += new.squares;
         self.backs += new.backs;
         self.samples += new.samples;
+    }
+
+    /// Whether enough has arrived for light to be shown.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.samples >= SETTLED
     }
 
     pub(crate) fn is_buried(&self) -> bool {

@@ -229,6 +229,7 @@ impl BenchScenes {
                 samples: SampleRange::fixed(samples),
                 gather: served.gathered(BOUNCES - 1, f32::INFINITY, BlendSettings::default()),
                 volumes: wanted.volumes.clone(),
+                lightmap: wanted.lightmap.clone(),
                 ..TickOptions::default()
             };
             let live = live::light(subject.scene, gatherer, options, seconds.into())?;
