@@ -13,7 +13,7 @@ use crate::volume::VolumeSolver;
 /// A field, by its kind.
 #[derive(Clone)]
 pub(crate) enum FieldSolver {
-    Volume(Box<VolumeSolver>),
+    Volume(VolumeSolver),
     Lightmap(LightmapSolver),
 }
 
@@ -110,11 +110,5 @@ impl FieldSolver {
             Self::Volume(volume) => volume.expect_change(),
             Self::Lightmap(lightmap) => lightmap.expect_change(),
         }
-    }
-}
-
-impl From<VolumeSolver> for FieldSolver {
-    fn from(volume: VolumeSolver) -> Self {
-        Self::Volume(Box::new(volume))
     }
 }

@@ -63,8 +63,9 @@ impl Solver {
         for spec in volumes.iter().flat_map(|spec| spec.split()) {
             let is_same = |field: &FieldSolver| field.as_volume().is_some_and(|v| v.spec() == spec);
             let same = before.iter().position(is_same).map(|at| before.remove(at));
-            let field = same
-                .unwrap_or_else(|| VolumeSolver::new(self.next_id(), spec, &self.options).into());
+            let field = same.unwrap_or_else(|| {
+                FieldSolver::Volume(VolumeSolver::new(self.next_id(), spec, &self.options))
+            });
             self.fields.push(field);
         }
         before.retain(|field| field.as_volume().is_none());
