@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
-use lumencast_codec::{Catalog, DecodeError, LightFile};
+use lumencast_codec::{Catalog, DecodeError, FieldInfo, LightFile};
 use lumencast_gather::Gather;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::Field;
@@ -63,7 +63,10 @@ pub(crate) fn check_fits(what: &str, catalog: &Catalog, scene: &Scene) {
     }
     let bounds = scene.bounds();
     let (middle, reach) = (0.5 * (bounds.min + bounds.max), 0.5 * bounds.min.distance(bounds.max));
-    if !catalog.fields.iter().any(|field| field.shape.distance_from_all(middle) <= reach) {
+    // Where lumels are, the scene itself says.
+    let mut volumes = catalog.fields.iter().filter(|field| field.shape.as_volume().is_some());
+    let is_elsewhere = |field: &FieldInfo| field.shape.distance_from_all(middle) > reach;
+    if volumes.clone().next().is_some() && volumes.all(is_elsewhere) {
         tell!("warning: {what} lights no part of this scene; is it another scene's?");
     }
 }

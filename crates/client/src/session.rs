@@ -1,6 +1,6 @@
 //! The session: a connection, what is read over it, and the cache that it is read into.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -16,13 +16,15 @@ use tokio::task::{AbortHandle, JoinSet};
 
 use crate::error::ClientError;
 use crate::plan::plan;
-use crate::resources::read_resources;
+use crate::resources::fetch;
 use crate::statistics::{Meter, Statistics};
 
 /// State frames count for so long: every one of them tells something.
 const STATE_AGE: Duration = Duration::from_secs(5);
 /// Between two looks at where the eye is.
 const LOOK: Duration = Duration::from_millis(250);
+/// From one try to fetch a resource to the next.
+const AGAIN: Duration = Duration::from_secs(1);
 /// How long a catalog may take after the connection.
 const CATALOG_WAIT: Duration = Duration::from_secs(5);
 
@@ -43,7 +45,7 @@ pub struct Session {
 }
 
 /// What the session and its tasks share.
-pub(crate) struct Shared {
+struct Shared {
     began: Instant,
     known: Mutex<Known>,
     /// Changes when another catalog has come.
@@ -71,18 +73,8 @@ impl Shared {
         at.saturating_duration_since(self.began).as_secs_f64()
     }
 
-    /// Tells when anything has come.
-    pub(crate) fn subscribe(&self) -> watch::Receiver<()> {
-        self.news.subscribe()
-    }
-
-    /// Names of resources that are to be fetched.
-    pub(crate) fn wanted_resources(&self) -> Vec<ResourceHash> {
-        self.lock().cache.wanted_resources()
-    }
-
     /// Takes a resource in.
-    pub(crate) fn add_resource(&self, bytes: &[u8]) {
+    fn add_resource(&self, bytes: &[u8]) {
         let mut known = self.lock();
         known.meter.received += bytes.len() as u64;
         if let Err(error) = known.cache.add_resource(bytes) {
@@ -273,6 +265,31 @@ async fn read_state(client: Arc<Client>, shared: Arc<Shared>) {
         if shared.take(&frame, |cache, now| cache.add_state(&frame.bytes, now).map(|_| ())) {
             let now = shared.seconds(Instant::now());
             shared.lock().meter.ticks.add(1.0, now);
+        }
+    }
+}
+
+/// Fetches what is wanted. What cannot be had is asked for again after a while.
+async fn read_resources(url: String, shared: Arc<Shared>) {
+    let mut news = shared.news.subscribe();
+    let mut failed: HashSet<ResourceHash> = HashSet::new();
+    loop {
+        let wanted = shared.lock().cache.wanted_resources();
+        if let Some(hash) = wanted.into_iter().find(|hash| !failed.contains(hash)) {
+            match fetch(&url, hash).await {
+                Ok(bytes) => shared.add_resource(&bytes),
+                Err(error) => {
+                    tracing::debug!(%hash, %error, "a resource cannot be had");
+                    failed.insert(hash);
+                }
+            }
+        } else if failed.is_empty() {
+            if news.changed().await.is_err() {
+                return;
+            }
+        } else {
+            tokio::time::sleep(AGAIN).await;
+            failed.clear();
         }
     }
 }

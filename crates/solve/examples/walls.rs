@@ -1,5 +1,5 @@
 //! How much light of a lit room leaks into the dark one beside it, by the thickness of the wall between
-//! them: what probes in cells of a metre can tell apart.
+//! them: what probes in cells of a metre can tell apart, and lumels of a decimetre.
 //!
 //! ```sh
 //! cargo run --release -p lumencast-solve --example walls
@@ -9,17 +9,27 @@
 use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
+use lumencast_charts::{laid_out, sheets};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Grid, Light, Offset, Order};
-use lumencast_scene::{LightKind, Material, PunctualLight, Snapshot, VolumeSpec};
+use lumencast_scene::{LightKind, LightmapSpec, Material, PunctualLight, Snapshot, VolumeSpec};
 use lumencast_solve::blend::BlendSettings;
-use lumencast_solve::{Bake, Effort, FitOptions, GatherOptions, bake};
+use lumencast_solve::{Bake, Effort, FitOptions, GatherOptions, bake, spread};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 /// Sides of each of the two rooms, metres.
 const ROOM: Vec3 = Vec3::new(5.0, 3.0, 5.0);
 /// Thicknesses of the wall, metres.
 const WALLS: [f32; 5] = [0.0, 0.02, 0.05, 0.1, 0.2];
+
+/// A side of a lumel, metres.
+const TEXEL: f32 = 0.1;
+const LAMP: PunctualLight = PunctualLight {
+    kind: LightKind::Point { radius: 0.0 },
+    color: Vec3::ONE,
+    intensity: 100.0,
+    range: None,
+};
 
 /// Two rooms side by side along x, the wall about x = 0, a lamp in the left one.
 fn rooms(wall: f32) -> Arc<Snapshot> {
@@ -36,10 +46,36 @@ fn rooms(wall: f32) -> Arc<Snapshot> {
         stage.room(Vec3::NEG_X * middle, ROOM, grey);
         stage.room(Vec3::X * middle, ROOM, grey);
     }
-    let kind = LightKind::Point { radius: 0.0 };
-    let lamp = PunctualLight { kind, color: Vec3::ONE, intensity: 100.0, range: None };
-    stage.light(lamp, Vec3::new(-middle, 0.8, 0.3), Vec3::NEG_Y);
+    stage.light(LAMP, Vec3::new(-middle, 0.8, 0.3), Vec3::NEG_Y);
     stage.snapshot()
+}
+
+/// One room, parted by a wall that stands on its floor; the lamp is in the left half.
+fn parted(wall: f32) -> Arc<Snapshot> {
+    let mut stage = Stage::default();
+    let grey = stage.material(lambert(Vec3::splat(0.6), Vec3::ZERO));
+    stage.room(Vec3::ZERO, ROOM.with_x(2.0 * ROOM.x + wall), grey);
+    stage.room(Vec3::ZERO, -ROOM.with_x(wall), grey);
+    stage.light(LAMP, Vec3::new(-0.5 * (ROOM.x + wall), 0.8, 0.3), Vec3::NEG_Y);
+    stage.snapshot()
+}
+
+/// The light of the dark side's lumels, a share of that of the lit side's: the mean over all surfaces,
+/// and over those farther than two lumels from the wall.
+fn leaked_at_lumels(scene: &Arc<Snapshot>, wall: f32, tracer: &mut CpuPathTracer) -> [f32; 2] {
+    let fronts = sheets(scene, None, &|_| true).expect("charts").sheets;
+    let laid_out = laid_out(&fronts, LightmapSpec::Texel(TEXEL)).expect("a layout");
+    let (effort, options) = (Effort::of_samples(256), GatherOptions::default());
+    let lightmap = Some(&laid_out);
+    let wanted = Bake { scene, volumes: &[], lightmap, effort, options };
+    let light = Light::new(bake(wanted, tracer, |_| ()).expect("light").fields);
+    let places = spread(scene, &laid_out.layout, 20_000);
+    let mean = |side: f32, from: f32| {
+        let of_side = places.iter().filter(|p| side * p.position.x >= 0.5 * wall + from);
+        let read: Vec<f32> = of_side.map(|place| light.irradiance_at(place).y).collect();
+        read.iter().sum::<f32>() / read.len() as f32
+    };
+    [0.0, 2.0 * TEXEL].map(|from| 100.0 * mean(1.0, from) / mean(-1.0, from))
 }
 
 /// The mean irradiance that a field shows on the metre of a room's floor beside the wall.
@@ -53,7 +89,10 @@ fn floor(light: &Light, wall: f32, side: f32) -> f32 {
 
 fn main() {
     let mut tracer = CpuPathTracer::new(Options::default()).expect("threads");
-    println!("| wall, cm | as gathered | fitted |\n| --- | --- | --- |");
+    println!(
+        "| wall, cm | as gathered | fitted | lumels | lumels, one floor | but for two beside it |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- |");
     for wall in WALLS {
         let scene = rooms(wall);
         let size = ROOM.with_x(2.0 * ROOM.x + wall);
@@ -73,6 +112,16 @@ fn main() {
         };
         let gathered = leaked(None, Offset::HALF_CELL, &mut tracer);
         let fitted = leaked(Some(FitOptions { points: 256 }), Offset::Cells(0.125), &mut tracer);
-        println!("| {:.0} | {gathered:.1} % | {fitted:.2} % |", 100.0 * wall);
+        let [lumels, _] = leaked_at_lumels(&scene, wall, &mut tracer);
+        let one_floor = match wall > 0.0 {
+            true => leaked_at_lumels(&parted(wall), wall, &mut tracer)
+                .map(|share| format!("{share:.2} %")),
+            false => ["–"; 2].map(str::to_owned),
+        };
+        let [one_floor, but_two] = one_floor;
+        println!(
+            "| {:.0} | {gathered:.1} % | {fitted:.2} % | {lumels:.2} % | {one_floor} | {but_two} |",
+            100.0 * wall
+        );
     }
 }
