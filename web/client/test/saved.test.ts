@@ -6,7 +6,8 @@ import { afterEach, describe, expect, it, vi } from 'vitest';
 import type { Status } from '../src/api.js';
 import { fetchLight, openLight } from '../src/saved.js';
 import { FakeServer } from './support/fake-server.js';
-import { lightFile } from './support/light-file.js';
+import { lightFile, record } from './support/light-file.js';
+import { join, varint } from './support/probe-encoder.js';
 
 const saved = lightFile(new FakeServer({ brightness: () => 7 }));
 const servers: Server[] = [];
@@ -30,6 +31,15 @@ describe('opened light', () => {
     expect(session.light().age).toBeUndefined();
     expect(session.stats).toMatchObject({ updateRate: 0, bandwidth: 0, pending: 0 });
     expect([fetch.mock.calls.length, vi.getTimerCount()]).toEqual([0, 0]);
+  });
+
+  it('passes over frames and records that it does not know', async () => {
+    const server = new FakeServer({ brightness: () => 7 });
+    // The fake server's field 9 is of a kind that nobody knows.
+    const file = join(lightFile(server), record(1, varint(9), varint(0), [255, 255]), record(200, [1]));
+    const session = openLight(file);
+    await session.ready;
+    expect(session.light().fields.map(({ field }) => field.id)).toEqual([0]);
   });
 
   it('refuses edits, and can be closed', async () => {

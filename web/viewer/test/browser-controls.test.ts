@@ -441,6 +441,9 @@ describe('a page drawn by WebGPU', () => {
       await page.evaluate(() =>
         window.lumencast!.light.edit({ edit: 'set_animation', animation: 0, playing: false }),
       );
+      // What moves goes on until the page has been told where it stands.
+      const still = async () => difference(await look(page, 'direct'), await look(page, 'direct'));
+      await expect.poll(still).toBe(0);
       const [usual, sunny] = [await brightened(1), await brightened(2 ** 20)];
       expect(brightness(usual)).toBeGreaterThan(20);
       expect(difference(usual, sunny)).toBeLessThan(0.2);

@@ -35,13 +35,17 @@ export function readLightFile(bytes: Uint8Array): LightFile {
   const first = record(reader);
   if (first.kind !== KIND.catalog) throw new WireError('malformed', 'a light file without a catalog');
   const catalog = parseCatalog(first.body.rest());
+  const known = new Set(catalog.fields.map((field) => field.id));
   let edits: readonly Edit[] = [];
   const files = new Map<string, Uint8Array>();
   const frames = [];
   while (reader.left > 0) {
     const { kind, body } = record(reader);
-    if (kind === KIND.keyframe) frames.push(keyframe(body));
-    else if (kind === KIND.edits) edits = readEdits(body.rest());
+    if (kind === KIND.keyframe) {
+      // A frame of a kind that is not known is built in a way that is not known.
+      const [field, region] = [body.varint(), body.varint()];
+      if (known.has(field)) frames.push({ field, region, frame: keyframe(body.rest()) });
+    } else if (kind === KIND.edits) edits = readEdits(body.rest());
     else if (kind === KIND.file) files.set(name(body.take(body.varint())), body.rest());
   }
   return { catalog, edits, files, frames };
@@ -52,13 +56,11 @@ function record(reader: Reader): { kind: number; body: Reader } {
   return { kind: body.varint(), body };
 }
 
-function keyframe(body: Reader): LightFile['frames'][number] {
-  const [field, region] = [body.varint(), body.varint()];
-  const frame = body.rest();
+function keyframe(frame: Uint8Array): Uint8Array {
   if (splitProbeFrame(frame).header.base !== undefined) {
     throw new WireError('malformed', 'a delta in a light file');
   }
-  return { field, region, frame };
+  return frame;
 }
 
 function readEdits(bytes: Uint8Array): readonly Edit[] {
