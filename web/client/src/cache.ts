@@ -1,6 +1,7 @@
 import type { AcceptedEdit, FieldLight, LightNews, LightState, RefusedEdit, SavedScene } from './api.js';
 import { ServerClock } from './cache/clock.js';
-import { createFieldCache, type FieldCache, type Received } from './cache/field.js';
+import type { FieldCache, Received } from './cache/field.js';
+import { createFieldCache } from './cache/kinds.js';
 import { type PendingEdit, PendingEdits } from './cache/pending.js';
 import {
   type Catalog,
@@ -77,7 +78,7 @@ export class Cache {
     return events;
   }
 
-  /** Takes in a frame of the catalog track. Returns whether it tells more than the fields' scales. */
+  /** Takes in a frame of the catalog track. Returns whether it tells more than scales and layouts. */
   addCatalog(bytes: Uint8Array, _now: number): boolean {
     const catalog = parseCatalog(bytes);
     if (this.saved || !this.current || !offersSame(this.current, catalog)) {

@@ -21,13 +21,24 @@ export {
   type FieldInfo,
   type FieldKind,
   hasSameShape,
+  isLightmap,
   isVolume,
   parseCatalog,
   type Shapes,
   type UnknownField,
   WIRE_VERSION,
 } from './codec/catalog.js';
+export type { Charts } from './codec/charts.js';
 export { type LightFile, readLightFile } from './codec/file.js';
+export type { LightmapLayout, LightmapSurface, Rectangle } from './codec/layout.js';
+export {
+  type Coding,
+  type LightmapShape,
+  lumelCount,
+  type Tile,
+  tileCount,
+  tileOf,
+} from './codec/lightmap-shape.js';
 export type { LightHead, ProbeHeader } from './codec/probe-header.js';
 export { ProbeDecoder, type RegionLight } from './codec/probes.js';
 export { parseState, type StateFrame } from './codec/state.js';

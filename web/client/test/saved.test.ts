@@ -8,6 +8,7 @@ import { fetchLight, openLight } from '../src/saved.js';
 import { FakeServer } from './support/fake-server.js';
 import { lightFile, record } from './support/light-file.js';
 import { join, varint } from './support/probe-encoder.js';
+import { volumeOf } from './support/volumes.js';
 
 const saved = lightFile(new FakeServer({ brightness: () => 7 }));
 const servers: Server[] = [];
@@ -27,7 +28,7 @@ describe('opened light', () => {
     await session.ready;
     expect(session.status).toEqual({ state: 'saved' });
     expect([session.scene, session.files]).toEqual(['test', 'https://host/shop/']);
-    expect(session.light().fields[0].coefficients[0]).toBeCloseTo(7, 1);
+    expect(volumeOf(session.light()).coefficients[0]).toBeCloseTo(7, 1);
     expect(session.light().age).toBeUndefined();
     expect(session.stats).toMatchObject({ updateRate: 0, bandwidth: 0, pending: 0 });
     expect([fetch.mock.calls.length, vi.getTimerCount()]).toEqual([0, 0]);

@@ -1,8 +1,7 @@
-/** The light of one field: what the cache asks of any kind, and a table of the kinds. */
+/** The light of one field: what the cache asks of any kind. */
 import type { FieldLight } from '../api.js';
-import type { FieldInfo, FieldKind } from '../codec/catalog.js';
+import type { FieldInfo } from '../codec/catalog.js';
 import type { LightHead } from '../codec/probe-header.js';
-import { VolumeCache } from './volume.js';
 
 /** A frame that came. */
 export interface Arrival {
@@ -41,15 +40,4 @@ export interface FieldCache {
   span(): { readonly oldest: Arrival; readonly newest: Arrival } | undefined;
   /** The light at `now`; `undefined` when no region has any. `ageOf` tells the age of a tick's light. */
   light(now: number, ageOf: (tick: number, arrived: number) => number | undefined): FieldLight | undefined;
-}
-
-const CACHES: {
-  readonly [K in FieldKind]: (field: FieldInfo<K>, onLight: OnLight) => FieldCache;
-} = {
-  volume: (field, onLight) => new VolumeCache(field, onLight),
-};
-
-/** A cache of a field's kind, without light. */
-export function createFieldCache<K extends FieldKind>(field: FieldInfo<K>, onLight: OnLight): FieldCache {
-  return CACHES[field.kind](field, onLight);
 }

@@ -1,6 +1,6 @@
 import type { Edit } from '../edit.js';
 import { WireError } from '../wire-error.js';
-import { type Catalog, parseCatalog } from './catalog.js';
+import { type Catalog, isVolume, parseCatalog } from './catalog.js';
 import { parseEdit } from './edits.js';
 import { list, parseObject } from './json.js';
 import { LIMITS } from './limits.js';
@@ -35,7 +35,7 @@ export function readLightFile(bytes: Uint8Array): LightFile {
   const first = record(reader);
   if (first.kind !== KIND.catalog) throw new WireError('malformed', 'a light file without a catalog');
   const catalog = parseCatalog(first.body.rest());
-  const known = new Set(catalog.fields.map((field) => field.id));
+  const known = new Set(catalog.fields.filter(isVolume).map((field) => field.id));
   let edits: readonly Edit[] = [];
   const files = new Map<string, Uint8Array>();
   const frames = [];
