@@ -39,7 +39,8 @@ export {
   tileCount,
   tileOf,
 } from './codec/lightmap-shape.js';
-export type { LightHead, ProbeHeader } from './codec/probe-header.js';
+export type { FrameHead, LightHead } from './codec/frame-head.js';
+export type { ProbeHeader } from './codec/probe-header.js';
 export { ProbeDecoder, type RegionLight } from './codec/probes.js';
 export { parseState, type StateFrame } from './codec/state.js';
 export {

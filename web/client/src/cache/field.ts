@@ -1,7 +1,7 @@
 /** The light of one field: what the cache asks of any kind. */
 import type { FieldLight } from '../api.js';
 import type { FieldInfo } from '../codec/catalog.js';
-import type { LightHead } from '../codec/probe-header.js';
+import type { LightHead } from '../codec/frame-head.js';
 
 /** A frame that came. */
 export interface Arrival {

@@ -11,6 +11,9 @@ export const LIMITS = {
   tileLumels: 256,
   lumelsPerField: 8 << 20,
   lumelsPerCatalog: 8 << 20,
+  resourceBytes: 64 << 20,
+  /** Of all that a client keeps. */
+  resourceBytesInAll: 256 << 20,
   sourceBytes: 128,
   nameBytes: 64,
   snapshotEdits: 65_536,
