@@ -9,7 +9,7 @@ import {
 import type { Paint, PlanesPaint, Stroke } from './platform.js';
 
 /** How dark every other lumel of a checkerboard is. */
-export const DARK = 0.3;
+export const DARK = 0.1;
 
 /** A material for each kind of paint. */
 export type PaintMaterials = Readonly<Record<Paint['kind'], Material>>;

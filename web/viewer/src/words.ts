@@ -65,3 +65,26 @@ export function missingFile(what: string, address: string, answer: string, cause
     answer === '404' ? `${what} is missing: ${address}` : `${what} does not come (${answer}): ${address}`;
   return new Failure(message, 'Is its name right, and is it where this address says?', { cause });
 }
+
+/** A lightmap that a server casts, and what of it this page shows. */
+export interface ShownLumels {
+  readonly pages: number;
+  readonly pageSize: number;
+  readonly coding: string;
+  /** Meshes that are lit by it. */
+  readonly meshes: number;
+}
+
+/** What there is of lumels; where none are shown, why, as far as the browser and the page are to blame. */
+export function lumelWords(
+  { pages, pageSize, coding, meshes }: ShownLumels,
+  { webCodecs, secureContext }: { webCodecs: boolean; secureContext: boolean },
+): string {
+  if (coding !== 'halves' && !webCodecs) {
+    return secureContext
+      ? 'They travel as video, which this browser does not decode for pages: probes light all.'
+      : 'They travel as video, which browsers decode only for secure pages: probes light all. Open the page by https or as localhost.';
+  }
+  const on = `${pages === 1 ? 'one page' : `${pages} pages`} of ${pageSize} × ${pageSize}`;
+  return `On ${on}; they light ${meshes === 1 ? 'one mesh' : `${meshes} meshes`}.`;
+}
