@@ -22,6 +22,14 @@ const CODINGS = ['halves', 'h264', 'h264_stacked'] as const;
 
 export type Coding = (typeof CODINGS)[number];
 
+/** Those of which each region is a video. */
+export type VideoCoding = Exclude<Coding, 'halves'>;
+
+/** Whether a lightmap travels as video. */
+export function isVideo(coding: Coding): coding is VideoCoding {
+  return coding !== 'halves';
+}
+
 /** A part of a page that is coded and sent as one frame: a region of a lightmap. */
 export interface Tile {
   readonly page: number;
@@ -54,7 +62,7 @@ export function tileOf(shape: LightmapShape, region: number): Tile | undefined {
 
 /** Lumels along a side of tiles; those at a page's right and lower edge may be smaller. */
 function tileSide({ coding, pageSize }: LightmapShape): number {
-  return coding === 'halves' ? LIMITS.tileLumels : pageSize;
+  return isVideo(coding) ? pageSize : LIMITS.tileLumels;
 }
 
 function tilesAlongSide(shape: LightmapShape): number {
