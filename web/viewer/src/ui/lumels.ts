@@ -29,15 +29,15 @@ export class LumelsPanel {
     const { light } = actions;
     this.#still = slider('Static', STRENGTHS, percent, (value) => void (light.strengths.static = value));
     this.#moving = slider('Dynamic', STRENGTHS, percent, (value) => void (light.strengths.dynamic = value));
-    this.#still.element.title = 'Indirect light on what stands still, from lumels';
-    this.#moving.element.title = 'Indirect light on what moves, from probes';
+    this.#still.element.title = 'Strength of light from lumels, on what stands still';
+    this.#moving.element.title = 'Strength of light from probes, on what moves';
     const labels = LOOKS.map(([, label]) => label);
     this.#look = choice('Show', labels, (index) => (light.look = LOOKS[index][0]));
     const title = 'Show the pages that lumels lie on';
     this.#pages = h('button', { type: 'button', title, onclick: () => actions.pages() }, 'Pages');
     this.element = h(
       'aside',
-      { class: 'panel inspector lumels', 'aria-label': 'Lumels', hidden: true },
+      { class: 'panel lumels', 'aria-label': 'Lumels', hidden: true },
       h(
         'header',
         {},
