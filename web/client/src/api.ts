@@ -261,7 +261,7 @@ export interface Timing {
   readonly clock: number | undefined;
   /** `performance.timeOrigin + performance.now()` in milliseconds when the frame was handed over. */
   readonly arrived: number;
-  /** The same after decoding. */
+  /** The same after decoding; of a video after its unit was handed to a decoder. */
   readonly decoded: number;
   /** Bytes of the frame. */
   readonly bytes: number;
@@ -290,6 +290,11 @@ export interface Session {
   readonly ready: Promise<void>;
   /** What the server offers, until it has said so what the saved light holds; else `undefined`. */
   readonly catalog: Catalog | undefined;
+  /**
+   * Fields of the catalog that this page cannot show: lightmaps that travel as video, where the browser
+   * decodes none. `capabilities().notices` say why.
+   */
+  readonly unshown: readonly FieldInfo[];
   /** What the saved light that the session started from says of the scene. */
   readonly saved: SavedScene | undefined;
   readonly stats: SessionStats;
