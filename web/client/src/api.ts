@@ -67,7 +67,10 @@ export interface LumelRegion {
   /** Grows with each new picture: an equal revision needs no new upload. */
   readonly revision: number;
   readonly picture: LumelPicture;
-  /** How far along the way from what was shown when the picture came to the picture itself, 0 to 1. */
+  /**
+   * How far along the way from what was shown when the picture came to the picture itself, 0 to 1. It grows
+   * until the revision does.
+   */
   readonly shown: number;
 }
 
@@ -77,7 +80,10 @@ export type LumelPicture = HalvesPicture | PlanesPicture;
 export interface HalvesPicture {
   readonly kind: 'halves';
   readonly scale: number;
-  /** r, g, b, 1 of each lumel as half floats, row after row: irradiance in lux over `scale`. */
+  /**
+   * r, g, b, 1 of each lumel as half floats, row after row: irradiance in lux over `scale`. They belong to
+   * the cache, which writes over them once two newer pictures have come: read them, don't keep them.
+   */
   readonly texels: Uint16Array<ArrayBuffer>;
 }
 
