@@ -67,7 +67,10 @@ export interface LumelRegion {
   /** Grows with each new picture: an equal revision needs no new upload. */
   readonly revision: number;
   readonly picture: LumelPicture;
-  /** How far along the way from what was shown when the picture came to the picture itself, 0 to 1. */
+  /**
+   * How far along the way from what was shown when the picture came to the picture itself, 0 to 1. It grows
+   * until the revision does.
+   */
   readonly shown: number;
 }
 
@@ -77,7 +80,10 @@ export type LumelPicture = HalvesPicture | PlanesPicture;
 export interface HalvesPicture {
   readonly kind: 'halves';
   readonly scale: number;
-  /** r, g, b, 1 of each lumel as half floats, row after row: irradiance in lux over `scale`. */
+  /**
+   * r, g, b, 1 of each lumel as half floats, row after row: irradiance in lux over `scale`. They belong to
+   * the cache, which writes over them once two newer pictures have come: read them, don't keep them.
+   */
   readonly texels: Uint16Array<ArrayBuffer>;
 }
 
@@ -261,7 +267,7 @@ export interface Timing {
   readonly clock: number | undefined;
   /** `performance.timeOrigin + performance.now()` in milliseconds when the frame was handed over. */
   readonly arrived: number;
-  /** The same after decoding. */
+  /** The same after decoding; of a video after its unit was handed to a decoder. */
   readonly decoded: number;
   /** Bytes of the frame. */
   readonly bytes: number;
@@ -290,6 +296,11 @@ export interface Session {
   readonly ready: Promise<void>;
   /** What the server offers, until it has said so what the saved light holds; else `undefined`. */
   readonly catalog: Catalog | undefined;
+  /**
+   * Fields of the catalog that this page cannot show: lightmaps that travel as video, where the browser
+   * decodes none. `capabilities().notices` say why.
+   */
+  readonly unshown: readonly FieldInfo[];
   /** What the saved light that the session started from says of the scene. */
   readonly saved: SavedScene | undefined;
   readonly stats: SessionStats;

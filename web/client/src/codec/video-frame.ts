@@ -1,4 +1,4 @@
-/** Frames of lightmaps that are coded as video (docs/wire.md, "Video frames"). */
+/** Frames of lightmaps that are coded as video (docs/wire.md). */
 import { WireError } from '../wire-error.js';
 import { type FrameHead, splitFrame } from './frame-head.js';
 
