@@ -28,7 +28,7 @@ export type LightSession = Pick<
   Session,
   'files' | 'catalog' | 'status' | 'stats' | 'on' | 'edit' | 'light' | 'sceneTime' | 'setCamera' | 'close'
 > &
-  Partial<Pick<Session, 'saved'>>;
+  Partial<Pick<Session, 'saved' | 'unshown'>>;
 
 export interface AttachOptions {
   /** Where the light is shown. */
@@ -263,7 +263,8 @@ export class LumencastLight {
     this.#epoch = epoch;
     this.#warned.clear();
     // Lumels take their unit before grids are planned.
-    this.#lumels.setLightmaps(fields.filter(isLightmap));
+    const unshown = this.session.unshown ?? [];
+    this.#lumels.setLightmaps(fields.filter(isLightmap).filter((field) => !unshown.includes(field)));
     this.#warnOnce(this.#grids.setVolumes(fields.filter(isVolume)));
   }
 

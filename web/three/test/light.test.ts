@@ -40,6 +40,7 @@ class FakeSession {
   readonly files = 'http://localhost:1/scene/';
   readonly status = { state: 'connected', transport: 'websocket' } as const;
   catalog: SessionEvents['catalog'] | undefined;
+  unshown: readonly FieldInfo[] = [];
   state: LightState = { fields: [], age: undefined };
   closed = false;
   readonly #listeners = new Map<string, (value: never) => void>();
@@ -411,6 +412,13 @@ describe('lumels', () => {
     session.tell('catalog', catalogOf(field));
     expect(pages.dispose).toHaveBeenCalledTimes(2);
     expect(light.pages).toBeUndefined();
+  });
+
+  it('take no room where the session cannot show them', () => {
+    session.unshown = [lightmap];
+    session.tell('catalog', catalogOf(lightmap, field));
+    expect([light.pages, light.grids.length]).toEqual([undefined, 1]);
+    expect(platform.createPages).not.toHaveBeenCalled();
   });
 
   it.each([

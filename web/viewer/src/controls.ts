@@ -12,7 +12,7 @@ import { TONE_MAPPINGS } from './view/renderer.js';
 import type { Gizmo } from './view/selection.js';
 import { SKY } from './view/sky.js';
 import type { Viewer } from './viewer.js';
-import { lumelWords, wordsFor } from './words.js';
+import { lumelWords, unshownWords, wordsFor } from './words.js';
 
 /** The bar beside the picture, the panels over it, and the keys. */
 export class Controls {
@@ -99,7 +99,10 @@ export class Controls {
     this.#dock.hide('lumels', !lightmap);
     this.#dock.set('lumels', !element.hidden);
     if (!lightmap || element.hidden) return;
-    const words = lumelWords({ ...lightmap.shape, meshes: viewer.light.lumelMeshes }, capabilities());
+    const isShown = !viewer.session.unshown.includes(lightmap);
+    const words = isShown
+      ? lumelWords({ ...lightmap.shape, meshes: viewer.light.lumelMeshes })
+      : unshownWords(capabilities());
     this.#lumels.update(words, viewer.pages.mesh.visible);
   }
 

@@ -66,25 +66,23 @@ export function missingFile(what: string, address: string, answer: string, cause
   return new Failure(message, 'Is its name right, and is it where this address says?', { cause });
 }
 
-/** A lightmap that a server casts, and what of it this page shows. */
+/** What a page shows of a lightmap. */
 export interface ShownLumels {
   readonly pages: number;
   readonly pageSize: number;
-  readonly coding: string;
   /** Meshes that are lit by it. */
   readonly meshes: number;
 }
 
-/** What there is of lumels; where none are shown, why, as far as the browser and the page are to blame. */
-export function lumelWords(
-  { pages, pageSize, coding, meshes }: ShownLumels,
-  { webCodecs, secureContext }: { webCodecs: boolean; secureContext: boolean },
-): string {
-  if (coding !== 'halves' && !webCodecs) {
-    return secureContext
-      ? 'They travel as video, which this browser does not decode for pages: probes light all.'
-      : 'They travel as video, which browsers decode only for secure pages: probes light all. Open the page by https or as localhost.';
-  }
+/** What there is of lumels. */
+export function lumelWords({ pages, pageSize, meshes }: ShownLumels): string {
   const on = `${pages === 1 ? 'one page' : `${pages} pages`} of ${pageSize} × ${pageSize}`;
   return `On ${on}; they light ${meshes === 1 ? 'one mesh' : `${meshes} meshes`}.`;
+}
+
+/** Why a page shows none of a lightmap that a server casts: it travels as video. */
+export function unshownWords({ secureContext }: { readonly secureContext: boolean }): string {
+  return secureContext
+    ? 'They travel as video, which this browser does not decode for pages. Probes light all.'
+    : 'They travel as video, which browsers decode only for secure pages. Probes light all. Open the page by https or as localhost.';
 }

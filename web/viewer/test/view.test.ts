@@ -17,7 +17,7 @@ import { findFlashlight } from '../src/view/flashlight.js';
 import { irradianceWeights } from '../src/view/probes.js';
 import { isDark, SKY } from '../src/view/sky.js';
 import { setSunAngles, sunAngles } from '../src/view/sun.js';
-import { lumelWords, missingFile, wordsFor } from '../src/words.js';
+import { lumelWords, missingFile, unshownWords, wordsFor } from '../src/words.js';
 
 describe('exposureFor', () => {
   it('scales with the light', () => {
@@ -231,21 +231,17 @@ describe('what the page says', () => {
   });
 });
 
-describe('lumelWords', () => {
-  const shown = { pages: 2, pageSize: 512, coding: 'h264', meshes: 7 };
-  const all = { webCodecs: true, secureContext: true };
-
-  it('says how many there are', () => {
-    expect(lumelWords(shown, all)).toBe('On 2 pages of 512 × 512; they light 7 meshes.');
-    expect(lumelWords({ ...shown, pages: 1, meshes: 1 }, all)).toBe(
+describe('words for lumels', () => {
+  it('say how many there are', () => {
+    const shown = { pages: 2, pageSize: 512, meshes: 7 };
+    expect(lumelWords(shown)).toBe('On 2 pages of 512 × 512; they light 7 meshes.');
+    expect(lumelWords({ ...shown, pages: 1, meshes: 1 })).toBe(
       'On one page of 512 × 512; they light one mesh.',
     );
   });
 
-  it('says why there are none, where they travel as video', () => {
-    const none = { ...all, webCodecs: false };
-    expect(lumelWords(shown, none)).toMatch(/video.*this browser/);
-    expect(lumelWords(shown, { ...none, secureContext: false })).toMatch(/secure pages.*https/);
-    expect(lumelWords({ ...shown, coding: 'halves' }, none)).toMatch(/^On 2 pages/);
+  it('say why there are none, and what helps', () => {
+    expect(unshownWords({ secureContext: true })).toMatch(/video.*this browser/);
+    expect(unshownWords({ secureContext: false })).toMatch(/secure pages.*https/);
   });
 });
