@@ -54,32 +54,67 @@ export function canHaveLumels(mesh: Mesh): boolean {
 export function part(geometry: BufferGeometry, sides: Sides): Parted | undefined {
   const own = trianglesOf(geometry);
   if (!sides.every((charts) => charts === undefined || fits(charts, own))) return undefined;
-  const [front, back] = sides;
+  const vertices = new PartedVertices(sides, geometry.attributes.position?.count ?? 0, own.length);
+  const [front, back] = sides.map((charts) => charts?.triangles);
   const index = new Uint32Array(own.length);
-  const [sources, ofFronts, ofBacks]: number[][] = [[], [], []];
-  const known = new Map<number, number>();
-  // A vertex without lumels is known by its own number, others by their vertices of both sides' charts.
-  const stride = (back?.sources.length ?? 0) + 1;
-  for (let i = 0; i < own.length; i++) {
-    const ofFront = front ? front.triangles[i] : -1;
-    const ofBack = back ? back.triangles[i] : -1;
-    const isBare = ofFront < 0 && ofBack < 0;
-    const key = isBare ? -1 - own[i] : (ofFront + 1) * stride + ofBack + 1;
-    let vertex = known.get(key);
-    if (vertex === undefined) {
-      vertex = sources.push(own[i]) - 1;
-      ofFronts.push(ofFront);
-      ofBacks.push(ofBack);
-      known.set(key, vertex);
-    }
-    index[i] = vertex;
-  }
+  for (let i = 0; i < own.length; i++) index[i] = vertices.of(own[i], front?.[i] ?? -1, back?.[i] ?? -1);
+  const { sources, chartVertices } = vertices.found();
   const attributes = Object.entries(geometry.attributes);
   return {
     attributes: Object.fromEntries(attributes.map(([name, all]) => [name, gather(all, sources)])),
     index: new BufferAttribute(sources.length > 0xffff ? index : Uint16Array.from(index), 1),
-    chartVertices: [Int32Array.from(ofFronts), Int32Array.from(ofBacks)],
+    chartVertices,
   };
+}
+
+/** The vertices that a geometry is parted into: each has one source, and one vertex of each side's charts. */
+class PartedVertices {
+  /** Of each vertex of the front's charts, the back's and the geometry the first parted one that has it. */
+  readonly #first: Int32Array;
+  /** Of each parted vertex the next one with the same such vertex. */
+  readonly #next: Int32Array;
+  readonly #sources: Uint32Array;
+  readonly #fronts: Int32Array;
+  readonly #backs: Int32Array;
+  readonly #offsets: readonly [back: number, source: number];
+  #count = 0;
+
+  /** `most`: how many there may be. */
+  constructor([front, back]: Sides, vertices: number, most: number) {
+    const ofBack = front?.sources.length ?? 0;
+    const ofSource = ofBack + (back?.sources.length ?? 0);
+    this.#offsets = [ofBack, ofSource];
+    this.#first = new Int32Array(ofSource + vertices).fill(-1);
+    this.#next = new Int32Array(most);
+    this.#sources = new Uint32Array(most);
+    this.#fronts = new Int32Array(most);
+    this.#backs = new Int32Array(most);
+  }
+
+  /** The number of the one that has these; −1 is no vertex of a side's charts. */
+  of(source: number, front: number, back: number): number {
+    const [ofBack, ofSource] = this.#offsets;
+    // Charts' vertices know their source.
+    const at = front >= 0 ? front : back >= 0 ? ofBack + back : ofSource + source;
+    for (let known = this.#first[at]; known >= 0; known = this.#next[known]) {
+      if (this.#backs[known] === back) return known;
+    }
+    const made = this.#count++;
+    this.#sources[made] = source;
+    this.#fronts[made] = front;
+    this.#backs[made] = back;
+    this.#next[made] = this.#first[at];
+    this.#first[at] = made;
+    return made;
+  }
+
+  found(): { readonly sources: Uint32Array; readonly chartVertices: Parted['chartVertices'] } {
+    const count = this.#count;
+    return {
+      sources: this.#sources.slice(0, count),
+      chartVertices: [this.#fronts.slice(0, count), this.#backs.slice(0, count)],
+    };
+  }
 }
 
 /** Three vertices a triangle. */
@@ -97,20 +132,17 @@ function fits({ triangles, sources }: Charts, own: TypedArray): boolean {
 }
 
 /** The values of these vertices. */
-function gather(
-  all: BufferAttribute | InterleavedBufferAttribute,
-  sources: readonly number[],
-): BufferAttribute {
+function gather(all: BufferAttribute | InterleavedBufferAttribute, sources: Uint32Array): BufferAttribute {
   const { itemSize, normalized } = all;
   const isInterleaved = 'data' in all;
   const stride = isInterleaved ? all.data.stride : itemSize;
   const offset = isInterleaved ? all.offset : 0;
   const from = all.array;
   const array = new (from.constructor as new (length: number) => TypedArray)(sources.length * itemSize);
-  sources.forEach((source, vertex) => {
-    const first = offset + source * stride;
+  for (let vertex = 0; vertex < sources.length; vertex++) {
+    const first = offset + sources[vertex] * stride;
     for (let k = 0; k < itemSize; k++) array[vertex * itemSize + k] = from[first + k];
-  });
+  }
   const gathered = new BufferAttribute(array, itemSize, normalized);
   if (!isInterleaved) gathered.gpuType = all.gpuType;
   return gathered;
@@ -134,10 +166,10 @@ export function lumelsAttribute(
     for (let vertex = 0; vertex < count; vertex++) {
       const chartVertex = chartVertices[side][vertex];
       if (chartVertex < 0) continue;
-      const corner = corners[side][rectangle[chartVertex]];
-      for (const axis of [0, 1]) {
-        array[vertex * itemSize + 2 * side + axis] = FIRST + corner[axis] + at[2 * chartVertex + axis];
-      }
+      const [x, y] = corners[side][rectangle[chartVertex]];
+      const first = vertex * itemSize + 2 * side;
+      array[first] = FIRST + x + at[2 * chartVertex];
+      array[first + 1] = FIRST + y + at[2 * chartVertex + 1];
     }
   });
   return new BufferAttribute(array, itemSize);

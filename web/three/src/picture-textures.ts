@@ -28,6 +28,12 @@ function planesOf(picture: LumelPicture, [width, height]: readonly [number, numb
   ];
 }
 
+/** Bytes that a picture takes on its way to the device. */
+export function bytesOf(picture: LumelPicture): number {
+  if (picture.kind === 'halves') return picture.texels.byteLength;
+  return picture.y.byteLength + picture.co.byteLength + picture.cg.byteLength;
+}
+
 /** The textures that one picture after another of a kind and size is loaded into. */
 class PictureTextures {
   readonly #textures: readonly DataTexture[];

@@ -120,6 +120,27 @@ describe('pages', () => {
     expect(new Set(textures).size).toBe(2);
   });
 
+  it('take in large pictures one a frame, each in its turn', () => {
+    const [large, scale] = [2 ** 18, 1];
+    const all = (revision: number) =>
+      [0, 1, 2].map((tile) =>
+        region({ region: tile, revision, picture: halves(10 * revision + tile, large, scale) }),
+      );
+    for (let revision = 1; revision <= 6; revision++) update(all(revision));
+    const seen = painted.map((strokes) => strokes.map(({ first }) => first! % 10));
+    expect(seen).toEqual([[0], [1], [2], [0], [1], [2]]);
+    // What has come last is what is painted, and in the end all is.
+    update(all(6));
+    update(all(6));
+    expect(
+      painted
+        .slice(6)
+        .flat()
+        .map(({ first }) => first),
+    ).toEqual([60, 61]);
+    expect(update(all(6))).toBe(false);
+  });
+
   it('are painted anew when their scale changes', () => {
     const two = (scale: number, revision: number) => [
       region({ picture: halves(1, 64, 2) }),
