@@ -264,10 +264,11 @@ function cornersOf({ rectangles }: LightmapSurface, corner: PlacedLayout['corner
 }
 
 function isSame(a: Wanted, b: Wanted): boolean {
-  return (
-    a.sides.every((charts, side) => charts === b.sides[side]) &&
-    a.corners.every((corners, side) => corners.flat().join() === b.corners[side].flat().join())
-  );
+  return a.sides.every((charts, side) => charts === b.sides[side] && isAt(a.corners[side], b.corners[side]));
+}
+
+function isAt(a: Corners, b: Corners): boolean {
+  return a.length === b.length && a.every(([x, y], i) => x === b[i][0] && y === b[i][1]);
 }
 
 /** Light goes through it, and what it scatters is little of what arrives. */
