@@ -31,7 +31,7 @@ const LONGEST_RUN: f64 = 1.0;
 /// Memory: five copies of the light of those regions that frames have come for, at most
 /// [`lumencast_codec::limits::CATALOG_PROBES`] probes and [`lumencast_codec::limits::CATALOG_LUMELS`]
 /// lumels; three where nothing changes.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Cache {
     catalog: Option<Catalog>,
     /// Whether the catalog is that of a file.

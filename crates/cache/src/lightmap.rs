@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use lumencast_codec::{LightTrack, LightmapShape, LumelHeader};
+use lumencast_codec::{FrameHead, LightTrack, LightmapShape};
 use lumencast_light::{Field, Light, Lightmap};
 
 use crate::CacheError;
@@ -11,7 +11,7 @@ use crate::received::Received;
 use crate::tile::TileCache;
 
 /// The tiles of a lightmap; those for which frames have come hold memory.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct LightmapCache {
     shape: LightmapShape,
     tiles: BTreeMap<u32, TileCache>,
@@ -43,16 +43,15 @@ impl LightmapCache {
         let LightTrack { field, region, layer } = track;
         let unknown = CacheError::UnknownRegion { field, region };
         let tile = self.shape.tile(region).ok_or(unknown)?;
-        let info = LumelHeader::read(frame)?.info;
+        let info = FrameHead::read(frame)?.info;
         if layer != 0 {
             return Err(CacheError::WrongLayer { update: info.update, layer });
         }
-        let news = self.tiles.entry(region).or_insert_with(|| TileCache::new(tile)).add(
-            frame,
-            now,
-            tick_seconds,
-            shown,
-        )?;
+        let news = self
+            .tiles
+            .entry(region)
+            .or_insert_with(|| TileCache::new(self.shape.coding, tile))
+            .add(frame, now, tick_seconds, shown)?;
         Ok(Received { info, news })
     }
 

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use glam::{UVec2, Vec2, Vec3};
 use lumencast_cache::{Cache, CacheError};
 use lumencast_codec::{
-    Catalog, DecodeError, EncodedRegion, Epoch, FieldInfo, LightFile, LightTrack, LightmapShape,
-    LumelEncoder, Resource, ResourceHash, SceneInfo, StateFrame, UpdateInfo, layout_resources,
+    Catalog, Coding, DecodeError, EncodedRegion, Epoch, FieldInfo, LightFile, LightTrack,
+    LightmapShape, LumelCoding, LumelEncoder, Resource, ResourceHash, SceneInfo, StateFrame,
+    UpdateInfo, layout_resources,
 };
 use lumencast_light::{
     ChartVertex, Charts, FieldId, Layout, Lightmap, OnTriangle, Rectangle, Surface, SurfaceId,
@@ -49,12 +50,13 @@ impl Server {
     fn new(epoch: u64, layout: Layout) -> Self {
         let resources = layout_resources(&layout);
         let lightmap = Lightmap::dark(FieldId(FIELD), Arc::new(layout));
+        let shape = LightmapShape::of(&lightmap, Coding::Halves);
         let scene = SceneInfo { name: "room".into(), root: "room.glb".into() };
-        let fields = vec![FieldInfo::of_lightmap(&lightmap, None, "a test")];
+        let fields = vec![FieldInfo::of_lightmap(lightmap.id, shape.clone(), None, "a test")];
         let epoch = Epoch(epoch);
         Self {
             catalog: Catalog { epoch, scene, tick_seconds: TICK, fields, unknown: vec![] },
-            encoder: LumelEncoder::new(LightmapShape::of(&lightmap)),
+            encoder: LumelEncoder::new(shape, LumelCoding::Halves),
             lightmap,
             resources,
             update: 0,
@@ -67,7 +69,7 @@ impl Server {
         let (update, tick) = (self.update, self.update);
         let info = UpdateInfo { update, tick, time: tick as f64 * TICK, scene_version: 5 };
         self.update += 1;
-        self.encoder.encode(&self.lightmap, info, |_| true)
+        self.encoder.encode(&self.lightmap, info, |_| true).expect("frames")
     }
 
     /// Names of the layout and of its charts.
@@ -267,7 +269,7 @@ fn resources_that_cannot_be_read_are_not_asked_for_again() {
     let other_pages = layout_resources(&Layout::new(16, 1, vec![])).0;
     let mut cache = Cache::new();
     for (resource, taken) in [(rubbish, false), (other_pages, true)] {
-        let mut shape = LightmapShape::of(&server.lightmap);
+        let mut shape = LightmapShape::of(&server.lightmap, Coding::Halves);
         shape.layout = resource.hash();
         server.catalog.fields[0].shape = lumencast_codec::Shape::Lightmap(shape);
         cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lumencast_light::{FieldId, Layout, Lightmap};
 use serde::{Deserialize, Serialize};
 
-use crate::lumel::{Tile, per_side, tile, tiles};
+use crate::lumel::{Packing, Tile, per_side, tile, tiles};
 use crate::{
     DecodeError, LayoutResource, Resource, ResourceHash, layout_resources, limits, read_charts,
 };
@@ -31,14 +31,29 @@ pub enum Coding {
     /// As half floats, without loss.
     #[default]
     Halves,
+    /// As H.264, with colour at half the resolution.
+    H264,
+    /// As H.264, with colour at full resolution.
+    H264Stacked,
+}
+
+impl Coding {
+    /// How pages become pictures, where they do.
+    pub(crate) fn packing(self) -> Option<Packing> {
+        match self {
+            Self::Halves => None,
+            Self::H264 => Some(Packing::Subsampled),
+            Self::H264Stacked => Some(Packing::Stacked),
+        }
+    }
 }
 
 impl LightmapShape {
-    /// The shape of a lightmap. It costs as much as writing its layout.
-    pub fn of(lightmap: &Lightmap) -> Self {
+    /// The shape of a lightmap that is coded so. It costs as much as writing its layout.
+    pub fn of(lightmap: &Lightmap, coding: Coding) -> Self {
         let Layout { page_size, pages, .. } = *lightmap.layout;
         let layout = layout_resources(&lightmap.layout).0.hash();
-        Self { coding: Coding::Halves, page_size, pages, layout }
+        Self { coding, page_size, pages, layout }
     }
 
     /// A lightmap of this shape without light, whose layout has no surfaces: nothing is read from it
@@ -52,14 +67,22 @@ impl LightmapShape {
         self.pages as usize * (self.page_size as usize).pow(2)
     }
 
+    /// Lumels of a tile along a side, at most: as video a page is one.
+    fn tile_size(&self) -> u32 {
+        match self.coding {
+            Coding::Halves => limits::TILE_LUMELS,
+            Coding::H264 | Coding::H264Stacked => self.page_size,
+        }
+    }
+
     /// Its tiles, in order of their numbers.
     pub fn tiles(&self) -> impl Iterator<Item = Tile> + use<> {
-        tiles(self.page_size, self.pages)
+        tiles(self.page_size, self.tile_size(), self.pages)
     }
 
     /// The tile of a number.
     pub fn tile(&self, id: u32) -> Option<Tile> {
-        tile(self.page_size, self.pages, id)
+        tile(self.page_size, self.tile_size(), self.pages, id)
     }
 
     /// Its layout, of resources that hold all of it.
@@ -94,7 +117,8 @@ impl LightmapShape {
         DecodeError::limit("lumels of a page along a side", side, most)?;
         let lumels = side.pow(2).saturating_mul(self.pages as usize);
         DecodeError::limit("lumels of a field", lumels, limits::FIELD_LUMELS)?;
-        let tiles = per_side(self.page_size).pow(2) as usize * self.pages as usize;
+        let tiles =
+            per_side(self.page_size, self.tile_size()).pow(2) as usize * self.pages as usize;
         DecodeError::limit("regions of a field", tiles, limits::REGIONS)?;
         Ok(self)
     }

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use lumencast_charts::LaidOut;
 use lumencast_codec::{
-    AcceptedEdit, Catalog, EncodedRegion, Epoch, FieldInfo, RefusedEdit, Resource, SceneInfo,
-    SceneState, StateFrame, check_volumes, layout_resources, limits,
+    AcceptedEdit, Catalog, EncodedRegion, Epoch, FieldInfo, LumelCoding, RefusedEdit, Resource,
+    SceneInfo, SceneState, StateFrame, check_volumes, layout_resources, limits,
 };
 use lumencast_gather::Gather;
 use lumencast_light::{FieldId, Light, Lightmap};
@@ -41,6 +41,8 @@ pub struct TickOptions {
     pub lightmap: Option<LaidOut>,
     /// Samples of all lumels in a tick: as many as there is time for beside probes, unless it is given.
     pub lumel_samples: Option<u64>,
+    /// How they are coded.
+    pub lumel_coding: LumelCoding,
     /// Edits at set times.
     pub script: Option<Script>,
     /// What computes the light, for the catalog ([`lumencast_codec::FieldInfo::source`]).
@@ -58,6 +60,7 @@ impl Default for TickOptions {
             volumes: Vec::new(),
             lightmap: None,
             lumel_samples: None,
+            lumel_coding: LumelCoding::default(),
             script: None,
             source: String::new(),
         }
@@ -133,9 +136,12 @@ impl Tick {
             options.volumes.clone()
         };
         check_volumes(&volumes)?;
+        if let Some(laid_out) = &options.lightmap {
+            options.lumel_coding.check(laid_out.layout.page_size)?;
+        }
         let mut solver = Solver::new(&volumes, options.gather)?;
         solver.set_lightmap(&scene.snapshot(), options.lightmap.as_ref());
-        let published = Published::all(&solver, Vec::new());
+        let published = Published::all(&solver, options.lumel_coding, Vec::new());
         let told_scales = vec![None; published.len()];
         let share = match options.lightmap {
             Some(_) => Budget::SHARE_BESIDE_LUMELS,
@@ -207,7 +213,8 @@ impl Tick {
     pub fn set_volumes(&mut self, volumes: &[VolumeSpec]) -> Result<(), ServerError> {
         check_volumes(volumes)?;
         self.solver.set_volumes(volumes)?;
-        self.published = Published::all(&self.solver, std::mem::take(&mut self.published));
+        let before = std::mem::take(&mut self.published);
+        self.published = Published::all(&self.solver, self.options.lumel_coding, before);
         self.gathering.keep(|id| self.solver.ids().any(|there| there == id));
         self.fields_are_news = true;
         Ok(())
@@ -453,7 +460,7 @@ impl Tick {
 
     fn note_failure(&mut self, field: FieldId, outcome: &str) {
         if let Some(published) = self.published_mut(field) {
-            published.note_failure(outcome);
+            published.note_failure("gathering", outcome);
         }
     }
 

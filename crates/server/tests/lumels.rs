@@ -185,7 +185,7 @@ fn frames_and_resources_are_what_clients_need() {
     let id = stepped.lightmap().id.0;
     let mut shown = vec![Vec3::ZERO; shape.lumel_count()];
     for tile in shape.tiles() {
-        let mut decoder = LumelDecoder::new(tile.size);
+        let mut decoder = LumelDecoder::new(shape.coding, tile);
         let of_tile =
             stepped.kept.frames.iter().filter(|(f, frame)| (*f, frame.region) == (id, tile.id));
         for (_, frame) in of_tile {

@@ -63,6 +63,7 @@ impl TickArguments {
             volumes: volumes.volumes(scene, gatherer)?,
             lightmap,
             lumel_samples: None,
+            lumel_coding: self.fields.coding(),
             script: self.edits.as_deref().map(read_script).transpose()?,
         })
     }

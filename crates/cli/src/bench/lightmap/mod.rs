@@ -1,5 +1,7 @@
 //! `lumencast bench lightmap`: how right the light of lumels is.
 
+mod coded;
+
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -15,6 +17,7 @@ use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{LightmapSolver, seam_differences, spread};
 use serde_json::json;
 
+use self::coded::Coded;
 use super::quantile;
 use crate::arguments::{LightmapArguments, Materials, SceneSource};
 use crate::charting;
@@ -112,6 +115,10 @@ impl BenchLightmap {
         let psnr = |lightmap: &Lightmap| reference.psnr(&places, lightmap);
         let (as_gathered, filtered) = (psnr(gathered), psnr(solver.lightmap()));
 
+        let coded = Coded::all(solver.lightmap())?;
+        let coded_psnr: Vec<f64> = coded.iter().map(|coded| psnr(&coded.shown)).collect();
+        let coded: Vec<(Coded, f64)> = coded.into_iter().zip(coded_psnr).collect();
+
         let LaidOut { layout, texel, .. } = &laid_out;
         let judged = reference.irradiance.iter().flatten().count();
         if self.json {
@@ -129,6 +136,7 @@ impl BenchLightmap {
                 "materials": self.materials.to_string(),
                 "points": judged,
                 "irradiance_db": { "gathered": as_gathered, "filtered": filtered },
+                "coded": coded.iter().map(|(coded, db)| coded.json(*db)).collect::<Vec<_>>(),
                 "seams": { "points": seams.len(), "p99": seam },
                 "reference": { "noise_db": reference.noise, "samples": reference.samples },
                 "seconds": {
@@ -149,6 +157,16 @@ impl BenchLightmap {
             "irradiance: {filtered:.1} dB, as gathered {as_gathered:.1} dB, {} samples a lumel",
             self.samples
         );
+        for (coded, db) in &coded {
+            say!(
+                "coded: {db:.1} dB by {}, qp {}, keyframe {:.1} KB, {:.1} ms, decoded in {:.1} ms",
+                coded.name(),
+                coded.qp,
+                coded.bytes as f64 / 1e3,
+                1e3 * coded.encode_seconds,
+                1e3 * coded.decode_seconds
+            );
+        }
         if let Some(seam) = seam {
             say!("seams: both sides differ by {:.2} % in the 99th percentile", 100.0 * seam);
         }

@@ -1,0 +1,49 @@
+//! How a server codes lumels.
+
+use lumencast_video::{H264Encoder, Qp, VideoError};
+
+use super::planes::Packing;
+use crate::Coding;
+
+/// How a server codes lumels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LumelCoding {
+    /// As half floats, without loss: for files, and for clients on the same machine.
+    #[default]
+    Halves,
+    /// As video, with colour at half the resolution.
+    H264(Qp),
+    /// As video, with colour at full resolution: more bytes, and more nearly what was computed.
+    H264Stacked(Qp),
+}
+
+impl LumelCoding {
+    /// As a catalog tells it.
+    pub fn coding(self) -> Coding {
+        match self {
+            Self::Halves => Coding::Halves,
+            Self::H264(_) => Coding::H264,
+            Self::H264Stacked(_) => Coding::H264Stacked,
+        }
+    }
+
+    /// Whether pages of so many lumels a side can be coded so.
+    ///
+    /// # Errors
+    /// [`VideoError::Size`] where they are too large for the video encoder.
+    pub fn check(self, page_size: u32) -> Result<(), VideoError> {
+        match self.video() {
+            None => Ok(()),
+            Some((packing, qp)) => {
+                let (width, height) = packing.size(page_size);
+                H264Encoder::new(width, height, qp).map(drop)
+            }
+        }
+    }
+
+    /// How pages become pictures, where they do.
+    pub(crate) fn video(self) -> Option<(Packing, Qp)> {
+        let (Self::H264(qp) | Self::H264Stacked(qp)) = self else { return None };
+        self.coding().packing().map(|packing| (packing, qp))
+    }
+}
