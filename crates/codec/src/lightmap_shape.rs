@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lumencast_light::{FieldId, Layout, Lightmap};
 use serde::{Deserialize, Serialize};
 
-use crate::lumel::{Packing, Tile, per_side, tile, tiles};
+use crate::lumel::{Coding, Tile, per_side, tile, tiles};
 use crate::{
     DecodeError, LayoutResource, Resource, ResourceHash, layout_resources, limits, read_charts,
 };
@@ -22,30 +22,6 @@ pub struct LightmapShape {
     pub pages: u32,
     /// The resource that tells where surfaces lie on the pages.
     pub layout: ResourceHash,
-}
-
-/// How lumels are coded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Coding {
-    /// As half floats, without loss.
-    #[default]
-    Halves,
-    /// As H.264, with colour at half the resolution.
-    H264,
-    /// As H.264, with colour at full resolution.
-    H264Stacked,
-}
-
-impl Coding {
-    /// How pages become pictures, where they do.
-    pub(crate) fn packing(self) -> Option<Packing> {
-        match self {
-            Self::Halves => None,
-            Self::H264 => Some(Packing::Subsampled),
-            Self::H264Stacked => Some(Packing::Stacked),
-        }
-    }
 }
 
 impl LightmapShape {

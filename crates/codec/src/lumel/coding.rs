@@ -1,9 +1,33 @@
-//! How a server codes lumels.
+//! How lumels are coded.
 
 use lumencast_video::{H264Encoder, Qp, VideoError};
+use serde::{Deserialize, Serialize};
 
 use super::planes::Packing;
-use crate::Coding;
+
+/// How lumels are coded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Coding {
+    /// As half floats, without loss.
+    #[default]
+    Halves,
+    /// As H.264, with colour at half the resolution.
+    H264,
+    /// As H.264, with colour at full resolution.
+    H264Stacked,
+}
+
+impl Coding {
+    /// How pages become pictures, where they do.
+    pub(crate) fn packing(self) -> Option<Packing> {
+        match self {
+            Self::Halves => None,
+            Self::H264 => Some(Packing::Subsampled),
+            Self::H264Stacked => Some(Packing::Stacked),
+        }
+    }
+}
 
 /// How a server codes lumels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

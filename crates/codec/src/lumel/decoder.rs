@@ -1,11 +1,11 @@
 //! Frames of one region of a lightmap → light.
 
-use glam::Vec3;
-
+use super::coding::Coding;
 use super::page_decoder::PageDecoder;
 use super::tile_decoder::TileDecoder;
+use super::tile_light::TileLight;
 use super::tiles::Tile;
-use crate::{Coding, DecodeError, FrameHead};
+use crate::DecodeError;
 
 /// Decodes the frames of one tile of a lightmap. Holds the newest, which deltas refer to: 6 bytes a
 /// lumel; as video 1.5, 3 where planes are stacked, and what [`lumencast_video::H264Decoder`] takes.
@@ -14,15 +14,6 @@ pub struct LumelDecoder(Kind);
 enum Kind {
     Tile(TileDecoder),
     Page(Box<PageDecoder>),
-}
-
-/// Light of a tile at one update.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TileLight {
-    /// What the frame begins with.
-    pub head: FrameHead,
-    /// Irradiance (r, g, b), lux, row after row.
-    pub irradiance: Vec<Vec3>,
 }
 
 impl LumelDecoder {

@@ -15,13 +15,14 @@ mod planes;
 mod residual;
 mod tile_decoder;
 mod tile_encoder;
+mod tile_light;
 mod tiles;
 mod video_frame;
 
-pub use coding::LumelCoding;
-pub use decoder::{LumelDecoder, TileLight};
+pub use coding::{Coding, LumelCoding};
+pub use decoder::LumelDecoder;
 pub use encoder::LumelEncoder;
 pub use header::LumelHeader;
-pub(crate) use planes::Packing;
+pub use tile_light::TileLight;
 pub use tiles::Tile;
 pub(crate) use tiles::{per_side, tile, tiles};

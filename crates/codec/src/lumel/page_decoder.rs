@@ -2,9 +2,9 @@
 
 use lumencast_video::{H264Decoder, Picture, PictureDecoder};
 
-use super::decoder::TileLight;
 use super::mapping::LightTable;
 use super::planes::{Packing, irradiance};
+use super::tile_light::TileLight;
 use super::video_frame::VideoHead;
 use crate::{DecodeError, FrameHead};
 

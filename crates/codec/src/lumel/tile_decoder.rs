@@ -2,10 +2,10 @@
 
 use glam::{UVec2, Vec3};
 
-use super::decoder::TileLight;
 use super::halves::{Lumel, to_rgb};
 use super::header::LumelHeader;
 use super::model::code_tile;
+use super::tile_light::TileLight;
 use crate::range_coder::Decoder;
 use crate::{DecodeError, FrameHead};
 
