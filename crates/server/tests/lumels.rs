@@ -6,8 +6,8 @@ use std::sync::Arc;
 use glam::Vec3;
 use lumencast_charts::{LaidOut, laid_out, sheets};
 use lumencast_codec::{
-    Catalog, EncodedRegion, Epoch, FrameHead, LayoutResource, LightmapShape, LumelDecoder,
-    Resource, ResourceHash, read_charts,
+    Catalog, EncodedRegion, Epoch, FrameHead, LayoutResource, LightmapShape, LumelCoding,
+    LumelDecoder, Qp, Resource, ResourceHash, read_charts,
 };
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Layout, Lightmap, SurfaceId, luminance};
@@ -59,11 +59,17 @@ struct Stepped {
 impl Stepped {
     /// A cornell that stands still, with a small page.
     fn new() -> Self {
+        Self::coded(LumelCoding::Halves)
+    }
+
+    /// The same, whose lumels are sent so.
+    fn coded(lumel_coding: LumelCoding) -> Self {
         let mut scene = Scene::builtin("cornell").expect("a built-in scene");
         let options = TickOptions {
             samples: SampleRange::fixed(4),
             lightmap: Some(lumels(&scene.snapshot())),
             lumel_samples: Some(8192),
+            lumel_coding,
             ..TickOptions::default()
         };
         let tracer = CpuPathTracer::new(Options::default()).expect("threads");
@@ -175,15 +181,26 @@ fn lumels_come_near_to_converged_light_and_follow_a_change() {
 /// What is sent is what there is: layouts by their hash, before the catalog that names them, and light.
 #[test]
 fn frames_and_resources_are_what_clients_need() {
-    let mut stepped = Stepped::new();
-    stepped.steps(10);
+    let video = LumelCoding::H264(Qp::new(15).expect("a parameter"));
+    for (coding, most) in [(LumelCoding::Halves, 1e-3), (video, 0.03)] {
+        let mut stepped = Stepped::coded(coding);
+        stepped.steps(10);
+        let shown = shown(&stepped);
+        let off = difference(&shown, stepped.lightmap());
+        assert!(off < most, "{coding:?}: {off}");
+    }
+}
+
+/// What a client makes of all that was sent.
+fn shown(stepped: &Stepped) -> Lightmap {
     let shape = stepped.shape();
     let resources: HashMap<ResourceHash, Resource> =
         stepped.tick.resources().into_iter().map(|r| (r.hash(), r)).collect();
     assert_eq!(read(&shape.layout, &resources), *stepped.lightmap().layout);
 
     let id = stepped.lightmap().id.0;
-    let mut shown = vec![Vec3::ZERO; shape.lumel_count()];
+    let mut shown = stepped.lightmap().clone();
+    shown.irradiance.fill(Vec3::ZERO);
     for tile in shape.tiles() {
         let mut decoder = LumelDecoder::new(shape.coding, tile);
         let of_tile =
@@ -194,14 +211,11 @@ fn frames_and_resources_are_what_clients_need() {
             for (row, light) in
                 tile.rows(shape.page_size).zip(light.irradiance.chunks(tile.size.x as usize))
             {
-                shown[row].copy_from_slice(light);
+                shown.irradiance[row].copy_from_slice(light);
             }
         }
     }
-    let off = shown.iter().zip(&stepped.lightmap().irradiance);
-    let off = off.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
-    let most = stepped.lightmap().irradiance.iter().map(|e| e.max_element()).fold(0.0, f32::max);
-    assert!(most > 0.0 && off < 1e-3 * most, "{off} of {most}");
+    shown
 }
 
 fn read(hash: &ResourceHash, resources: &HashMap<ResourceHash, Resource>) -> Layout {
