@@ -31,6 +31,19 @@ impl Qp {
     }
 }
 
+impl Default for Qp {
+    /// 15: lumels lose at most about 1.5 dB by it.
+    fn default() -> Self {
+        Self(15)
+    }
+}
+
+impl std::fmt::Display for Qp {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
 /// Encodes H.264 in Annex B, a keyframe with its parameter sets in front.
 ///
 /// openh264 is made for calls between people, so its own rules are off: it neither skips frames, nor

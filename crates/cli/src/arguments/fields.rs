@@ -61,7 +61,7 @@ pub(crate) struct LiveFieldsArguments {
     #[arg(long, value_enum, default_value_t = SentAs::H264)]
     lumel_coding: SentAs,
     /// How coarse the video is; 6 more make half the bytes or less.
-    #[arg(long, value_name = "12..36", default_value = "15", value_parser = qp)]
+    #[arg(long, value_name = "12..36", default_value_t, value_parser = qp)]
     qp: Qp,
     #[command(flatten)]
     lightmap: LightmapArguments,

@@ -26,7 +26,7 @@ use filter::{Noisy, REACH, filter};
 use places::{LumelPlace, lumel_places};
 pub use points::spread;
 use seams::Seams;
-pub use seams::seam_differences;
+pub use seams::sides_of_seams;
 use sums::{Sum, have_changed};
 
 /// What a lumel has in place of a receiver where no surface covers it.

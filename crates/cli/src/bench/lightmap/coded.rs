@@ -64,6 +64,11 @@ impl Coded {
         Ok(Self { qp: qp.get(), stacked, shown, bytes, encode_seconds, decode_seconds })
     }
 
+    /// Whether servers send it so unless told otherwise.
+    pub(super) fn is_default(&self) -> bool {
+        (self.qp, self.stacked) == (Qp::default().get(), false)
+    }
+
     pub(super) fn name(&self) -> &'static str {
         if self.stacked { "h264-stacked" } else { "h264" }
     }

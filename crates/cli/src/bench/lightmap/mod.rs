@@ -1,6 +1,7 @@
 //! `lumencast bench lightmap`: how right the light of lumels is.
 
 mod coded;
+mod edges;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -14,7 +15,7 @@ use lumencast_gather::{Gather, Job, Receiver};
 use lumencast_light::{FieldId, Lightmap, Place};
 use lumencast_scene::Snapshot;
 use lumencast_solve::blend::BlendSettings;
-use lumencast_solve::{LightmapSolver, seam_differences, spread};
+use lumencast_solve::{LightmapSolver, sides_of_seams, spread};
 use serde_json::json;
 
 use self::coded::Coded;
@@ -25,6 +26,8 @@ use crate::output::{self, say};
 
 /// Points of surfaces at which light is judged.
 const POINTS: usize = 4096;
+/// The same where light from beyond charts is looked for.
+const POISON_POINTS: usize = 1 << 17;
 /// Samples that lumels, and points of the reference, take at a time.
 const PASS: u32 = 16;
 const REFERENCE_PASS: u32 = 256;
@@ -105,10 +108,8 @@ impl BenchLightmap {
         solver.solve(true);
         let filter_seconds = start.elapsed().as_secs_f64();
 
-        let mut seams: Vec<f64> =
-            seam_differences(&snapshot, solver.lightmap()).into_iter().map(f64::from).collect();
-        seams.sort_unstable_by(f64::total_cmp);
-        let seam = (!seams.is_empty()).then(|| quantile(&seams, 0.99));
+        let sides = sides_of_seams(&snapshot, solver.lightmap());
+        let seam = edges::relative(&sides);
 
         let places = spread(&snapshot, &laid_out.layout, POINTS);
         let reference = self.reference(&places, &snapshot, &mut tracer)?;
@@ -118,6 +119,11 @@ impl BenchLightmap {
         let coded = Coded::all(solver.lightmap())?;
         let coded_psnr: Vec<f64> = coded.iter().map(|coded| psnr(&coded.shown)).collect();
         let coded: Vec<(Coded, f64)> = coded.into_iter().zip(coded_psnr).collect();
+        let sent = coded.iter().find(|(coded, _)| coded.is_default()).map(|(coded, _)| coded);
+        let shown = sent.map_or(solver.lightmap(), |coded| &coded.shown);
+        let seam_codes = edges::codes(&sides_of_seams(&snapshot, shown), reference.white);
+        let many = spread(&snapshot, &laid_out.layout, POISON_POINTS);
+        let poison = edges::poisoned(shown, &many, reference.white);
 
         let LaidOut { layout, texel, .. } = &laid_out;
         let judged = reference.irradiance.iter().flatten().count();
@@ -137,7 +143,8 @@ impl BenchLightmap {
                 "points": judged,
                 "irradiance_db": { "gathered": as_gathered, "filtered": filtered },
                 "coded": coded.iter().map(|(coded, db)| coded.json(*db)).collect::<Vec<_>>(),
-                "seams": { "points": seams.len(), "p99": seam },
+                "seams": { "points": sides.len(), "p99": seam, "coded_codes_p99": seam_codes },
+                "poison_codes": poison,
                 "reference": { "noise_db": reference.noise, "samples": reference.samples },
                 "seconds": {
                     "layout": layout_seconds, "gather": gather_seconds, "filter": filter_seconds,
@@ -168,8 +175,13 @@ impl BenchLightmap {
             );
         }
         if let Some(seam) = seam {
-            say!("seams: both sides differ by {:.2} % in the 99th percentile", 100.0 * seam);
+            say!(
+                "seams: both sides differ by {:.2} % in the 99th percentile, as sent by {:.1} codes",
+                100.0 * seam,
+                seam_codes.unwrap_or_default()
+            );
         }
+        say!("light from beyond charts changes points by {poison:.1} codes at most");
         say!(
             "reference: {judged} points, noise {:.1} dB after {} samples",
             reference.noise,
