@@ -256,6 +256,15 @@ fn another_layout_takes_over_the_pages_and_then_the_surfaces() {
     let gone = CacheError::UnknownResource(layout.hash());
     assert_eq!(cache.add_resource(layout.bytes()), Err(gone));
 
+    // Further pages are dark, those of before are not.
+    let more = Server::new(1, Layout::new(260, 2, vec![]));
+    cache.add_catalog(&more.catalog.encode(), 2.0).unwrap();
+    assert_eq!(shown(&mut cache, 2.0), [2.0, 0.0]);
+    assert_eq!(
+        cache.light(2.0).lightmaps().next().map(|l| l.irradiance.len()),
+        Some(2 * 260 * 260)
+    );
+
     // Pages of another size are other pages.
     let larger = Server::new(1, Layout::new(512, 1, vec![]));
     cache.add_catalog(&larger.catalog.encode(), 2.0).unwrap();
