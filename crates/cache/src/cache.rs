@@ -14,6 +14,7 @@ use crate::CacheError;
 use crate::clock::ServerClock;
 use crate::edits::{Edits, SceneEvent};
 use crate::field::FieldCache;
+use crate::handover::Handover;
 use crate::newest::Newest;
 use crate::received::Received;
 use crate::resources::Resources;
@@ -38,6 +39,8 @@ pub struct Cache {
     saved: bool,
     fields: BTreeMap<u32, FieldCache>,
     light: Light,
+    /// Of each lightmap, how its surfaces pass from one layout to the next.
+    handovers: BTreeMap<u32, Handover>,
     resources: Resources,
     clock: ServerClock,
     state: Option<StateFrame>,
@@ -159,6 +162,7 @@ impl Cache {
         }
         self.fields = caches;
         self.light = Light::new(shown);
+        self.handovers.retain(|id, _| catalog.field(*id).is_some());
         self.resources.follow(&catalog);
         self.catalog = Some(catalog);
         self.saved = saved;
@@ -241,7 +245,7 @@ impl Cache {
 
     /// Brings the light to what is to be seen at `now`.
     fn show(&mut self, now: f64) {
-        self.lay_out();
+        self.lay_out(now);
         for field in self.light.fields_mut() {
             if let Some(cache) = self.fields.get_mut(&field.id().0) {
                 cache.show(now, field);
@@ -249,14 +253,15 @@ impl Cache {
         }
     }
 
-    /// Gives lightmaps their layouts, as far as these are known.
-    fn lay_out(&mut self) {
+    /// Gives lightmaps their layouts at `now`, as far as these are known.
+    fn lay_out(&mut self, now: f64) {
         self.resources.lay_out();
         for lightmap in self.light.fields_mut().iter_mut().filter_map(Field::as_lightmap_mut) {
             let info = self.catalog.as_ref().and_then(|catalog| catalog.field(lightmap.id.0));
             let shape = info.and_then(|info| info.shape.as_lightmap());
             if let Some(layout) = shape.and_then(|shape| self.resources.layout(shape)) {
-                lightmap.layout = layout.clone();
+                let handover = self.handovers.entry(lightmap.id.0).or_default();
+                lightmap.layout = handover.show(layout, now);
             }
         }
     }

@@ -47,7 +47,7 @@ pub struct Instance {
 pub struct Rectangle {
     pub corner: Vec2,
     pub layer: u32,
-    pub _pad: u32,
+    pub share: f32,
 }
 
 /// What holds for all of a frame's passes. Group 1, binding 0.

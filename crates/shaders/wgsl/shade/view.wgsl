@@ -31,5 +31,6 @@ struct Rectangle {
     // Its first lumel, on a layer of the pages' texture.
     corner: vec2f,
     layer: u32,
-    _pad: u32,
+    // How much of the light its lumels make; the rest is the probes'.
+    share: f32,
 }
