@@ -15,6 +15,10 @@ use lumencast_codec::{DecodeError, ProbeDecoder, ProbeEncoder, RegionLight, Upda
 use lumencast_light::{FieldId, Grid, Order, ProbeVolume};
 use serde_json::{Value, json};
 
+use crate::noise::Noise;
+
+mod noise;
+
 fn main() {
     let sequences = [
         sequence("keyframe and deltas, L2", [4, 3, 2], Order::L2, 1.0, 0..13),
@@ -81,24 +85,6 @@ fn sequence(
         frames.extend(encoder.encode(&volume, info, |_| true).into_iter().map(|frame| frame.bytes));
     }
     Sequence { name, size, order, frames }
-}
-
-/// Numbers that only look random (splitmix64).
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn vector(&mut self) -> Vec3 {
-        Vec3::from_array(std::array::from_fn(|_| {
-            (self.next() >> 40) as f32 / (1 << 23) as f32 - 1.0
-        }))
-    }
 }
 
 impl Sequence {

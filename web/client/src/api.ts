@@ -1,15 +1,29 @@
 import type { Catalog, FieldInfo } from './codec/catalog.js';
+import type { LightmapLayout } from './codec/layout.js';
 import type { Edit, Vec3 } from './edit.js';
 
-/** The light of one field at one moment; `kind` says which members it has. See `isVolume`. */
-export type FieldLight = VolumeLight;
+/** The light of one field at one moment; `kind` says which members it has. See `isVolume`, `isLightmap`. */
+export type FieldLight = VolumeLight | LightmapLight;
+
+/** How old the light of a field is, whatever its kind. */
+export interface FieldAge {
+  /**
+   * Seconds since this light was computed, of its oldest region. This and the next two are `undefined`
+   * for what is left from the time before a restart of the server.
+   */
+  readonly age: number | undefined;
+  /** Version of the scene that the light was computed from, of its oldest region. */
+  readonly sceneVersion: number | undefined;
+  /** Server tick in which it was computed, of its oldest region. */
+  readonly tick: number | undefined;
+}
 
 /**
  * The light of a volume at one moment.
  *
  * The arrays belong to the cache and change with the next call of `light`: read them, don't keep them.
  */
-export interface VolumeLight {
+export interface VolumeLight extends FieldAge {
   readonly kind: 'volume';
   /** What the newest catalog says of the field: its use, its grid, its order. */
   readonly field: FieldInfo<'volume'>;
@@ -22,17 +36,78 @@ export interface VolumeLight {
   readonly scale: number;
   /** Grows whenever the coefficients changed: equal revisions need no new upload. */
   readonly revision: number;
-  /**
-   * Seconds since this light was computed, of its oldest region. This and the next two are `undefined`
-   * for what is left from the time before a restart of the server.
-   */
-  readonly age: number | undefined;
-  /** Version of the scene that the light was computed from, of its oldest region. */
-  readonly sceneVersion: number | undefined;
-  /** Server tick in which it was computed, of its oldest region. */
-  readonly tick: number | undefined;
   /** Regions that hold light, of all that the field has. */
   readonly regions: { readonly lit: number; readonly all: number };
+}
+
+/** The light of a lightmap at one moment: pictures of parts of its pages, and where surfaces lie on these. */
+export interface LightmapLight extends FieldAge {
+  readonly kind: 'lightmap';
+  /** What the newest catalog says of the field: its use, its coding, its pages. */
+  readonly field: FieldInfo<'lightmap'>;
+  /**
+   * Where surfaces lie on the pages; `undefined` until that has come. Another object when anything of it
+   * has changed.
+   */
+  readonly layout: LightmapLayout | undefined;
+  /** Regions that have light. */
+  readonly regions: readonly LumelRegion[];
+  /** The largest of the regions' scales: a power of two, by which half floats are divided. */
+  readonly scale: number;
+}
+
+/** A part of a page that is sent as one picture. */
+export interface LumelRegion {
+  readonly region: number;
+  readonly page: number;
+  /** Its first lumel. */
+  readonly min: readonly [number, number];
+  /** Lumels along x and y. */
+  readonly size: readonly [number, number];
+  /** Grows with each new picture: an equal revision needs no new upload. */
+  readonly revision: number;
+  readonly picture: LumelPicture;
+  /**
+   * How far along the way from what was shown when the picture came to the picture itself, 0 to 1. It grows
+   * until the revision does.
+   */
+  readonly shown: number;
+}
+
+export type LumelPicture = HalvesPicture | PlanesPicture;
+
+/** Half floats, without loss. */
+export interface HalvesPicture {
+  readonly kind: 'halves';
+  readonly scale: number;
+  /**
+   * r, g, b, 1 of each lumel as half floats, row after row: irradiance in lux over `scale`. They belong to
+   * the cache, which writes over them once two newer pictures have come: read them, don't keep them.
+   */
+  readonly texels: Uint16Array<ArrayBuffer>;
+}
+
+/** A decoded video picture; `irradianceOf` tells what its codes mean. */
+export interface PlanesPicture extends Planes {
+  readonly kind: 'planes';
+  readonly scale: number;
+  /** log2 of what irradiance over `scale` is multiplied by before its logarithm is taken. */
+  readonly toe: number;
+  /** Powers of two that the codes 0 to 255 span. */
+  readonly octaves: number;
+}
+
+/** The planes of a picture, codes of 8 bits in rows without gaps. */
+export interface Planes {
+  readonly y: Uint8Array<ArrayBuffer>;
+  readonly co: Uint8Array<ArrayBuffer>;
+  readonly cg: Uint8Array<ArrayBuffer>;
+  /** Columns and rows of `y`. */
+  readonly width: number;
+  readonly height: number;
+  /** Columns and rows of `co` and `cg`: half as many, rounded up, or as many. */
+  readonly chromaWidth: number;
+  readonly chromaHeight: number;
 }
 
 /** All light at one moment. */
@@ -131,7 +206,7 @@ export interface LightNews {
 
 /** What a session tells; the values are the listeners' argument. */
 export interface SessionEvents {
-  /** The server's fields are known, or have changed in more than their scales. */
+  /** The server's fields are known, or have changed in more than their scales and layouts. */
   catalog: Catalog;
   /**
    * Edits that turn the scene as it stands in its file into the scene as it is now. Comes on joining,
@@ -192,7 +267,7 @@ export interface Timing {
   readonly clock: number | undefined;
   /** `performance.timeOrigin + performance.now()` in milliseconds when the frame was handed over. */
   readonly arrived: number;
-  /** The same after decoding. */
+  /** The same after decoding; of a video after its unit was handed to a decoder. */
   readonly decoded: number;
   /** Bytes of the frame. */
   readonly bytes: number;
@@ -221,6 +296,11 @@ export interface Session {
   readonly ready: Promise<void>;
   /** What the server offers, until it has said so what the saved light holds; else `undefined`. */
   readonly catalog: Catalog | undefined;
+  /**
+   * Fields of the catalog that this page cannot show: lightmaps that travel as video, where the browser
+   * decodes none. `capabilities().notices` say why.
+   */
+  readonly unshown: readonly FieldInfo[];
   /** What the saved light that the session started from says of the scene. */
   readonly saved: SavedScene | undefined;
   readonly stats: SessionStats;

@@ -1,19 +1,25 @@
 import type { AcceptedEdit, FieldLight, LightNews, LightState, RefusedEdit, SavedScene } from './api.js';
 import { ServerClock } from './cache/clock.js';
-import { createFieldCache, type FieldCache, type Received } from './cache/field.js';
+import type { FieldCache, Received } from './cache/field.js';
+import { createFieldCache } from './cache/kinds.js';
 import { type PendingEdit, PendingEdits } from './cache/pending.js';
+import type { OpenDecoder } from './cache/picture-decoder.js';
+import { Resources } from './cache/resources.js';
 import {
   type Catalog,
   epochOf,
   type FieldInfo,
-  hasSameShape,
+  isCodedAlike,
+  isLightmap,
   offersSame,
   parseCatalog,
 } from './codec/catalog.js';
-import { readLightFile } from './codec/file.js';
+import { type LightFile, readLightFile } from './codec/file.js';
+import type { LightHead } from './codec/frame-head.js';
+import { isVideo } from './codec/lightmap-shape.js';
 import { parseState, type StateFrame } from './codec/state.js';
 import type { Edit } from './edit.js';
-import type { WireError } from './wire-error.js';
+import { WireError } from './wire-error.js';
 
 /** What happened in the cache, in order. */
 export type CacheEvent =
@@ -27,6 +33,14 @@ export type CacheEvent =
   | { readonly kind: 'refused'; readonly refused: RefusedEdit }
   /** One of our edits was on its way to a server that has restarted since. */
   | { readonly kind: 'lost'; readonly seq: number };
+
+/** What a cache is given besides bytes. */
+export interface CacheOptions {
+  /** Opens decoders of video; without them lightmaps that travel as video are not shown. */
+  openDecoder?: OpenDecoder | undefined;
+  /** Told when something has happened outside of a call, as when a decoder has taken its time. */
+  onLate?: () => void;
+}
 
 /** Seconds that the scene's time may run on past the newest state frame. */
 const LONGEST_RUN = 1;
@@ -42,6 +56,7 @@ export class Cache {
   private fields = new Map<number, FieldCache>();
   /** Fields of before whose light fits none of now; shown until there is new light. */
   private leftover: FieldCache[] = [];
+  private resources = new Resources();
   private clock = new ServerClock(1);
   private newest: StateFrame | undefined;
   /** Whether no tick is missing since the last snapshot that was passed on. */
@@ -54,10 +69,19 @@ export class Cache {
   private happened: CacheEvent[] = [];
 
   /** `client` is the name under which this client's edits come back. */
-  constructor(readonly client: string) {}
+  constructor(
+    readonly client: string,
+    private readonly options: CacheOptions = {},
+  ) {}
 
   get catalog(): Catalog | undefined {
     return this.current;
+  }
+
+  /** Fields of the catalog that are not shown: lightmaps that travel as video, where nobody decodes that. */
+  get unshown(): readonly FieldInfo[] {
+    if (this.options.openDecoder) return [];
+    return this.current?.fields.filter(isLightmap).filter(({ shape }) => isVideo(shape.coding)) ?? [];
   }
 
   /** The newest state frame. */
@@ -77,14 +101,16 @@ export class Cache {
     return events;
   }
 
-  /** Takes in a frame of the catalog track. Returns whether it tells more than the fields' scales. */
+  /** Takes in a frame of the catalog track. Returns whether it tells more than scales and layouts. */
   addCatalog(bytes: Uint8Array, _now: number): boolean {
     const catalog = parseCatalog(bytes);
+    for (const cache of this.fields.values()) cache.keepResources();
     if (this.saved || !this.current || !offersSame(this.current, catalog)) {
       this.setCatalog(catalog);
       return true;
     }
     for (const field of catalog.fields) this.fields.get(field.id)!.field = field;
+    this.resources.follow(catalog);
     this.current = catalog;
     return false;
   }
@@ -97,17 +123,21 @@ export class Cache {
    */
   load(file: Uint8Array, now: number): SavedScene {
     if (this.current && !this.saved) throw new Error('light of a server is there already');
-    const { catalog, edits, files, frames } = readLightFile(file);
-    const fields = new Map(catalog.fields.map((field) => [field.id, this.fieldCache(field)]));
+    const read = readLightFile(file);
+    const { catalog, edits, files, frames } = read;
+    const resources = savedResources(read);
+    const fields = new Map(catalog.fields.map((field) => [field.id, this.fieldCache(field, resources)]));
     let savedTime = 0;
     for (const { field, region, frame } of frames) {
       const cache = fields.get(field);
       // Keyframes are of layer 0.
       if (cache?.has(region)) savedTime = cache.add(region, 0, frame, now, catalog.tickSeconds).head.time;
     }
+    this.close();
     this.current = catalog;
     this.fields = fields;
     this.leftover = [];
+    this.resources = resources;
     this.savedTime = savedTime;
     this.saved = true;
     this.happened.push({ kind: 'catalog', catalog, restarted: false });
@@ -123,7 +153,7 @@ export class Cache {
       const same = old.get(field.id);
       // Each field's updates are numbered by its own server's run.
       const anew = this.saved || (before && same && epochOf(before, same.field) !== epochOf(catalog, field));
-      const keeps = same && hasSameShape(same.field, field);
+      const keeps = same && isCodedAlike(same.field, field);
       if (same && (anew || !keeps)) same.forgetUpdates();
       if (keeps) {
         same.field = field;
@@ -131,9 +161,10 @@ export class Cache {
         old.delete(field.id);
       } else {
         if (same) this.leave(same);
-        this.fields.set(field.id, this.fieldCache(field));
+        this.fields.set(field.id, this.fieldCache(field, this.resources));
       }
     }
+    for (const cache of old.values()) cache.close();
     const gone = [...old.values()].filter(({ field }) => !this.fields.has(field.id));
     if (restarted) {
       for (const cache of gone) {
@@ -146,6 +177,7 @@ export class Cache {
       this.leftover = this.leftover.filter(({ field }) => !ids.has(field.id));
     }
     if (!before || restarted) this.clock = new ServerClock(catalog.tickSeconds);
+    this.resources.follow(catalog);
     this.saved = false;
     this.current = catalog;
     this.happened.push({ kind: 'catalog', catalog, restarted });
@@ -229,8 +261,22 @@ export class Cache {
     return cache.add(region, layer, bytes, now, this.current.tickSeconds);
   }
 
-  private fieldCache(field: FieldInfo): FieldCache {
-    const cache = createFieldCache(field, (region, { tick }) => {
+  /** Names of resources to be asked for: layouts that the catalog names, and charts that layouts name. */
+  get wantedResources(): readonly string[] {
+    return this.resources.wanted();
+  }
+
+  /**
+   * Takes in a resource; returns whether it was wanted. Lightmaps show its surfaces from the next call of
+   * {@link light} on; those whose charts have not come yet are left out.
+   * @throws WireError where it was wanted, and cannot be read or is too much; it is then wanted no longer.
+   */
+  addResource(bytes: Uint8Array): boolean {
+    return this.resources.add(bytes);
+  }
+
+  private fieldCache(field: FieldInfo, resources: Resources): FieldCache {
+    const onLight = (region: number, { tick }: LightHead) => {
       // That of a file is not announced, nor that of a field that is no more.
       if (this.fields.get(field.id) !== cache) return;
       // It takes the place of its field's old light, and of that of fields that are gone.
@@ -238,8 +284,19 @@ export class Cache {
         (left) => left.field.id !== field.id && this.fields.has(left.field.id),
       );
       this.happened.push({ kind: 'light', light: { field: field.id, region, tick } });
+    };
+    const cache = createFieldCache(field, {
+      onLight,
+      onLate: () => this.options.onLate?.(),
+      layoutOf: (shape) => resources.layoutOf(shape),
+      openDecoder: this.options.openDecoder,
     });
     return cache;
+  }
+
+  /** Gives back what decoders hold. The light stays, and none comes any more. */
+  close(): void {
+    for (const cache of this.fields.values()) cache.close();
   }
 
   /** All light, blended to `now`. */
@@ -321,4 +378,22 @@ export class Cache {
   abandon(seq: number): void {
     this.edits.settle(seq);
   }
+}
+
+/**
+ * The resources of a file.
+ * @throws WireError where one cannot be read, or a lightmap that has light lacks one.
+ */
+function savedResources({ catalog, resources: records, frames }: LightFile): Resources {
+  const resources = new Resources();
+  resources.follow(catalog);
+  // Twice, since layouts tell which charts are wanted.
+  for (const bytes of [...records, ...records]) resources.add(bytes);
+  const lit = new Set(frames.map(({ field }) => field));
+  for (const { id, shape } of catalog.fields.filter(isLightmap)) {
+    if (lit.has(id) && !resources.hasAllOf(shape)) {
+      throw new WireError('malformed', `a resource of field ${id} is missing`);
+    }
+  }
+  return resources;
 }

@@ -8,13 +8,17 @@ import {
   type Status,
 } from './api.js';
 import { Cache } from './cache.js';
-import type { Catalog } from './codec/catalog.js';
+import type { OpenDecoder } from './cache/picture-decoder.js';
+import type { Catalog, FieldInfo } from './codec/catalog.js';
 import { Emitter } from './session/emitter.js';
+import { videoDecoders } from './video/decoders.js';
 
 /** What of saved light's surroundings its file does not say. */
 export interface SavedOptions {
   /** Address of a file of the scene, or of their folder with a slash at its end; the page's folder unless given. */
   files?: string | URL;
+  /** Opens decoders of video; those of the browser unless given, where it has any. */
+  openDecoder?: OpenDecoder;
 }
 
 /**
@@ -75,14 +79,15 @@ class SavedSession implements Session {
   readonly pending = [];
   readonly saved: SavedScene;
   status: Status = { state: 'saved' };
-  private readonly cache = new Cache('');
+  private readonly cache: Cache;
   private readonly emitter = new Emitter<SessionEvents>();
 
-  constructor(bytes: Uint8Array, { files = '.' }: SavedOptions) {
+  constructor(bytes: Uint8Array, { files = '.', openDecoder = videoDecoders() }: SavedOptions) {
     const folder = new URL(files, pageAddress());
     // Blobs and data lie in no folder.
     this.files = URL.canParse('.', folder) ? new URL('.', folder).href : pageAddress();
     this.origin = folder.origin;
+    this.cache = new Cache('', { openDecoder });
     this.saved = this.cache.load(bytes, performance.now() / 1000);
   }
 
@@ -92,6 +97,10 @@ class SavedSession implements Session {
 
   get catalog(): Catalog {
     return this.cache.catalog!;
+  }
+
+  get unshown(): readonly FieldInfo[] {
+    return this.cache.unshown;
   }
 
   on<K extends keyof SessionEvents>(event: K, listener: (value: SessionEvents[K]) => void): () => void {
@@ -118,6 +127,7 @@ class SavedSession implements Session {
 
   close(reason = 'the session was closed'): void {
     if (this.status.state === 'closed') return;
+    this.cache.close();
     this.status = { state: 'closed', reason };
     this.emitter.emit('status', this.status);
   }

@@ -12,7 +12,8 @@ import {
   type Timing,
 } from './api.js';
 import { Cache } from './cache.js';
-import type { Catalog } from './codec/catalog.js';
+import type { OpenDecoder } from './cache/picture-decoder.js';
+import type { Catalog, FieldInfo } from './codec/catalog.js';
 import { checkEdit } from './codec/state.js';
 import { CATALOG_TRACK, STATE_TRACK } from './codec/tracks.js';
 import type { Edit, Vec3 } from './edit.js';
@@ -21,10 +22,12 @@ import { Meter } from './session/meter.js';
 import { Outbox } from './session/outbox.js';
 import type { TrackPlan } from './session/plan.js';
 import { Reading, type Sink } from './session/reading.js';
+import { ResourceFetcher, type Seeker } from './session/resources.js';
 import { parseTarget } from './session/target.js';
 import { reportUncaught } from './session/uncaught.js';
 import type { Connector, Link, Target } from './transport.js';
 import { moqConnector } from './transport/moq.js';
+import { videoDecoders } from './video/decoders.js';
 import { WireError } from './wire-error.js';
 
 /** How to connect; all of it may be left out. */
@@ -47,6 +50,8 @@ export interface ConnectOptions {
   saved?: Uint8Array;
   /** Makes connections; tests bring their own. */
   connector?: Connector;
+  /** Opens decoders of video; those of the browser unless given, where it has any. */
+  openDecoder?: OpenDecoder;
 }
 
 /** Milliseconds between two looks at link, camera and pending edits. */
@@ -85,7 +90,7 @@ function seconds(): number {
   return performance.now() / 1000;
 }
 
-class LiveSession implements Session, Sink {
+class LiveSession implements Session, Sink, Seeker {
   readonly origin: string;
   readonly scene: string;
   readonly client: string;
@@ -94,6 +99,7 @@ class LiveSession implements Session, Sink {
   private settleReady: { resolve: () => void; reject: (error: Error) => void } | undefined;
   private readonly cache: Cache;
   private readonly outbox: Outbox;
+  private readonly resources: ResourceFetcher;
   private readonly meter = new Meter();
   private readonly emitter = new Emitter<SessionEvents>();
   private readonly ending = new AbortController();
@@ -104,7 +110,7 @@ class LiveSession implements Session, Sink {
   private reading: Reading | undefined;
   private camera: Vec3 | undefined;
   /** Where the server answers plain requests, as far as is known. */
-  private base: URL;
+  base: URL;
   /** Seconds awake since the link was made, or last gave a frame. */
   private silence = 0;
 
@@ -117,8 +123,12 @@ class LiveSession implements Session, Sink {
     this.scene = target.scene;
     this.client = target.client;
     this.connector = options.connector ?? moqConnector;
-    this.cache = new Cache(target.client);
+    this.cache = new Cache(target.client, {
+      openDecoder: options.openDecoder ?? videoDecoders(),
+      onLate: () => this.dispatch(),
+    });
     this.outbox = new Outbox(this.cache);
+    this.resources = new ResourceFetcher(this, this.ending.signal);
     this.ready = new Promise((resolve, reject) => (this.settleReady = { resolve, reject }));
     // Who does not wait for it need not hear that it failed.
     this.ready.catch(() => {});
@@ -229,16 +239,23 @@ class LiveSession implements Session, Sink {
       return this.drop(error);
     }
     this.dispatch();
+    this.resources.look();
     if (!this.cache.catalog || (this.reading && !changed)) return;
     // Tracks of a former epoch or set of fields are read no more.
     this.reading?.close();
     this.meter.restart();
-    this.reading = new Reading(link, this.cache.catalog, this, now);
+    this.reading = new Reading(link, this.readable(this.cache.catalog), this, now);
     this.reading.setCamera(this.camera);
     this.reading.adapt(now);
     this.outbox.connected((bytes) => link.sendEdit(bytes), now);
     if (this.current.state !== 'connected') this.setStatus({ state: 'connected', transport: link.kind });
     this.settleReady?.resolve();
+  }
+
+  /** A catalog without fields that nothing is made of here. */
+  private readable(catalog: Catalog): Catalog {
+    const { unshown } = this;
+    return { ...catalog, fields: catalog.fields.filter((field) => !unshown.includes(field)) };
   }
 
   stateFrame(frame: Uint8Array): void {
@@ -272,6 +289,14 @@ class LiveSession implements Session, Sink {
     if (delay !== undefined) this.reading?.arrived(track, update, delay, bytes, now);
     this.dispatch();
     return added.news;
+  }
+
+  takeResource(bytes: Uint8Array): void {
+    try {
+      this.cache.addResource(bytes);
+    } catch (error) {
+      this.drop(error);
+    }
   }
 
   /** Notes that a frame came; returns when. */
@@ -328,6 +353,14 @@ class LiveSession implements Session, Sink {
     return this.cache.catalog;
   }
 
+  get unshown(): readonly FieldInfo[] {
+    return this.cache.unshown;
+  }
+
+  get wantedResources(): readonly string[] {
+    return this.cache.wantedResources;
+  }
+
   get pending(): readonly Edit[] {
     return this.cache.pending.map(({ edit }) => edit);
   }
@@ -337,7 +370,7 @@ class LiveSession implements Session, Sink {
     const state = this.cache.state;
     return {
       tickRate: state && this.meter.ticks.at(now),
-      updateRate: this.meter.updates.at(now),
+      updateRate: this.meter.updateRate(now),
       age: this.cache.age(now),
       bandwidth: this.meter.bytes.at(now),
       bandwidthByTrack: this.meter.bandwidthByTrack(now),
@@ -388,6 +421,7 @@ class LiveSession implements Session, Sink {
     if (this.ending.signal.aborted) return;
     this.ending.abort();
     this.link?.close();
+    this.cache.close();
     this.outbox.close(reason);
     this.settleReady?.reject(problem ? new ConnectError(problem, reason) : new Error(reason));
     this.setStatus({ state: 'closed', reason, ...(problem && { problem }) });

@@ -1,7 +1,8 @@
 /** `vectors/cache.json`, which Rust reads too: what a cache makes of what comes, and shows at times. */
 import { describe, expect, it } from 'vitest';
-import type { FieldLight } from '../src/api.js';
+import type { VolumeLight } from '../src/api.js';
 import { Cache } from '../src/cache.js';
+import { isVolume } from '../src/codec/catalog.js';
 import { valuesPerProbe } from '../src/codec/volume-shape.js';
 import { WireError } from '../src/wire-error.js';
 import { FakeServer, json, TICK } from './support/fake-server.js';
@@ -83,7 +84,7 @@ function take(cache: Cache, { at, catalog, state, light, load }: Step): { news?:
 function expectShown(cache: Cache, at: number, shown: Shown, where: string): void {
   const light = cache.light(at);
   for (const { field, first, last } of shown.fields ?? []) {
-    const lit = light.fields.find((one) => one.field.id === field);
+    const lit = light.fields.filter(isVolume).find((one) => one.field.id === field);
     // Regions without light are dark.
     const [firstShown, lastShown] = lit ? endsOf(lit) : [0, 0];
     expectNear(firstShown, first ?? 0, 0.01, `${where}, first of field ${field}`);
@@ -94,7 +95,7 @@ function expectShown(cache: Cache, at: number, shown: Shown, where: string): voi
 }
 
 /** Red of coefficient 0 of the first and the last probe. */
-function endsOf({ coefficients, field }: FieldLight): [number, number] {
+function endsOf({ coefficients, field }: VolumeLight): [number, number] {
   return [coefficients[0], coefficients[coefficients.length - valuesPerProbe(field.shape.order)]];
 }
 

@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest';
 
 import { Cache, type CacheEvent } from '../src/cache.js';
+import { isVolume } from '../src/codec/catalog.js';
 import type { Edit } from '../src/edit.js';
 import { WireError } from '../src/wire-error.js';
 import { FakeServer, json, type SentFrame, TICK } from './support/fake-server.js';
@@ -8,6 +9,7 @@ import { lightFile, record } from './support/light-file.js';
 import { join } from './support/probe-encoder.js';
 import { random } from './support/random.js';
 import { SimulatedLink } from './support/simulated-link.js';
+import { volumeOf } from './support/volumes.js';
 
 const ME = 'me';
 
@@ -30,7 +32,13 @@ function addLight(cache: Cache, track: string, bytes: Uint8Array, now: number): 
 
 /** Red of the first probe's c0. */
 function shown(cache: Cache, now: number): number {
-  return cache.light(now).fields[0].coefficients[0];
+  return volumeOf(cache.light(now)).coefficients[0];
+}
+
+/** How many regions each volume that is shown has. */
+function regionCounts(cache: Cache, now: number): number[] {
+  const volumes = cache.light(now).fields.filter(isVolume);
+  return volumes.map(({ field }) => field.shape.regions.length);
 }
 
 function move(node: number, x: number): Edit {
@@ -62,7 +70,7 @@ describe('light', () => {
     const cache = joined(server);
     feed(cache, server.step(), 0);
     feed(cache, server.step(), 0.04);
-    const revision = (now: number) => cache.light(now).fields[0].revision;
+    const revision = (now: number) => volumeOf(cache.light(now)).revision;
     expect(revision(0.05)).not.toBe(revision(0.06));
     expect(revision(0.1)).toBe(revision(0.2));
     expect(revision(0.2)).toBe(revision(5));
@@ -123,7 +131,7 @@ describe('light', () => {
     const cache = joined(server);
     const group = Array.from({ length: 40 }, () => server.step().probes).flat();
     for (const { track, bytes } of group) addLight(cache, track, bytes, 0);
-    const revision = () => cache.light(2).fields[0].revision;
+    const revision = () => volumeOf(cache.light(2)).revision;
     const before = revision();
     for (const { track, bytes } of group) addLight(cache, track, bytes, 1);
     expect(revision()).toBe(before);
@@ -421,10 +429,10 @@ describe('a restarted server', () => {
     feed(cache, old.step(), 0);
     const fresh = new FakeServer({ epoch: '00000000000000bb', regions: 2, brightness: () => 80 });
     cache.addCatalog(fresh.catalog, 0);
-    expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([1]);
+    expect(regionCounts(cache, 1)).toEqual([1]);
     expect(cache.light(1).fields[0].tick).toBeUndefined();
     feed(cache, fresh.step(), 1);
-    expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([2]);
+    expect(regionCounts(cache, 1)).toEqual([2]);
   });
 
   it('without a field that it had shows that one too until there is new light', () => {
@@ -492,10 +500,10 @@ describe('a field with an epoch of its own', () => {
     feed(cache, server.step(), 0);
     const fresh = new FakeServer({ ...own, fieldEpoch: '00000000000000f2', regions: 2 });
     cache.addCatalog(fresh.catalog, 0);
-    expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([1]);
+    expect(regionCounts(cache, 1)).toEqual([1]);
     expect(cache.light(1).fields[0].tick).toBeUndefined();
     feed(cache, { probes: fresh.step().probes }, 1);
-    expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([2]);
+    expect(regionCounts(cache, 1)).toEqual([2]);
   });
 
   it('keeps one old light, however often its shape changes', () => {
@@ -508,7 +516,7 @@ describe('a field with an epoch of its own', () => {
     const cache = joined(shaped(0));
     feed(cache, shaped(0).step(), 0);
     for (let i = 1; i < 50; i++) cache.addCatalog(shaped(i).catalog, 0);
-    expect(cache.light(1).fields.map(({ field }) => field.shape.regions.length)).toEqual([1]);
+    expect(regionCounts(cache, 1)).toEqual([1]);
     // Shapes that never had light are not kept.
     expect(cache['leftover'].length).toBe(1);
     // Where each shape had light, the last is shown.
@@ -517,7 +525,7 @@ describe('a field with an epoch of its own', () => {
       feed(cache, { probes: shaped(i).step().probes }, i);
     }
     cache.addCatalog(shaped(80).catalog, 0);
-    expect(cache.light(81).fields.map(({ field }) => field.shape.regions.length)).toEqual([1 + (79 % 3)]);
+    expect(regionCounts(cache, 81)).toEqual([1 + (79 % 3)]);
   });
 });
 

@@ -4,6 +4,7 @@ import { epochOf, hasSameShape, offersSame, parseCatalog } from '../src/codec/ca
 import { parseState } from '../src/codec/state.js';
 import { FakeServer, json } from './support/fake-server.js';
 import { random } from './support/random.js';
+import { volumeIn } from './support/volumes.js';
 
 type Loose = Record<string, any>;
 
@@ -15,10 +16,11 @@ function catalog(change: (catalog: Loose, field: Loose) => void = () => {}): Uin
 
 describe('a catalog', () => {
   it('is read, with the fields of unknown kinds apart', () => {
-    const { epoch, tickSeconds, fields, unknown } = parseCatalog(catalog());
+    const read = parseCatalog(catalog());
+    const { epoch, tickSeconds, fields, unknown } = read;
     expect(unknown).toEqual([{ id: 9, kind: 'something later' }]);
     expect([epoch, tickSeconds, fields.length]).toEqual(['00000000000000aa', 0.04, 1]);
-    expect(fields[0].shape.regions[1]).toEqual({ id: 1, min: [2, 0, 0], size: [2, 2, 2] });
+    expect(volumeIn(read).shape.regions[1]).toEqual({ id: 1, min: [2, 0, 0], size: [2, 2, 2] });
   });
 
   const unknown: [string, (catalog: Loose, field: Loose) => void, object][] = [
@@ -47,9 +49,9 @@ describe('a catalog', () => {
   });
 
   it('tells where in front of surfaces a field is read: half a cell unless it says so', () => {
-    expect(parseCatalog(catalog()).fields[0].shape.offset).toEqual({ cells: 0.5 });
+    expect(volumeIn(parseCatalog(catalog())).shape.offset).toEqual({ cells: 0.5 });
     for (const offset of [{ cells: 0.125 }, { metres: 0.1 }]) {
-      expect(parseCatalog(catalog((_, f) => (f.shape.offset = offset))).fields[0].shape.offset).toEqual(
+      expect(volumeIn(parseCatalog(catalog((_, f) => (f.shape.offset = offset)))).shape.offset).toEqual(
         offset,
       );
     }
@@ -87,8 +89,8 @@ describe('a catalog', () => {
   });
 
   it('has its rotation made a unit quaternion', () => {
-    const { fields } = parseCatalog(catalog((_, field) => (field.shape.grid.rotation = [0, 0.6001, 0, 0.8])));
-    expect(Math.hypot(...fields[0].shape.grid.rotation)).toBeCloseTo(1, 12);
+    const turned = parseCatalog(catalog((_, field) => (field.shape.grid.rotation = [0, 0.6001, 0, 0.8])));
+    expect(Math.hypot(...volumeIn(turned).shape.grid.rotation)).toBeCloseTo(1, 12);
   });
 
   const refused: [string, string, (catalog: Loose, field: Loose) => void][] = [

@@ -4,7 +4,7 @@ import { layerOf } from '../src/codec/probe-header.js';
 import { ProbeDecoder } from '../src/codec/probes.js';
 import type { Vec3 } from '../src/edit.js';
 import { WireError } from '../src/wire-error.js';
-import { bytesOf, readVectors } from './support/vectors.js';
+import { bytesOf, fnv, readVectors } from './support/vectors.js';
 
 interface Vectors {
   sequences: {
@@ -31,13 +31,6 @@ interface Vectors {
 }
 
 const vectors = readVectors<Vectors>('codec');
-
-/** FNV-1a of the little-endian bytes. */
-function fnv(coefficients: Float32Array): number {
-  let hash = 0x811c9dc5;
-  for (const byte of new Uint8Array(coefficients.buffer)) hash = Math.imul(hash ^ byte, 0x01000193);
-  return hash >>> 0;
-}
 
 describe('vectors/codec.json', () => {
   for (const { name, size, order, frames } of vectors.sequences) {

@@ -43,11 +43,17 @@ function feed(
 describe('of mutated bytes', { timeout: 600_000 * rounds }, () => {
   it.each([
     ['probe frames', targets.probeFrame, seeds.probeFrames, 10_000, 8 * MIB],
+    ['lumel frames', targets.lumelFrame, seeds.lumelFrames, 10_000, 8 * MIB],
+    ['video frames', targets.videoFrame, seeds.videoFrames, 5000, MIB],
+    ['charts', targets.charts, seeds.charts, 10_000, MIB],
+    ['layouts', targets.layout, seeds.layouts, 5000, MIB],
     ['catalogs', targets.catalog, seeds.catalogs, 20_000, MIB],
     ['state frames', targets.state, seeds.states, 20_000, MIB],
     ['client edits', targets.clientEdit, seeds.clientEdits, 20_000, MIB],
     ['saved files', targets.lightFile, seeds.lightFiles, 5000, 8 * MIB],
+    ['saved lightmaps', targets.lightFile, seeds.lightmapFiles, 2000, 8 * MIB],
     ['streams', targets.stream, seeds.streams, 2000, 64 * MIB],
+    ['streams of lightmaps', targets.stream, seeds.lightmapStreams, 2000, 64 * MIB],
   ] as const)('%s are taken or refused', (_, target, seeds, mutations, memory) => {
     feed(target, seeds, mutations, memory);
   });

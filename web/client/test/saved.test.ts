@@ -4,10 +4,13 @@ import type { AddressInfo } from 'node:net';
 import { afterEach, describe, expect, it, vi } from 'vitest';
 
 import type { Status } from '../src/api.js';
+import { isLightmap } from '../src/codec/catalog.js';
 import { fetchLight, openLight } from '../src/saved.js';
 import { FakeServer } from './support/fake-server.js';
-import { lightFile, record } from './support/light-file.js';
+import { lightFile, lightmapFile, record } from './support/light-file.js';
+import { LightmapServer } from './support/lightmap-server.js';
 import { join, varint } from './support/probe-encoder.js';
+import { volumeOf } from './support/volumes.js';
 
 const saved = lightFile(new FakeServer({ brightness: () => 7 }));
 const servers: Server[] = [];
@@ -27,7 +30,7 @@ describe('opened light', () => {
     await session.ready;
     expect(session.status).toEqual({ state: 'saved' });
     expect([session.scene, session.files]).toEqual(['test', 'https://host/shop/']);
-    expect(session.light().fields[0].coefficients[0]).toBeCloseTo(7, 1);
+    expect(volumeOf(session.light()).coefficients[0]).toBeCloseTo(7, 1);
     expect(session.light().age).toBeUndefined();
     expect(session.stats).toMatchObject({ updateRate: 0, bandwidth: 0, pending: 0 });
     expect([fetch.mock.calls.length, vi.getTimerCount()]).toEqual([0, 0]);
@@ -40,6 +43,12 @@ describe('opened light', () => {
     const session = openLight(file);
     await session.ready;
     expect(session.light().fields.map(({ field }) => field.id)).toEqual([0]);
+  });
+
+  it('may hold a lightmap', () => {
+    const session = openLight(lightmapFile(new LightmapServer(), 4));
+    const [{ layout, regions }] = session.light().fields.filter(isLightmap);
+    expect([layout?.surfaces.length, regions.length, session.unshown]).toEqual([2, 2, []]);
   });
 
   it('refuses edits, and can be closed', async () => {

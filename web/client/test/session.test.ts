@@ -13,6 +13,7 @@ import { connect, type ConnectOptions } from '../src/session.js';
 import { FakeNet } from './support/fake-link.js';
 import { FakeServer, json, TICK } from './support/fake-server.js';
 import { lightFile } from './support/light-file.js';
+import { volumeOf } from './support/volumes.js';
 
 const MOVE: Edit = { edit: 'move_node', node: 1, translation: [1, 2, 3] };
 const sessions: Session[] = [];
@@ -82,7 +83,7 @@ describe('connecting', () => {
     expect([...net.link.readers.keys()].sort()).toEqual(
       ['catalog', 'f0/r0/l0', 'f0/r0/l1', 'f0/r0/l2', 'state'].sort(),
     );
-    expect(session.light().fields[0].coefficients[0]).toBeCloseTo(1, 3);
+    expect(volumeOf(session.light()).coefficients[0]).toBeCloseTo(1, 3);
   });
 
   it('goes on when the catalog tells another scale', async () => {
@@ -180,7 +181,7 @@ describe('connecting', () => {
 
 describe('saved light', () => {
   const saved = () => lightFile(new FakeServer({ brightness: () => 7 }));
-  const red = (session: Session) => session.light().fields[0].coefficients[0];
+  const red = (session: Session) => volumeOf(session.light()).coefficients[0];
 
   it('is shown with no server, while one is looked for', async () => {
     const net = new FakeNet();
@@ -238,11 +239,11 @@ describe('after a loss', () => {
     const snapshots = vi.fn();
     session.on('snapshot', snapshots);
     await run(net, server, 1);
-    const before = session.light().fields[0].coefficients[0];
+    const before = volumeOf(session.light()).coefficients[0];
     net.link.break('the cable was pulled');
     await pass(0.1);
     expect(statuses.at(-1)).toEqual({ state: 'lost', reason: 'the cable was pulled', retryIn: 0.25 });
-    expect(session.light().fields[0].coefficients[0]).toBeGreaterThanOrEqual(before);
+    expect(volumeOf(session.light()).coefficients[0]).toBeGreaterThanOrEqual(before);
     await pass(0.3);
     expect(net.links.length).toBe(2);
     net.link.deliver('catalog', server.catalog);

@@ -124,7 +124,7 @@ describe('light', () => {
     const version = texture.version;
     light.update(camera);
     expect(texture.version).toBe(version);
-    session.state = { fields: [{ ...session.state.fields[0], revision: 2 }], age: 0 };
+    session.state = { fields: [{ ...lit, revision: 2, regions: { lit: 1, all: 1 } }], age: 0 };
     light.update(camera);
     expect(texture.version).toBe(version + 1);
 

@@ -168,7 +168,8 @@ describe('a person at the page', () => {
     const spheres = await page.evaluate(() => {
       const { camera, renderer, session, viewer } = window.lumencast!;
       const { clientWidth, clientHeight } = renderer.domElement;
-      const { center, size, resolution } = session.catalog!.fields[0].shape.grid;
+      const { center, size, resolution } = session.catalog!.fields.find((field) => field.kind === 'volume')!
+        .shape.grid;
       const at = (axis: number, cell: number) =>
         center[axis] + ((cell + 0.5) / resolution[axis] - 0.5) * size[axis];
       const points: [number, number][] = [];
@@ -269,7 +270,9 @@ describe('a person at the page', () => {
   it('changes a lamp in the inspector, and its light follows', async () => {
     const light = () =>
       page.evaluate(() => {
-        const { coefficients } = window.lumencast!.session.light().fields[0];
+        const { coefficients } = window
+          .lumencast!.session.light()
+          .fields.find((field) => field.kind === 'volume')!;
         let [red, blue] = [0, 0];
         for (let i = 0; i < coefficients.length; i += 27) {
           red += coefficients[i];
@@ -466,7 +469,7 @@ describe('a scene of two volumes', () => {
         const { session, light } = window.lumencast!;
         const mean = ({ coefficients }: { coefficients: Float32Array }) =>
           coefficients.reduce((total, value, i) => total + (i % 27 < 3 ? value : 0), 0) / coefficients.length;
-        const { fields } = session.light();
+        const fields = session.light().fields.filter((field) => field.kind === 'volume');
         return { means: fields.map(mean), grids: light.grids.length };
       });
       expect(fields.means.length).toBe(2);

@@ -161,7 +161,7 @@ declare global {
 function watch(camera: [number, number, number]): void {
   const { session } = window.lumencast!;
   session.setCamera(camera);
-  const count = session.catalog!.fields[0].shape.regions.length;
+  const count = session.catalog!.fields.find((field) => field.kind === 'volume')!.shape.regions.length;
   const fresh = () => Array.from({ length: count }, () => ({ updates: 0, ages: [] as number[] }));
   const newest = Array.from({ length: count }, () => -Infinity);
   let regions = fresh();

@@ -84,7 +84,7 @@ describe('the page', () => {
         (_, i) => [60 + (i % 10) * 30, 40 + Math.floor(i / 10) * 30] as const,
       );
       const look = () => viewer.pixels(points).flat();
-      const lit = () => session.light().fields[0];
+      const lit = () => session.light().fields.find((field) => field.kind === 'volume')!;
       const change = (a: ArrayLike<number>, b: ArrayLike<number>) => {
         let [apart, all] = [0, 1e-6];
         for (let i = 0; i < a.length; i++) {

@@ -114,7 +114,8 @@ async function turnSun(degrees: number) {
   const AVERAGE = 4_000;
   const { light, session, viewer } = window.lumencast!;
   const wait = (ms: number) => new Promise((resolve) => setTimeout(resolve, ms));
-  const look = () => new Float32Array(session.light().fields[0].coefficients);
+  const volume = () => session.light().fields.find((field) => field.kind === 'volume')!;
+  const look = () => new Float32Array(volume().coefficients);
   const watch = async (ms: number) => {
     const seen: { at: number; light: Float32Array }[] = [];
     for (const start = performance.now(); performance.now() - start < ms; await wait(20)) {

@@ -4,10 +4,8 @@ import { layerOf, type ProbeHeader, splitProbeFrame } from '../codec/probe-heade
 import { ProbeDecoder } from '../codec/probes.js';
 import { cellCount, type Region, valuesPerProbe } from '../codec/volume-shape.js';
 import { WireError } from '../wire-error.js';
-import type { Arrival, FieldCache, OnLight, Received } from './field.js';
-
-/** Seconds that a change takes to show at most, however long the silence before it was. */
-const LONGEST_BLEND = 0.5;
+import type { AgeOf, Arrival, FieldCache, OnLight, Received } from './field.js';
+import { Passage } from './passage.js';
 
 /** The newest light of a region and what is shown on the way there. */
 interface RegionState {
@@ -23,16 +21,15 @@ interface RegionState {
   scale: number;
   /** When it came. */
   arrived: number;
-  /** Seconds between it and the one before: how long the blend takes. */
-  interval: number;
+  /** From `from` to `to`. */
+  readonly passage: Passage;
   /** Weight of `to` in what `shown` holds; −1 when it holds neither. */
   shown: number;
 }
 
 /**
- * The light of a volume: decodes its regions and blends each from what was shown when its newest
- * update came to that update, over the time that lay between the last two. So the light never jumps,
- * is late by one interval, and stands still when an update is overdue. Frames are decoded as they come.
+ * The light of a volume: decodes its regions and blends each on its {@link Passage} to its newest update.
+ * Frames are decoded as they come.
  */
 export class VolumeCache implements FieldCache {
   private readonly regions = new Map<number, RegionState>();
@@ -54,7 +51,7 @@ export class VolumeCache implements FieldCache {
         to: undefined,
         scale: 1,
         arrived: 0,
-        interval: 0,
+        passage: new Passage(),
         shown: -1,
       });
     }
@@ -89,13 +86,11 @@ export class VolumeCache implements FieldCache {
     const { coefficients } = state.decoder.decode(frame);
     if (!news) return { head, news };
     if (state.to) {
-      // Frames that come in a burst blend over the time in which they were made.
-      const made = before ? (head.tick - before.tick) * tickSeconds : 0;
       const from = state.from ?? new Float32Array(coefficients.length);
-      blend(state.from ?? state.to, state.to, weight(state, now), from);
+      blend(state.from ?? state.to, state.to, state.passage.at(now), from);
       state.from = from;
-      state.interval = Math.min(Math.max(now - state.arrived, made), LONGEST_BLEND);
     }
+    state.passage.begin(now, before ? (head.tick - before.tick) * tickSeconds : 0);
     state.to = coefficients;
     state.head = head;
     state.scale = head.scale;
@@ -116,7 +111,7 @@ export class VolumeCache implements FieldCache {
     return oldest && newest && { oldest, newest };
   }
 
-  light(now: number, ageOf: (tick: number, arrived: number) => number | undefined): VolumeLight | undefined {
+  light(now: number, ageOf: AgeOf): VolumeLight | undefined {
     let lit = 0;
     let scale = 0;
     let changed = false;
@@ -124,7 +119,7 @@ export class VolumeCache implements FieldCache {
       if (!state.to) continue;
       lit++;
       scale = Math.max(scale, state.scale);
-      changed = this.show(state, weight(state, now)) || changed;
+      changed = this.show(state, state.passage.at(now)) || changed;
     }
     if (lit === 0) return undefined;
     if (changed) this.revision++;
@@ -141,6 +136,10 @@ export class VolumeCache implements FieldCache {
       regions: { lit, all: this.regions.size },
     };
   }
+
+  keepResources(): void {}
+
+  close(): void {}
 
   /** Writes a region's blend into the volume's coefficients, unless it stands there already. */
   private show(state: RegionState, w: number): boolean {
@@ -166,12 +165,6 @@ export class VolumeCache implements FieldCache {
     }
     return true;
   }
-}
-
-/** How far a region is on its way to its newest update, 0 to 1. */
-function weight(state: RegionState, now: number): number {
-  if (!state.from || !(state.interval > 0)) return 1;
-  return Math.min(1, Math.max(0, (now - state.arrived) / state.interval));
 }
 
 /** `out` = `from` + `w` · (`to` − `from`); `out` may be `from`. */

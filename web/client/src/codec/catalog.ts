@@ -13,6 +13,7 @@ import {
   usable,
   whole,
 } from './json.js';
+import { type LightmapShape, lumelCount, parseLightmapShape } from './lightmap-shape.js';
 import { LIMITS } from './limits.js';
 import { cellCount, parseVolumeShape, type VolumeShape } from './volume-shape.js';
 
@@ -55,6 +56,7 @@ export interface FieldHead {
 /** The kinds of fields that this client knows, each with its shape: what the catalog says of it besides. */
 export interface Shapes {
   readonly volume: VolumeShape;
+  readonly lightmap: LightmapShape;
 }
 
 export type FieldKind = keyof Shapes;
@@ -77,6 +79,13 @@ export function isVolume<T extends { readonly kind: FieldKind }>(
   return of.kind === 'volume';
 }
 
+/** Whether a field, or its light, is that of a lightmap. */
+export function isLightmap<T extends { readonly kind: FieldKind }>(
+  of: T,
+): of is Extract<T, { readonly kind: 'lightmap' }> {
+  return of.kind === 'lightmap';
+}
+
 /** The run that numbers a field's updates and ticks: its own, or else the catalog's. */
 export function epochOf(catalog: Catalog, field: FieldInfo): string {
   return field.epoch ?? catalog.epoch;
@@ -90,11 +99,20 @@ export function hasSameShape(a: FieldInfo, b: FieldInfo): boolean {
   return a.kind === b.kind && JSON.stringify(a.shape) === JSON.stringify(b.shape);
 }
 
-/** Whether two catalogs offer the same fields of the same scene and run, at whatever scales. */
+/**
+ * Whether frames of the one field are frames of the other too, if one server numbers them: their shapes are
+ * equal but for the layout of a lightmap, which says where surfaces are and nothing of how pages are coded.
+ */
+export function isCodedAlike(a: FieldInfo, b: FieldInfo): boolean {
+  if (!isLightmap(a) || !isLightmap(b)) return hasSameShape(a, b);
+  return hasSameShape(a, { ...b, shape: { ...b.shape, layout: a.shape.layout } });
+}
+
+/** Whether two catalogs offer the same fields of the same scene and run, at whatever scales and layouts. */
 export function offersSame(a: Catalog, b: Catalog): boolean {
   const heads = ({ fields, ...rest }: Catalog) =>
     JSON.stringify({ ...rest, heads: fields.map(({ scale: _, shape: __, ...head }) => head) });
-  return heads(a) === heads(b) && a.fields.every((field, i) => hasSameShape(field, b.fields[i]));
+  return heads(a) === heads(b) && a.fields.every((field, i) => isCodedAlike(field, b.fields[i]));
 }
 
 /**
@@ -103,6 +121,7 @@ export function offersSame(a: Catalog, b: Catalog): boolean {
  */
 const SHAPES: { readonly [K in FieldKind]: (json: Json) => Shapes[K] | undefined } = {
   volume: parseVolumeShape,
+  lightmap: parseLightmapShape,
 };
 
 /**
@@ -133,6 +152,8 @@ export function parseCatalog(bytes: Uint8Array): Catalog {
   const volumes = fields.filter(isVolume);
   const probes = volumes.reduce((sum, { shape }) => sum + cellCount(shape.grid.resolution), 0);
   if (probes > LIMITS.probesPerCatalog) throw new WireError('limit', `a catalog of ${probes} probes`);
+  const lumels = fields.filter(isLightmap).reduce((sum, { shape }) => sum + lumelCount(shape), 0);
+  if (lumels > LIMITS.lumelsPerCatalog) throw new WireError('limit', `a catalog of ${lumels} lumels`);
   return {
     epoch,
     scene: { name: text(scene.name, 'scene.name'), root: text(scene.root, 'scene.root') },

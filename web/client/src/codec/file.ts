@@ -2,9 +2,9 @@ import type { Edit } from '../edit.js';
 import { WireError } from '../wire-error.js';
 import { type Catalog, parseCatalog } from './catalog.js';
 import { parseEdit } from './edits.js';
+import { splitFrame } from './frame-head.js';
 import { list, parseObject } from './json.js';
 import { LIMITS } from './limits.js';
-import { splitProbeFrame } from './probe-header.js';
 import { Reader } from './reader.js';
 
 /** What a `.light` file holds: a catalog and keyframes, the same bytes as on the wire. */
@@ -14,6 +14,8 @@ export interface LightFile {
   readonly edits: readonly Edit[];
   /** Files of the scene's folder that the edits name, by their names. */
   readonly files: ReadonlyMap<string, Uint8Array>;
+  /** Layouts of lightmaps, and their charts. */
+  readonly resources: readonly Uint8Array[];
   readonly frames: readonly { readonly field: number; readonly region: number; readonly frame: Uint8Array }[];
 }
 
@@ -21,10 +23,10 @@ const MAGIC = new TextEncoder().encode('LUMENCST');
 const VERSION = 2;
 
 /** What a record holds; those of other kinds are passed over. */
-const KIND = { catalog: 0, keyframe: 1, edits: 2, file: 3 } as const;
+const KIND = { catalog: 0, keyframe: 1, edits: 2, file: 3, resource: 4 } as const;
 const utf8 = new TextDecoder('utf-8', { fatal: true });
 
-/** Reads a `.light` file. The frames are views of `bytes`; their payloads are not decoded yet. */
+/** Reads a `.light` file. Frames and resources are views of `bytes`; what is in them is not decoded yet. */
 export function readLightFile(bytes: Uint8Array): LightFile {
   if (bytes.length > LIMITS.fileBytes) throw new WireError('limit', `a file of ${bytes.length} bytes`);
   const reader = new Reader(bytes);
@@ -38,6 +40,7 @@ export function readLightFile(bytes: Uint8Array): LightFile {
   const known = new Set(catalog.fields.map((field) => field.id));
   let edits: readonly Edit[] = [];
   const files = new Map<string, Uint8Array>();
+  const resources = [];
   const frames = [];
   while (reader.left > 0) {
     const { kind, body } = record(reader);
@@ -47,8 +50,9 @@ export function readLightFile(bytes: Uint8Array): LightFile {
       if (known.has(field)) frames.push({ field, region, frame: keyframe(body.rest()) });
     } else if (kind === KIND.edits) edits = readEdits(body.rest());
     else if (kind === KIND.file) files.set(name(body.take(body.varint())), body.rest());
+    else if (kind === KIND.resource) resources.push(resource(body.rest()));
   }
-  return { catalog, edits, files, frames };
+  return { catalog, edits, files, resources, frames };
 }
 
 function record(reader: Reader): { kind: number; body: Reader } {
@@ -57,10 +61,17 @@ function record(reader: Reader): { kind: number; body: Reader } {
 }
 
 function keyframe(frame: Uint8Array): Uint8Array {
-  if (splitProbeFrame(frame).header.base !== undefined) {
+  if (splitFrame(frame).head.base !== undefined) {
     throw new WireError('malformed', 'a delta in a light file');
   }
   return frame;
+}
+
+function resource(bytes: Uint8Array): Uint8Array {
+  if (bytes.length > LIMITS.resourceBytes) {
+    throw new WireError('limit', `a resource of ${bytes.length} bytes`);
+  }
+  return bytes;
 }
 
 function readEdits(bytes: Uint8Array): readonly Edit[] {

@@ -7,6 +7,13 @@ export const LIMITS = {
   probesPerField: 262_144,
   probesPerCatalog: 524_288,
   regionCells: 16,
+  pageLumels: 4096,
+  tileLumels: 256,
+  lumelsPerField: 8 << 20,
+  lumelsPerCatalog: 8 << 20,
+  resourceBytes: 64 << 20,
+  /** Of all that a client keeps. */
+  resourceBytesInAll: 256 << 20,
   sourceBytes: 128,
   nameBytes: 64,
   snapshotEdits: 65_536,

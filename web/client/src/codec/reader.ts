@@ -57,4 +57,33 @@ export class Reader {
     }
     throw new WireError('malformed', 'a varint of more than 8 bytes');
   }
+
+  /** A varint below 2³². */
+  number(): number {
+    const value = this.varint();
+    if (value > 0xffff_ffff) throw new WireError('malformed', 'a number of 2^32 or more');
+    return value;
+  }
+
+  /** A signed number: 0, −1, 1, −2, … as 0, 1, 2, 3, …. */
+  zigzag(): number {
+    return unzigzag(this.varint());
+  }
+
+  /**
+   * How many things follow of so many bytes each, at least. What is allocated for them is bounded by the
+   * bytes that are left.
+   */
+  count(bytesEach: number): number {
+    const count = this.varint();
+    if (count > Math.floor(this.left / bytesEach)) {
+      throw new WireError('truncated', 'the bytes end too early');
+    }
+    return count;
+  }
+}
+
+/** The signed number that a zigzag varint stands for. */
+export function unzigzag(value: number): number {
+  return value % 2 === 0 ? value / 2 : -(value + 1) / 2;
 }

@@ -7,11 +7,11 @@ const TIMINGS = 1000;
 /** Counts what arrives, for stats and measurements. Times in seconds unless said otherwise. */
 export class Meter {
   readonly ticks = new Rate();
-  readonly updates = new Rate();
   readonly bytes = new Rate();
   private readonly byTrack = new Map<string, Rate>();
   private readonly arrivals: Omit<Timing, 'clock'>[] = [];
-  private newestUpdate = -1;
+  /** Of each field, which numbers its updates by itself, the newest and their rate. */
+  private readonly updates = new Map<number, { newest: number; readonly rate: Rate }>();
   dropped = 0;
 
   /** Any frame of any track. */
@@ -22,11 +22,13 @@ export class Meter {
     rate.add(bytes, now);
   }
 
-  /** A probe frame that was of use. */
+  /** A frame of light that was of use. */
   update(update: number, timing: Omit<Timing, 'clock'>, now: number): void {
-    if (update > this.newestUpdate) {
-      this.newestUpdate = update;
-      this.updates.add(1, now);
+    const known = this.updates.get(timing.field) ?? { newest: -1, rate: new Rate() };
+    this.updates.set(timing.field, known);
+    if (update > known.newest) {
+      known.newest = update;
+      known.rate.add(1, now);
     }
     this.arrivals.push(timing);
     if (this.arrivals.length > TIMINGS) this.arrivals.shift();
@@ -34,8 +36,13 @@ export class Meter {
 
   /** Updates are numbered anew, and tracks may be others. */
   restart(): void {
-    this.newestUpdate = -1;
+    for (const known of this.updates.values()) known.newest = -1;
     this.byTrack.clear();
+  }
+
+  /** Updates a second, of the field that gets most. */
+  updateRate(now: number): number {
+    return Math.max(0, ...[...this.updates.values()].map(({ rate }) => rate.at(now)));
   }
 
   bandwidthByTrack(now: number): Map<string, number> {

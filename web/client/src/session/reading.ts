@@ -1,4 +1,4 @@
-import { type Catalog, epochOf } from '../codec/catalog.js';
+import { type Catalog, epochOf, isVolume } from '../codec/catalog.js';
 import { STATE_TRACK } from '../codec/tracks.js';
 import type { Vec3 } from '../edit.js';
 import type { Link, TrackReader } from '../transport.js';
@@ -22,6 +22,8 @@ export class Reading {
   readonly layers: LayerControl;
   private readonly stateReader: TrackReader;
   private readonly readers = new Map<string, TrackReader>();
+  /** Fields by which the link is judged. */
+  private readonly judged: ReadonlySet<number>;
   private readonly turns: Turns;
   private camera: Vec3 | undefined;
   private moved = false;
@@ -44,11 +46,12 @@ export class Reading {
   ) {
     this.beat = this.tickedAt = this.awake = now;
     const most = Math.max(1, ...catalog.fields.map((field) => layersOf(field)));
-    // Only of the catalog's own server are clock and updates known by which delivery is judged.
+    // Only of the catalog's own server are clock and updates known by which delivery is judged; and lightmaps
+    // number theirs apart, and have no upper layers to be dropped.
     const own = catalog.fields.filter((field) => epochOf(catalog, field) === catalog.epoch);
-    const judged = new Set(own.map((field) => field.id));
+    this.judged = new Set(own.filter(isVolume).map((field) => field.id));
     this.turns = new Turns(lowestTracks(catalog, undefined), catalog.tickSeconds, now, MOST_TRACKS);
-    const steady = ({ field, name }: TrackPlan) => judged.has(field) && !this.turns.isFar(name);
+    const steady = ({ field, name }: TrackPlan) => this.judged.has(field) && !this.turns.isFar(name);
     this.layers = new LayerControl(most, catalog.tickSeconds, (layers) =>
       framesPerUpdate(planTracks(catalog, layers, this.camera).filter(steady)),
     );
@@ -65,8 +68,8 @@ export class Reading {
   }
 
   /** Light came; see {@link LayerControl.arrived}. What comes and goes in turn tells nothing of the link. */
-  arrived({ name }: TrackPlan, update: number, delay: number, bytes: number, now: number): void {
-    if (!this.turns.isFar(name)) this.layers.arrived(update, delay, bytes, now);
+  arrived({ field, name }: TrackPlan, update: number, delay: number, bytes: number, now: number): void {
+    if (this.judged.has(field) && !this.turns.isFar(name)) this.layers.arrived(update, delay, bytes, now);
   }
 
   /** Adapts to the link and the camera. To be called some times a second. */

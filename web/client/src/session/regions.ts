@@ -1,5 +1,6 @@
 /** What the plan of a session must know of the regions of fields: a table of their kinds. */
 import type { FieldInfo, FieldKind, Shapes } from '../codec/catalog.js';
+import { tileCount } from '../codec/lightmap-shape.js';
 import type { Vec3 } from '../edit.js';
 import { boxDistance } from './box.js';
 
@@ -25,6 +26,11 @@ const RULES: { readonly [K in FieldKind]: RegionRules<Shapes[K]> } = {
     layers: ({ layers }) => layers,
     regions: ({ grid, regions }) =>
       regions.map((region) => ({ id: region.id, distance: (point) => boxDistance(grid, region, point) })),
+  },
+  lightmap: {
+    layers: () => 1,
+    // A shape does not say where in the world its surfaces are.
+    regions: (shape) => Array.from({ length: tileCount(shape) }, (_, id) => ({ id, distance: () => 0 })),
   },
 };
 

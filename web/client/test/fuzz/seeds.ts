@@ -4,6 +4,11 @@ import type { Vec3 } from '../../src/edit.js';
 import { json } from '../support/fake-server.js';
 import { record } from '../support/light-file.js';
 import { join, varint } from '../support/probe-encoder.js';
+import { accessUnit } from '../support/fake-video.js';
+import { lightmapFile } from '../support/light-file.js';
+import { LightmapServer } from '../support/lightmap-server.js';
+import { triangle } from '../support/resource-writer.js';
+import { frameHead } from '../support/probe-encoder.js';
 import { bytesOf, readVectors } from '../support/vectors.js';
 
 /** Probe frames of one region, one after the other. */
@@ -25,7 +30,23 @@ const { edits } = readVectors<{ edits: { json: unknown }[] }>('edits');
 
 export const probeFrames: readonly Uint8Array[] = sequences.flatMap(({ frames }) => frames);
 
-export const catalogs = framesOf('catalog');
+const { sequences: tiles } = readVectors<{ sequences: { frames: { bytes: string }[] }[] }>('lumels');
+
+/** Frames of tiles, of several sequences. */
+export const lumelFrames: readonly Uint8Array[] = tiles.flatMap(({ frames }) =>
+  frames.slice(0, 3).map(({ bytes }) => bytesOf(bytes)),
+);
+
+/** Frames of video, of which what is in the access unit is the decoder's affair. */
+export const videoFrames: readonly Uint8Array[] = [true, false].map((key) =>
+  join(frameHead({ update: 5, ...(key ? {} : { base: 4 }) }), [7, 96], accessUnit(key, 1)),
+);
+
+const resources = readVectors<Record<'charts' | 'layouts', { bytes: string }[]>>('resources');
+export const charts: readonly Uint8Array[] = resources.charts.map(({ bytes }) => bytesOf(bytes));
+export const layouts: readonly Uint8Array[] = resources.layouts.map(({ bytes }) => bytesOf(bytes));
+
+export const catalogs = [...framesOf('catalog'), new LightmapServer().catalog];
 export const states = framesOf('state');
 
 /** Edits as clients send them. */
@@ -42,7 +63,16 @@ export const streams: readonly Uint8Array[] = sequences.map((sequence, number) =
   return join(packed('c', catalogOf(sequence)), ...frames);
 });
 
+/** The same of a lightmap. */
+export const lightmapStreams: readonly Uint8Array[] = [8, 24].map((pageSize) => {
+  const server = new LightmapServer({ pageSize, pages: 1, surfaces: [{ node: 1, charts: triangle(4) }] });
+  const frames = [1, 1, 2, 3].flatMap((value) => server.step(value).map(({ bytes }) => packed(0, bytes)));
+  const all = server.resources.map(({ bytes }) => packed('r', bytes));
+  return join(packed('c', server.catalog), ...all, ...frames);
+});
+
 /** Files of saved light. */
+export const lightmapFiles: readonly Uint8Array[] = [lightmapFile(new LightmapServer(), 4)];
 export const lightFiles: readonly Uint8Array[] = sequences.map((sequence) => {
   const kept = json({ edits: edits.map((edit) => edit.json) });
   return join(
@@ -56,10 +86,10 @@ export const lightFiles: readonly Uint8Array[] = sequences.map((sequence) => {
 });
 
 /**
- * A frame of a stream: its track (`c`atalog, `s`tate, or the number of a layer), its length in two bytes,
- * and what it holds.
+ * A frame of a stream: its track (`c`atalog, `s`tate, or the number of a layer; `r` a resource), its length in
+ * two bytes, and what it holds.
  */
-function packed(track: 'c' | 's' | number, frame: Uint8Array): Uint8Array {
+function packed(track: 'c' | 's' | 'r' | number, frame: Uint8Array): Uint8Array {
   const first = typeof track === 'number' ? track : track.charCodeAt(0);
   return join([first, frame.length & 0xff, frame.length >> 8], frame);
 }

@@ -1,5 +1,7 @@
 import type { FakeServer } from './fake-server.js';
+import { FIELD, type LightmapServer } from './lightmap-server.js';
 import { join, varint } from './probe-encoder.js';
+import type { Resource } from './resource-writer.js';
 
 /** What a `.light` file keeps of its scene. */
 export interface Kept {
@@ -26,4 +28,17 @@ export function lightFile(server: FakeServer, { edits, files = {} }: Kept = {}):
 export function record(kind: number, ...parts: (Uint8Array | number[])[]): Uint8Array {
   const body = join([kind], ...parts);
   return join(varint(body.length), body);
+}
+
+/** A `.light` file of a lightmap of such light; resources may be left out. */
+export function lightmapFile(
+  server: LightmapServer,
+  value: number,
+  resources: readonly Resource[] = server.resources,
+): Uint8Array {
+  const keyframes = server
+    .step(value)
+    .map(({ bytes }, region) => record(1, varint(FIELD), varint(region), bytes));
+  const kept = resources.map(({ bytes }) => record(4, bytes));
+  return join(new TextEncoder().encode('LUMENCST'), [2], record(0, server.catalog), ...kept, ...keyframes);
 }

@@ -87,11 +87,16 @@ export function encodeProbes(
 }
 
 function header(info: FrameInfo, order: number, size: Vec3): Uint8Array {
+  return join(frameHead(info), [order, ...size]);
+}
+
+/** What frames of light of any kind begin with. */
+export function frameHead(info: FrameInfo): Uint8Array {
   const bytes = [1, info.base === undefined ? 1 : 0];
   bytes.push(...varint(info.update), ...varint(info.base === undefined ? 0 : info.update - info.base));
   bytes.push(...varint(info.sceneVersion ?? 0), ...varint(info.tick ?? info.update));
   bytes.push(...new Uint8Array(new Float64Array([info.time ?? 0]).buffer));
-  bytes.push((info.scaleLog2 ?? 0) & 0xff, order, ...size);
+  bytes.push((info.scaleLog2 ?? 0) & 0xff);
   return Uint8Array.from(bytes);
 }
 

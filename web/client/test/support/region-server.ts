@@ -6,6 +6,7 @@ import type { TrackPlan } from '../../src/session/plan.js';
 import { Reading } from '../../src/session/reading.js';
 import type { Target, TrackReader } from '../../src/transport.js';
 import { FakeLink } from './fake-link.js';
+import { volumeIn } from './volumes.js';
 
 const TICK = 0.04;
 const BEAT = 0.25;
@@ -49,7 +50,7 @@ export function catalogOf(counts: Vec3, tickSeconds = TICK): Catalog {
 
 /** Numbers of the regions, nearest first. */
 export function byDistance(catalog: Catalog, camera: Vec3): number[] {
-  const { grid, regions } = catalog.fields[0].shape;
+  const { grid, regions } = volumeIn(catalog).shape;
   const distances = regions.map((region) => boxDistance(grid, region, camera));
   return regions.map(({ id }) => id).sort((a, b) => distances[a] - distances[b]);
 }
@@ -105,7 +106,7 @@ export class World {
     catalog: Catalog,
     private readonly options: WorldOptions = {},
   ) {
-    this.light = catalog.fields[0].shape.regions.map(() => []);
+    this.light = volumeIn(catalog).shape.regions.map(() => []);
     const subscribe = this.link.subscribe.bind(this.link);
     this.link.subscribe = (track, options, onFrame): TrackReader => {
       const reader = subscribe(track, options, onFrame);

@@ -8,3 +8,10 @@ export function readVectors<T>(name: string): T {
 export function bytesOf(base64: string): Uint8Array {
   return Uint8Array.from(Buffer.from(base64, 'base64'));
 }
+
+/** FNV-1a of the values' little-endian bytes. */
+export function fnv(values: Float32Array): number {
+  let hash = 0x811c9dc5;
+  for (const byte of new Uint8Array(values.buffer)) hash = Math.imul(hash ^ byte, 0x01000193);
+  return hash >>> 0;
+}

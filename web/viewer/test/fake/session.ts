@@ -29,6 +29,7 @@ export class FakeSession implements Session {
   readonly client = 'fake';
   readonly ready = Promise.resolve();
   readonly pending = [];
+  readonly unshown = [];
   readonly saved = undefined;
   readonly catalog: Catalog;
   status: Status = { state: 'connected', transport: 'websocket' };
