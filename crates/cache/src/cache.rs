@@ -144,7 +144,8 @@ impl Cache {
         let mut shown = Vec::with_capacity(catalog.fields.len());
         for info in &catalog.fields {
             let same = before.as_ref().and_then(|before| {
-                let old = before.field(info.id).filter(|old| old.shape == info.shape)?;
+                let old =
+                    before.field(info.id).filter(|old| old.shape.is_coded_alike(&info.shape))?;
                 Some(before.epoch_of(old))
             });
             let known = self.light.field(FieldId(info.id));

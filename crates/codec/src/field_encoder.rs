@@ -30,6 +30,17 @@ impl FieldEncoder {
         }
     }
 
+    /// Goes on with a field of the same kind whose surfaces lie elsewhere, and begins anew where it has
+    /// other pages.
+    pub fn follow(&mut self, field: &Field, lumels: LumelCoding) {
+        if let (Self::Lightmap(encoder), Field::Lightmap(lightmap)) = (&mut *self, field)
+            && encoder.follow(LightmapShape::of(lightmap, lumels.coding()))
+        {
+            return;
+        }
+        *self = Self::new(field, lumels);
+    }
+
     /// Encodes an update for the regions that somebody watches; see [`ProbeEncoder::encode`] and
     /// [`LumelEncoder::encode`].
     ///

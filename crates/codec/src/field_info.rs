@@ -145,6 +145,14 @@ impl Shape {
         }
     }
 
+    /// Whether frames of the one are frames of the other too. Lightmaps may differ in their layout.
+    pub fn is_coded_alike(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Lightmap(one), Self::Lightmap(other)) => one.is_coded_alike(other),
+            _ => self == other,
+        }
+    }
+
     /// The volume, where it is one.
     pub fn as_volume(&self) -> Option<&VolumeShape> {
         match self {

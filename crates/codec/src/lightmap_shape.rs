@@ -38,6 +38,11 @@ impl LightmapShape {
         Lightmap::dark(id, Arc::new(Layout::new(self.page_size, self.pages, Vec::new())))
     }
 
+    /// Whether frames of the one are frames of the other too: only their layouts may differ.
+    pub fn is_coded_alike(&self, other: &Self) -> bool {
+        Self { layout: other.layout, ..self.clone() } == *other
+    }
+
     /// Number of lumels of all pages.
     pub fn lumel_count(&self) -> usize {
         self.pages as usize * (self.page_size as usize).pow(2)

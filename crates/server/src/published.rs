@@ -47,9 +47,9 @@ impl Published {
         solver.ids().filter_map(published).collect()
     }
 
-    /// The field has another layout, which is coded anew; its updates are numbered on.
-    pub(crate) fn restart(&mut self, field: &Field) {
-        self.encoder = FieldEncoder::new(field, self.lumels);
+    /// The field has another layout; its updates are numbered on.
+    pub(crate) fn lay_out(&mut self, field: &Field) {
+        self.encoder.follow(field, self.lumels);
     }
 
     /// The field as the catalog lists it.

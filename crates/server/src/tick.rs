@@ -342,7 +342,7 @@ impl Tick {
             let field = self.solver.light().field(*id);
             let published = self.published.iter_mut().find(|published| published.id == *id);
             if let (Some(published), Some(field)) = (published, field) {
-                published.restart(field);
+                published.lay_out(field);
             }
         }
         if !others.is_empty() {
@@ -368,7 +368,7 @@ impl Tick {
             self.published.iter_mut().find(|published| published.id == id),
             self.solver.light().field(id),
         ) {
-            published.restart(field);
+            published.lay_out(field);
         }
         outlet.resources(self.resources());
         self.fields_are_news = true;

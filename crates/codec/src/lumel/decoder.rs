@@ -1,5 +1,7 @@
 //! Frames of one region of a lightmap → light.
 
+use glam::UVec2;
+
 use super::coding::Coding;
 use super::page_decoder::PageDecoder;
 use super::tile_decoder::TileDecoder;
@@ -23,6 +25,11 @@ impl LumelDecoder {
             None => Kind::Tile(TileDecoder::new(tile.size)),
             Some(packing) => Kind::Page(Box::new(PageDecoder::new(tile.size.x, packing))),
         })
+    }
+
+    /// For a tile of `size` lumels that is coded as halves.
+    pub fn of_halves(size: UVec2) -> Self {
+        Self(Kind::Tile(TileDecoder::new(size)))
     }
 
     /// Decodes a frame. Frames may come in any order and may be missing.

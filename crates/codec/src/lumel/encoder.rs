@@ -48,6 +48,15 @@ impl LumelEncoder {
         Self { shape, scale: ScaleRule::default(), regions }
     }
 
+    /// Goes on with lightmaps that differ in their layout alone; whether these do.
+    pub(crate) fn follow(&mut self, shape: LightmapShape) -> bool {
+        let is_alike = self.shape.is_coded_alike(&shape);
+        if is_alike {
+            self.shape = shape;
+        }
+        is_alike
+    }
+
     /// The shape.
     pub fn shape(&self) -> &LightmapShape {
         &self.shape
