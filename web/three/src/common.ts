@@ -5,5 +5,6 @@ export { Content, loadGltf } from './content.js';
 export { isHidden } from './exported.js';
 export type { AttachOptions, LightSession, LumencastLight, Shown } from './light.js';
 export { createLight, isPunctualLight, lightSpec, type PunctualLight } from './lights.js';
+export type { LumelLook } from './lumel-pages.js';
 export type { ProbeGrid } from './platform.js';
 export type { ShadowOptions } from './shadows.js';

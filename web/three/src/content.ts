@@ -10,6 +10,7 @@ import {
   type Texture,
 } from 'three';
 import { type GLTF, GLTFLoader, type GLTFReference } from 'three/addons/loaders/GLTFLoader.js';
+import { withoutCharts } from './charted.js';
 import { blankPadding, completeNodes } from './exported.js';
 import { SpecularGlossiness } from './glossiness.js';
 import { isPunctualLight, type PunctualLight } from './lights.js';
@@ -32,6 +33,8 @@ export interface Animation {
 export class Content {
   readonly #object = new Map<number, Object3D>();
   readonly #node = new WeakMap<Object3D, number>();
+  /** Which primitive of its file's mesh an object shows. */
+  readonly #primitive = new WeakMap<Object3D, number>();
   readonly #materials = new Map<number, Material[]>();
   readonly #animations = new Map<number, readonly Animation[]>();
   readonly cameras: Camera[] = [];
@@ -45,7 +48,7 @@ export class Content {
       if (materials !== undefined && 'isMaterial' in thing)
         this.#addMaterial(first.material + materials, thing);
     }
-    this.addMaterials(gltf, gltf.scene, first.material);
+    this.addMeshes(gltf, gltf.scene, first.material);
     gltf.animations.forEach((clip, i) => {
       const copies = this.#animations.get(first.animation + i) ?? [];
       this.#animations.set(first.animation + i, [...copies, { clip, root: gltf.scene }]);
@@ -54,17 +57,18 @@ export class Content {
   }
 
   /**
-   * Takes in the materials of the file's meshes below an object: those that no other mesh shows, and
-   * glTF's default material, which comes after the file's own.
+   * Takes in the meshes of a file below an object: which primitives they show, and their materials. Those
+   * that no other mesh shows are among these, and glTF's default material, which comes after the file's own.
    */
-  addMaterials(gltf: GLTF, below: Object3D, first: number): void {
+  addMeshes(gltf: GLTF, below: Object3D, first: number): void {
     const { meshes = [], materials = [] } = gltf.parser.json as MeshesAndMaterials;
     const associations = associationsOf(gltf);
     below.traverse((object) => {
       const { meshes: mesh, primitives: index } = associations.get(object) ?? {};
       const primitive =
         mesh === undefined || index === undefined ? undefined : meshes[mesh]?.primitives[index];
-      if (!primitive) return;
+      if (index === undefined || !primitive) return;
+      this.#primitive.set(object, index);
       const number = first + (primitive.material ?? materials.length);
       for (const material of materialsOf(object)) this.#addMaterial(number, material);
     });
@@ -138,6 +142,23 @@ export class Content {
     return object.children.find(
       (child): child is PunctualLight => isPunctualLight(child) && !this.#node.has(child),
     );
+  }
+
+  /**
+   * The mesh that shows a primitive of a node. In a scene of the program's own nobody has numbered them:
+   * there the node's meshes count in their order.
+   */
+  mesh(node: number, primitive: number): Mesh | undefined {
+    const object = this.#object.get(node);
+    const meshes = object ? this.#meshesOf(object) : [];
+    const isNumbered = meshes.some((mesh) => this.#primitive.has(mesh));
+    return isNumbered ? meshes.find((mesh) => this.#primitive.get(mesh) === primitive) : meshes[primitive];
+  }
+
+  /** A node's own meshes, without those of nodes below it. */
+  #meshesOf(object: Object3D): Mesh[] {
+    const below = object.children.filter((child) => !this.#node.has(child));
+    return [...(isMesh(object) ? [object] : []), ...below.flatMap((child) => this.#meshesOf(child))];
   }
 
   materials(number: number): readonly Material[] {
@@ -216,7 +237,8 @@ export async function instantiateMesh(gltf: GLTF, mesh: number): Promise<Object3
   const original = (await gltf.parser.getDependency('mesh', mesh)) as Object3D;
   const parts = primitives.length === 1 ? [original] : original.children.slice(0, primitives.length);
   const copies = parts.filter(isMesh).map((part) => {
-    const copy = new Mesh(part.geometry, part.material);
+    // The one that there is may have lumels where it stands.
+    const copy = new Mesh(withoutCharts(part.geometry), part.material);
     copy.morphTargetInfluences?.forEach((_, i, all) => (all[i] = weights[i] ?? 0));
     // As GLTFLoader does with its copies.
     gltf.parser.associations.set(copy, { meshes: mesh, primitives: parts.indexOf(part) });

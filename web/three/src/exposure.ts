@@ -1,8 +1,8 @@
 import { type Material, type Object3D, type Scene, SRGBColorSpace, Texture } from 'three';
 import { materialsOf } from './patch.js';
 
-/** Gives an object another number for as long as its scene is drawn. */
-export type SetWhileDrawn = (owner: object, key: string, value: number) => void;
+/** Gives an object another value for as long as its scene is drawn. */
+export type SetWhileDrawn = (owner: object, key: string, value: unknown) => void;
 
 /**
  * Changes a scene for the time of drawing only, so that the program's own values stay; returns what
@@ -21,10 +21,10 @@ export function whileDrawn(scene: Scene, change: (set: SetWhileDrawn) => void): 
     // Shadow maps and mirrors draw the scene while it is being drawn.
     if (depth++ > 0) return;
     change((owner, key, value) => {
-      const numbers = owner as Record<string, number>;
-      const before = numbers[key];
-      undo.push(() => (numbers[key] = before));
-      numbers[key] = value;
+      const values = owner as Record<string, unknown>;
+      const before = values[key];
+      undo.push(() => (values[key] = before));
+      values[key] = value;
     });
     // After an error, and in WebGPURenderer's `compileAsync`, `onAfterRender` is not called.
     queueMicrotask(restore);

@@ -40,9 +40,11 @@ export class ProbeGrids {
   #black = atlasTexture([1, 1, 1], new Uint16Array(4 * 7 * 3));
   #visible = true;
 
+  /** `unitsKept`: texture units that are not for grids. */
   constructor(
     private readonly scene: Scene,
     private readonly platform: Platform,
+    private readonly unitsKept: () => number = () => 0,
   ) {}
 
   /** Replaces the grids by those for these volumes; returns what could not be shown as meant. */
@@ -57,7 +59,8 @@ export class ProbeGrids {
   }
 
   #mostGrids(): number {
-    return Math.max(0, Math.min(this.platform.freeGrids(this.scene), this.#volumes.length));
+    const free = this.platform.freeUnits(this.scene) - this.unitsKept();
+    return Math.max(0, Math.min(free, this.#volumes.length));
   }
 
   #plan(): readonly string[] {

@@ -4,10 +4,11 @@ import {
   type Edit,
   type EditOptions,
   type Environment,
+  isLightmap,
   isVolume,
   type Session,
 } from '@lumencast/client';
-import { type Camera, type Light, type Object3D, type Scene, Vector3 } from 'three';
+import { type Camera, type Light, type Object3D, type Scene, type Texture, Vector3 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import type { Content } from './content.js';
 import { expose, type SetWhileDrawn, whileDrawn } from './exposure.js';
@@ -15,6 +16,8 @@ import { nameOf, SavedFiles, sceneFile } from './files.js';
 import { Following } from './following.js';
 import { ProbeGrids } from './grids.js';
 import { isPunctualLight } from './lights.js';
+import type { LumelLook } from './lumel-pages.js';
+import { Lumels } from './lumels.js';
 import type { NamedNode } from './names.js';
 import type { Platform, ProbeGrid } from './platform.js';
 import { Replica } from './replica.js';
@@ -25,7 +28,7 @@ export type LightSession = Pick<
   Session,
   'files' | 'catalog' | 'status' | 'stats' | 'on' | 'edit' | 'light' | 'sceneTime' | 'setCamera' | 'close'
 > &
-  Partial<Pick<Session, 'saved'>>;
+  Partial<Pick<Session, 'saved' | 'unshown'>>;
 
 export interface AttachOptions {
   /** Where the light is shown. */
@@ -62,9 +65,15 @@ export class LumencastLight {
    * render targets are multiplied as well. 1 unless set.
    */
   preExposure = 1;
+  /**
+   * What indirect light is multiplied by: `static` that of meshes that have lumels, `dynamic` that of all
+   * others, which probes light. Without lightmaps nothing is known of what moves: `static` is for all.
+   */
+  readonly strengths = { static: 1, dynamic: 1 };
 
   readonly #replica: Replica;
   readonly #grids: ProbeGrids;
+  readonly #lumels: Lumels;
   readonly #shadows: Shadows | undefined;
   readonly #following: Following;
   readonly #unsubscribe: (() => void)[];
@@ -89,13 +98,14 @@ export class LumencastLight {
     const { scene, gltf, shadows = {} } = options;
     this.#warn = options.onWarning ?? warnInConsole;
     this.#saved = new SavedFiles(session);
-    this.#grids = new ProbeGrids(scene, platform);
     this.#shadows = shadows === false ? undefined : new Shadows(shadows);
     this.#replica = new Replica(scene, gltf, session, (file) => this.urlOf(file), {
       added: (object) => this.#added(object),
       removed: (object) => this.#shadows?.remove(object),
       warning: this.#warn,
     });
+    this.#lumels = new Lumels(scene, this.#replica.content, platform, this.#warn);
+    this.#grids = new ProbeGrids(scene, platform, () => this.#lumels.units);
     this.#following = new Following(session, this.#replica, this.#warn);
     this.#added(scene);
     this.#restoreHooks = whileDrawn(scene, (set) => this.#changeWhileDrawn(set));
@@ -114,9 +124,12 @@ export class LumencastLight {
   update(camera: Camera, now: number = performance.now()): void {
     this.session.setCamera(this.#camera.setFromMatrixPosition(camera.matrixWorld).toArray());
     this.#warnOnce(this.#grids.fit());
-    if (this.#grids.update(this.session.light(now))) this.#lightRevision++;
+    const light = this.session.light(now);
+    const [ofGrids, ofLumels] = [this.#grids.update(light), this.#lumels.update(light, now)];
+    if (ofGrids || ofLumels) this.#lightRevision++;
     this.#following.send(now);
     this.#replica.update(this.session.sceneTime(now));
+    this.#lumels.follow(this.#replica.revision, now);
     this.platform.patch(this.options.scene);
     this.#fitShadows(now);
   }
@@ -184,6 +197,29 @@ export class LumencastLight {
     return this.#grids.grids;
   }
 
+  /**
+   * The texture that holds all pages of lumels, rows from 0 on, and what its values are multiplied by to be
+   * irradiance in lux; `undefined` where there are none.
+   */
+  get pages(): { readonly texture: Texture; readonly scale: number } | undefined {
+    const { pages, scale } = this.#lumels;
+    return pages && { texture: pages, scale };
+  }
+
+  /** Meshes that are lit by lumels now. */
+  get lumelMeshes(): number {
+    return this.#lumels.meshes;
+  }
+
+  /** What the pages show: the light, or, on white, the lumels as a checkerboard or how old each part is. */
+  get look(): LumelLook {
+    return this.#lumels.look;
+  }
+
+  set look(look: LumelLook) {
+    this.#lumels.look = look;
+  }
+
   /** Grows when objects, lights or materials have changed: shadow maps are to be drawn anew. */
   get sceneRevision(): number {
     return this.#replica.revision;
@@ -210,6 +246,7 @@ export class LumencastLight {
     this.#restoreHooks();
     this.#saved.dispose();
     this.#grids.dispose();
+    this.#lumels.dispose();
     this.platform.unpatch(this.options.scene);
     const close = () => this.session.close();
     if (ends === undefined || this.session.status.state !== 'connected') close();
@@ -225,6 +262,9 @@ export class LumencastLight {
     if (epoch !== this.#epoch) this.#replica.forgetAdopted();
     this.#epoch = epoch;
     this.#warned.clear();
+    // Lumels take their unit before grids are planned.
+    const unshown = this.session.unshown ?? [];
+    this.#lumels.setLightmaps(fields.filter(isLightmap).filter((field) => !unshown.includes(field)));
     this.#warnOnce(this.#grids.setVolumes(fields.filter(isVolume)));
   }
 
@@ -264,9 +304,9 @@ export class LumencastLight {
   }
 
   #changeWhileDrawn(set: SetWhileDrawn): void {
-    const { preExposure, platform } = this;
+    const { preExposure } = this;
     const { scene } = this.options;
-    if (platform.gridExposure) set(platform.gridExposure, 'value', preExposure);
+    this.#weighIndirect(set);
     if (preExposure === 1 && this.#show !== 'indirect') return;
     scene.traverse((object) => {
       if (!('isLight' in object)) return;
@@ -275,5 +315,19 @@ export class LumencastLight {
       set(object, 'intensity', dark ? 0 : intensity * preExposure);
     });
     if (preExposure !== 1) expose(scene, preExposure, set);
+  }
+
+  /** What else the grids' light is multiplied by stands in their intensity or their atlas. */
+  #weighIndirect(set: SetWhileDrawn): void {
+    const { preExposure, platform, strengths } = this;
+    const { factors, pages, scaleIn } = platform;
+    const exposure = scaleIn === 'atlas' ? preExposure : 1;
+    const hasLumels = this.#lumels.units > 0;
+    set(factors.still, 'value', exposure * strengths.static);
+    set(factors.moving, 'value', exposure * (hasLumels ? strengths.dynamic : strengths.static));
+    const ofLumels = this.#show === 'direct' ? 0 : this.#lumels.scale * strengths.static * preExposure;
+    // What is looked into it by is shown as bright as white paper, whatever the exposure.
+    set(factors.lumels, 'value', this.look === 'light' ? ofLumels : Math.PI);
+    if (pages) set(pages, 'value', this.#lumels.pages ?? null);
   }
 }

@@ -62,7 +62,7 @@ export class Models {
     const file = this.#files.findLast(({ first }) => first.mesh <= mesh);
     if (!file || mesh >= this.#next.mesh) throw new Error(`mesh ${mesh} is not known here`);
     const object = await instantiateMesh(file.gltf, mesh - file.first.mesh);
-    this.content.addMaterials(file.gltf, object, file.first.material);
+    this.content.addMeshes(file.gltf, object, file.first.material);
     return object;
   }
 

@@ -1,5 +1,7 @@
-import { type Material, type Mesh, type Object3D, REVISION, ShaderChunk } from 'three';
+import { type Material, type Mesh, type Object3D, REVISION, ShaderChunk, type Texture } from 'three';
+import { LUMELS } from './charted.js';
 import { FALLOFF_GLSL } from './falloff.js';
+import { LUMELS_OF_FRAGMENT, LUMELS_OF_VERTEX, LUMELS_OF_VERTEX_MAIN } from './lumels-glsl.js';
 
 /**
  * Changes of WebGLRenderer's shaders, made material by material through `onBeforeCompile`, so that
@@ -9,10 +11,12 @@ import { FALLOFF_GLSL } from './falloff.js';
  * - shadow lookups offset towards the light also where it falls on a surface's back, else the lit
  *   back of a curtain shadows itself;
  * - irradiance of probe grids times 2^w, w the fourth channel of the atlas' last sub-volume, which is
- *   free: 0 in grids that three.js bakes, the logarithm of the field's scale in ours; and times
- *   {@link gridExposure}.
+ *   free: 0 in grids that three.js bakes, the logarithm of the field's scale in ours; and times a
+ *   factor of {@link uniforms};
+ * - in materials of meshes that have lumels, irradiance of these in place of the grids' ({@link LUMELS}
+ *   says what an attribute means).
  */
-export function patchedLights(): string {
+export function patchedLights(withLumels = false): string {
   const lights = Object.entries(FALLOFF_GLSL).reduce(
     (chunk, [name, body]) => replaceFunction(chunk, 'float', name, body),
     ShaderChunk.lights_pars_begin,
@@ -20,11 +24,21 @@ export function patchedLights(): string {
   const scaled = replaceText(
     ShaderChunk.lightprobes_pars_fragment,
     'return max( result, vec3( 0.0 ) );',
-    'return max( result, vec3( 0.0 ) ) * ( exp2( s6.w ) * lumencastExposure );',
+    `return max( result, vec3( 0.0 ) ) * ( exp2( s6.w ) * ${withLumels ? 'gridFactor()' : 'lumencastMoving'} );`,
   );
-  const samplers = 'uniform highp sampler3D probesSH[';
-  const probes = replaceText(scaled, samplers, `uniform float lumencastExposure;\n${samplers}`);
-  return replaceText(lights, '#include <lightprobes_pars_fragment>', probes);
+  const probes = replaceText(lights, '#include <lightprobes_pars_fragment>', scaled);
+  return (withLumels ? LUMELS_OF_FRAGMENT : 'uniform float lumencastMoving;') + probes;
+}
+
+/** The chunk that sums up irradiance, with that of lumels. */
+export function patchedIrradiance(): string {
+  const probes = replaceText(
+    ShaderChunk.lights_fragment_begin,
+    'if ( isInsideLightProbeGrid(',
+    'if ( ! hasLumels() && isInsideLightProbeGrid(',
+  );
+  const grids = '#if NUM_LIGHT_PROBE_GRIDS > 0';
+  return replaceText(probes, grids, `if ( hasLumels() ) irradiance += lumelIrradiance();\n\n${grids}`);
 }
 
 export function patchedShadowCoordinates(): string {
@@ -67,15 +81,35 @@ function rowOf(matrices: string, row: number): string {
   return `vec3( ${[0, 1, 2].map((column) => `${matrices}[ i ][ ${column} ][ ${row} ]`).join(', ')} )`;
 }
 
-/** The uniform that multiplies light of probe grids; other than 1 only while a scene is drawn. */
-export const gridExposure = { value: 1 };
+/** Uniforms of patched materials; other than neutral only while a scene is drawn. */
+export const uniforms = {
+  lumels: { value: 1 },
+  still: { value: 1 },
+  moving: { value: 1 },
+  pages: { value: null as Texture | null },
+};
 
-let chunks: { lights: string; shadows: string } | undefined;
+/** By what each chunk of three.js' shaders is replaced. */
+type Replacements = Readonly<Record<string, string>>;
+interface Patch {
+  readonly vertex: Replacements;
+  readonly fragment: Replacements;
+}
+let patches: { readonly plain: Patch; readonly withLumels: Patch } | undefined;
 const originals = new WeakMap<Material, Pick<Material, 'onBeforeCompile' | 'customProgramCacheKey'>>();
+/** The patched materials that read lumels: those of meshes that have some, and of other meshes too. */
+const reading = new WeakSet<Material>();
 
-/** Patches the materials of an object and of all below it; those that are patched already stay. */
+/**
+ * Patches the materials of an object and of all below it; those that are patched already stay, unless a
+ * mesh that has lumels now shows them.
+ */
 export function patchMaterials(root: Object3D): void {
-  root.traverse((object) => materialsOf(object).forEach(patchMaterial));
+  root.traverse((object) => {
+    const { geometry } = object as Partial<Mesh>;
+    const withLumels = geometry?.attributes[LUMELS] !== undefined;
+    for (const material of materialsOf(object)) patchMaterial(material, withLumels);
+  });
 }
 
 /** The materials of an object: none unless it is drawn. */
@@ -84,20 +118,58 @@ export function materialsOf(object: Object3D): readonly Material[] {
   return Array.isArray(material) ? material : material ? [material] : [];
 }
 
-function patchMaterial(material: Material): void {
-  if (originals.has(material) || !isLit(material)) return;
-  const { lights, shadows } = (chunks ??= { lights: patchedLights(), shadows: patchedShadowCoordinates() });
+function patchMaterial(material: Material, withLumels: boolean): void {
+  if (!isLit(material)) return;
+  if (withLumels && !reading.has(material)) {
+    reading.add(material);
+    material.needsUpdate = true;
+  }
+  if (originals.has(material)) return;
+  const { plain, withLumels: lumels } = (patches ??= { plain: plainPatch(), withLumels: lumelsPatch() });
   const { onBeforeCompile, customProgramCacheKey } = material;
   originals.set(material, { onBeforeCompile, customProgramCacheKey });
   const key = customProgramCacheKey.call(material);
   material.onBeforeCompile = (shader, renderer) => {
     onBeforeCompile.call(material, shader, renderer);
-    shader.uniforms.lumencastExposure = gridExposure;
-    shader.fragmentShader = shader.fragmentShader.replace('#include <lights_pars_begin>', () => lights);
-    shader.vertexShader = shader.vertexShader.replace('#include <shadowmap_vertex>', () => shadows);
+    const { vertex, fragment } = reading.has(material) ? lumels : plain;
+    Object.assign(shader.uniforms, {
+      lumencastMoving: uniforms.moving,
+      lumencastStill: uniforms.still,
+      lumencastLumels: uniforms.lumels,
+      lumencastPages: uniforms.pages,
+    });
+    shader.vertexShader = replaceChunks(shader.vertexShader, vertex);
+    shader.fragmentShader = replaceChunks(shader.fragmentShader, fragment);
   };
-  material.customProgramCacheKey = () => `${key}|lumencast`;
+  material.customProgramCacheKey = () => `${key}|lumencast${reading.has(material) ? ' lumels' : ''}`;
   material.needsUpdate = true;
+}
+
+function plainPatch(): Patch {
+  return {
+    vertex: { shadowmap_vertex: patchedShadowCoordinates() },
+    fragment: { lights_pars_begin: patchedLights() },
+  };
+}
+
+function lumelsPatch(): Patch {
+  return {
+    vertex: {
+      shadowmap_pars_vertex: ShaderChunk.shadowmap_pars_vertex + LUMELS_OF_VERTEX,
+      shadowmap_vertex: patchedShadowCoordinates() + LUMELS_OF_VERTEX_MAIN,
+    },
+    fragment: {
+      lights_pars_begin: patchedLights(true),
+      lights_fragment_begin: patchedIrradiance(),
+    },
+  };
+}
+
+function replaceChunks(shader: string, replacements: Replacements): string {
+  return Object.entries(replacements).reduce(
+    (text, [chunk, by]) => text.replace(`#include <${chunk}>`, () => by),
+    shader,
+  );
 }
 
 /** The materials that WebGLRenderer lights. */
@@ -113,6 +185,7 @@ export function unpatchMaterials(root: Object3D): void {
       if (original === undefined) continue;
       Object.assign(material, original);
       originals.delete(material);
+      reading.delete(material);
       material.needsUpdate = true;
     }
   });

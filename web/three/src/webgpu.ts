@@ -19,6 +19,8 @@ import { MIN_CONE, MIN_DISTANCE } from './falloff.js';
 import { type AttachOptions, type LightSession, LumencastLight } from './light.js';
 import type { Platform } from './platform.js';
 import { unitsTaken } from './units.js';
+import { FactorGridNode, factors, LumelLight } from './webgpu-lumels.js';
+import { webgpuPages } from './webgpu-pages.js';
 
 export * from './common.js';
 
@@ -56,6 +58,8 @@ export function attach(
 const MAX_TEXTURES = 16;
 /** The least that WebGPU allows a 3D texture along an axis. */
 const MAX_3D_TEXTURE_SIZE = 2048;
+/** The same of a 2D texture. */
+const MAX_TEXTURE_SIZE = 8192;
 
 function webgpuPlatform(renderer: WebGPURenderer): Platform {
   const gl = fallbackContext(renderer);
@@ -64,11 +68,16 @@ function webgpuPlatform(renderer: WebGPURenderer): Platform {
       const grid = new LightProbeGrid(...size, ...resolution);
       // The target that it would bake into is not needed.
       grid.dispose();
+      Object.assign(grid, { _lightNode: FactorGridNode });
       return grid as LightProbeGrid & { dispose(): void };
     },
     scaleIn: 'intensity',
-    freeGrids: (scene) => MAX_TEXTURES - unitsTaken(scene, 'webgpu'),
+    factors,
+    freeUnits: (scene) => MAX_TEXTURES - unitsTaken(scene, 'webgpu'),
     max3DTextureSize: gl ? (gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) as number) : MAX_3D_TEXTURE_SIZE,
+    maxTextureSize: gl ? (gl.getParameter(gl.MAX_TEXTURE_SIZE) as number) : MAX_TEXTURE_SIZE,
+    createPages: (width, height) => webgpuPages(renderer, width, height),
+    createLumelLight: (pages) => new LumelLight(pages),
     // Objects that stand still do not look for new data of their lights' textures.
     upload: (texture) => renderer.initTexture(texture),
     patch: (root) => eachLight(root, (light, Falloff) => (light._lightNode = Falloff)),

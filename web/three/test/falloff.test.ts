@@ -1,5 +1,18 @@
 import { describe, expect, it } from 'vitest';
-import { MeshBasicMaterial, MeshStandardMaterial, Mesh, ShaderChunk } from 'three';
+import {
+  BufferAttribute,
+  type Material,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  MeshPhongMaterial,
+  MeshStandardMaterial,
+  MeshToonMaterial,
+  PlaneGeometry,
+  ShaderChunk,
+  ShaderLib,
+} from 'three';
+import { LUMELS } from '../src/charted.js';
 import { distanceAttenuation, FALLOFF_GLSL, spotAttenuation } from '../src/falloff.js';
 import { patchedLights, patchedShadowCoordinates, patchMaterials, unpatchMaterials } from '../src/patch.js';
 
@@ -79,12 +92,10 @@ describe('the shader twins', () => {
 });
 
 describe('patchMaterials', () => {
-  const compile = (material: MeshStandardMaterial) => {
-    const shader = {
-      uniforms: {},
-      vertexShader: '#include <shadowmap_vertex>',
-      fragmentShader: '#include <lights_pars_begin>',
-    } as Parameters<typeof material.onBeforeCompile>[0];
+  const compile = (material: Material, { vertexShader, fragmentShader } = SHORT) => {
+    const shader = { uniforms: {}, vertexShader, fragmentShader } as Parameters<
+      typeof material.onBeforeCompile
+    >[0];
     material.onBeforeCompile(shader, undefined!);
     return shader;
   };
@@ -110,4 +121,61 @@ describe('patchMaterials', () => {
     unpatchMaterials(mesh);
     expect(material.onBeforeCompile).toBe(own);
   });
+
+  const LIT = [
+    ['lambert', new MeshLambertMaterial()],
+    ['phong', new MeshPhongMaterial()],
+    ['toon', new MeshToonMaterial()],
+    ['physical', new MeshStandardMaterial()],
+  ] as const;
+  const withLumels = (material: Material) => {
+    const geometry = new PlaneGeometry();
+    return new Mesh(geometry.setAttribute(LUMELS, new BufferAttribute(new Float32Array(8), 2)), material);
+  };
+
+  it.each(LIT)('lets %s materials of meshes with lumels read these', (kind, material) => {
+    const shader = compile(patched(withLumels(material)), ShaderLib[kind]);
+    const [vertex, fragment] = [shader.vertexShader, shader.fragmentShader];
+    // Once declared, before it is used.
+    for (const text of ['attribute vec4 lumels;', 'varying highp vec4 vLumels;']) {
+      expect(vertex.split(text)).toHaveLength(2);
+    }
+    expect(vertex.indexOf('vLumels.xy =')).toBeGreaterThan(vertex.indexOf('void main()'));
+    expect(fragment.indexOf('vec3 lumelIrradiance()')).toBeLessThan(fragment.indexOf('void main()'));
+    expect(fragment).toContain('if ( ! hasLumels() && isInsideLightProbeGrid(');
+    const added = fragment.indexOf('irradiance += lumelIrradiance()');
+    expect(added).toBeGreaterThan(fragment.indexOf('vec3 irradiance = getAmbientLightIrradiance'));
+    // Where a scene has no grids, too.
+    expect(added).toBeLessThan(fragment.indexOf('vec3 probeWorldPos'));
+    expect(fragment).toContain('exp2( s6.w ) * gridFactor()');
+  });
+
+  it('takes a material anew when a mesh with lumels shows it, and another program', () => {
+    const material = new MeshStandardMaterial();
+    const plain = new Mesh(new PlaneGeometry(), material);
+    patched(plain);
+    const key = material.customProgramCacheKey();
+    const { version } = material;
+    expect(compile(material, ShaderLib.physical).fragmentShader).not.toContain('vLumels');
+    patched(plain);
+    expect(material.version).toBe(version);
+    patched(withLumels(material));
+    expect(material.version).toBeGreaterThan(version);
+    expect(material.customProgramCacheKey()).not.toBe(key);
+    expect(compile(material, ShaderLib.physical).fragmentShader).toContain('vLumels');
+    unpatchMaterials(plain);
+    patched(plain);
+    expect(material.customProgramCacheKey()).toBe(key);
+  });
+
+  function patched(mesh: Mesh): Material {
+    patchMaterials(mesh);
+    return mesh.material as Material;
+  }
 });
+
+/** The chunks that are replaced in every material. */
+const SHORT = {
+  vertexShader: '#include <shadowmap_vertex>',
+  fragmentShader: '#include <lights_pars_begin>',
+};

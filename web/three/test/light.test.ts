@@ -1,4 +1,4 @@
-import type { Edit, FieldInfo, LightState, SessionEvents, Vec3 } from '@lumencast/client';
+import type { Edit, FieldInfo, LightmapSurface, LightState, SessionEvents, Vec3 } from '@lumencast/client';
 import {
   Color,
   DataUtils,
@@ -8,6 +8,7 @@ import {
   MeshBasicMaterial,
   MeshStandardMaterial,
   PerspectiveCamera,
+  PlaneGeometry,
   PointLight,
   Quaternion,
   Scene,
@@ -17,8 +18,18 @@ import {
   Vector3,
 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
-import { beforeEach, describe, expect, it, vi } from 'vitest';
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { LUMELS } from '../src/charted.js';
 import { type LightSession, LumencastLight } from '../src/light.js';
+import {
+  chartsOf,
+  halves,
+  layout,
+  lightmapField,
+  lightmapLight,
+  region,
+  surface,
+} from './support/lightmaps.js';
 import { platform } from './support/platform.js';
 
 const camera = new PerspectiveCamera();
@@ -29,6 +40,7 @@ class FakeSession {
   readonly files = 'http://localhost:1/scene/';
   readonly status = { state: 'connected', transport: 'websocket' } as const;
   catalog: SessionEvents['catalog'] | undefined;
+  unshown: readonly FieldInfo[] = [];
   state: LightState = { fields: [], age: undefined };
   closed = false;
   readonly #listeners = new Map<string, (value: never) => void>();
@@ -297,7 +309,7 @@ describe('grids', () => {
       shape: { ...shape, grid: { ...shape.grid, center: [x, 0, 0] } },
     }));
     session.tell('catalog', catalogOf(...fields));
-    const free = vi.spyOn(platform, 'freeGrids');
+    const free = vi.spyOn(platform, 'freeUnits');
     const gridsWith = (units: number) => {
       free.mockReturnValue(units);
       light.update(camera);
@@ -317,6 +329,108 @@ describe('grids', () => {
     expect([gridsWith(-3), gridsWith(0)]).toEqual([0, 0]);
     expect(warnings.slice(before)).toEqual([expect.stringMatching(/no texture unit is free/)]);
     free.mockRestore();
+  });
+});
+
+describe('lumels', () => {
+  const pages = { texture: new Texture(), paint: vi.fn(), dispose: vi.fn() };
+  const lightmap = lightmapField(1);
+  const SQUARE = chartsOf([0, 2, 1, 2, 3, 1]);
+  let wall: Mesh;
+
+  beforeEach(() => {
+    vi.clearAllMocks();
+    vi.spyOn(platform, 'createPages').mockReturnValue(pages);
+    wall = new Mesh(new PlaneGeometry(2, 2));
+    scene.add(wall);
+    light.setNode(wall, 9);
+  });
+
+  afterEach(() => vi.restoreAllMocks());
+
+  /** Lets the session have light of one scale at lumels, if any, and of a volume. */
+  function shine(scale: number, ...surfaces: LightmapSurface[]): void {
+    const regions = [region({ picture: halves(0, 64, scale) })];
+    session.state = { fields: [lightmapLight(regions, layout(...surfaces), lightmap)], age: 0 };
+    light.update(camera);
+  }
+
+  /** What shaders multiply by. */
+  const factors = () => {
+    const { lumels, still, moving } = platform.factors;
+    let seen: unknown[] = [];
+    drawn(() => (seen = [lumels.value, still.value, moving.value, platform.pages!.value]));
+    return seen;
+  };
+
+  it('light what the layout names, and are given back', () => {
+    const { geometry } = wall;
+    session.tell('catalog', catalogOf(lightmap, field));
+    const before = light.lightRevision;
+    shine(4, surface({ node: 9, charts: SQUARE }));
+    expect(light.lightRevision).toBeGreaterThan(before);
+    expect([light.lumelMeshes, wall.geometry.hasAttribute(LUMELS)]).toEqual([1, true]);
+    expect(light.pages).toEqual({ texture: pages.texture, scale: 4 });
+    expect(pages.paint).toHaveBeenCalledOnce();
+    light.dispose();
+    expect(wall.geometry).toBe(geometry);
+    expect(pages.dispose).toHaveBeenCalledOnce();
+  });
+
+  it('are weighed apart from what moves, and without them all is weighed alike', () => {
+    Object.assign(light.strengths, { static: 0.5, dynamic: 3 });
+    expect(factors()).toEqual([0, 0.5, 0.5, null]);
+    session.tell('catalog', catalogOf(lightmap, field));
+    shine(8);
+    expect(factors()).toEqual([4, 0.5, 3, pages.texture]);
+    light.preExposure = 0.25;
+    expect(factors()).toEqual([1, 0.125, 0.75, pages.texture]);
+    light.show = 'direct';
+    expect(factors()[0]).toBe(0);
+    const { lumels, still, moving } = platform.factors;
+    expect([lumels.value, still.value, moving.value, platform.pages!.value]).toEqual([1, 1, 1, null]);
+  });
+
+  it('take a texture unit before grids do', () => {
+    const other = { ...field, id: 5 };
+    session.tell('catalog', catalogOf(field, other));
+    expect(light.grids).toHaveLength(2);
+    session.tell('catalog', catalogOf(lightmap, field, other));
+    expect(light.grids).toHaveLength(1);
+  });
+
+  it('keep their pages while these take the same room', () => {
+    const elsewhere = { ...lightmap, shape: { ...lightmap.shape, layout: '1'.repeat(64) } };
+    session.tell('catalog', catalogOf(lightmap));
+    session.tell('catalog', catalogOf(elsewhere, field));
+    expect(platform.createPages).toHaveBeenCalledOnce();
+    session.tell('catalog', catalogOf(lightmapField(1, 16)));
+    expect(platform.createPages).toHaveBeenLastCalledWith(16, 16);
+    // Until there is new light, it is of the former shape.
+    shine(4, surface({ node: 9, charts: SQUARE }));
+    expect([light.lumelMeshes, pages.paint.mock.calls.length]).toEqual([0, 0]);
+    session.tell('catalog', catalogOf(field));
+    expect(pages.dispose).toHaveBeenCalledTimes(2);
+    expect(light.pages).toBeUndefined();
+  });
+
+  it('take no room where the session cannot show them', () => {
+    session.unshown = [lightmap];
+    session.tell('catalog', catalogOf(lightmap, field));
+    expect([light.pages, light.grids.length]).toEqual([undefined, 1]);
+    expect(platform.createPages).not.toHaveBeenCalled();
+  });
+
+  it.each([
+    ['half floats', 8, () => vi.spyOn(platform, 'createPages').mockReturnValue(undefined), /half floats/],
+    ['a texture unit', 8, () => vi.spyOn(platform, 'freeUnits').mockReturnValue(0), /unit/],
+    ['textures large enough', 4096, () => {}, /larger than textures/],
+  ])('are not shown without %s, with a warning', (_, pageSize, lack, words) => {
+    lack();
+    session.tell('catalog', catalogOf(lightmapField(1, pageSize)));
+    shine(4, surface({ node: 9, charts: SQUARE }));
+    expect(light.lumelMeshes).toBe(0);
+    expect(warnings.filter((warning) => warning.includes('lumels'))).toEqual([expect.stringMatching(words)]);
   });
 });
 
@@ -373,7 +487,7 @@ describe('preExposure', () => {
     ...unlit.color.toArray(),
     scene.environmentIntensity,
     scene.backgroundIntensity,
-    platform.gridExposure!.value,
+    platform.factors.moving.value,
   ];
 
   beforeEach(() => {

@@ -37,6 +37,7 @@ describe.skipIf(!chromiumProgram)('drawn by', () => {
       { parts: ['gltf', 'shadow'] },
       { parts: ['environment', 'clearcoat'] },
       { parts: ['morphs', 'specular'] },
+      { parts: ['lumels', 'gltf', 'shadow'] },
     ] satisfies { parts: Part[] }[])(
       'a material of $parts takes the units that are counted',
       async ({ parts }) => {

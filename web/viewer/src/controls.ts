@@ -1,9 +1,10 @@
-import { capabilities, type Status } from '@lumencast/client';
+import { capabilities, isLightmap, type Status } from '@lumencast/client';
 import type { Shown } from '@lumencast/three';
 import { Dock, type Toggle } from './ui/dock.js';
 import { h } from './ui/dom.js';
 import { flashlightHint, flyHint, helpPanel } from './ui/help.js';
 import { Inspector, nameOf } from './ui/inspector.js';
+import { LumelsPanel } from './ui/lumels.js';
 import { Notices } from './ui/notices.js';
 import { StatsPanel } from './ui/stats.js';
 import { isTyping } from './view/camera-rig.js';
@@ -11,7 +12,7 @@ import { TONE_MAPPINGS } from './view/renderer.js';
 import type { Gizmo } from './view/selection.js';
 import { SKY } from './view/sky.js';
 import type { Viewer } from './viewer.js';
-import { wordsFor } from './words.js';
+import { lumelWords, unshownWords, wordsFor } from './words.js';
 
 /** The bar beside the picture, the panels over it, and the keys. */
 export class Controls {
@@ -20,6 +21,7 @@ export class Controls {
   readonly #dock: Dock;
   readonly #inspector: Inspector;
   readonly #stats = new StatsPanel();
+  readonly #lumels: LumelsPanel;
   readonly #help = helpPanel(() => this.#toggle('help'));
   readonly #brand: HTMLElement;
   #statsAt = 0;
@@ -40,6 +42,11 @@ export class Controls {
       gizmo: (mode) => this.#setGizmo(mode),
       close: () => selection.select(undefined),
     });
+    this.#lumels = new LumelsPanel({
+      light: viewer.light,
+      pages: () => viewer.togglePages(),
+      close: () => this.#toggle('lumels'),
+    });
     selection.onChange = (object) => this.#inspector.show(object, selection.gizmo);
     this.#stats.element.hidden = innerWidth < 720 || innerHeight < 480;
     this.overlay = h(
@@ -47,7 +54,7 @@ export class Controls {
       { class: 'controls' },
       this.#brand,
       this.notices.element,
-      h('div', { class: 'side' }, this.#stats.element, this.#inspector.element),
+      h('div', { class: 'side' }, this.#stats.element, this.#lumels.element, this.#inspector.element),
       this.#help,
     );
     addEventListener('keydown', (event) => this.#key(event));
@@ -77,11 +84,26 @@ export class Controls {
     dock.hide('flashlight', isSaved);
     dock.set('stats', !this.#stats.element.hidden);
     dock.set('help', !this.#help.hidden);
+    this.#updateLumels();
     this.#inspector.update();
     this.#offerSky();
     if (performance.now() - this.#statsAt < 250) return;
     this.#statsAt = performance.now();
     if (!this.#stats.element.hidden) this.#stats.update(viewer.stats());
+  }
+
+  #updateLumels(): void {
+    const { viewer } = this;
+    const { element } = this.#lumels;
+    const lightmap = viewer.session.catalog?.fields.find(isLightmap);
+    this.#dock.hide('lumels', !lightmap);
+    this.#dock.set('lumels', !element.hidden);
+    if (!lightmap || element.hidden) return;
+    const isShown = !viewer.session.unshown.includes(lightmap);
+    const words = isShown
+      ? lumelWords({ ...lightmap.shape, meshes: viewer.light.lumelMeshes })
+      : unshownWords(capabilities());
+    this.#lumels.update(words, viewer.pages.mesh.visible);
   }
 
   #createDock(cameras: readonly string[]): Dock {
@@ -118,6 +140,9 @@ export class Controls {
         return;
       case 'probes':
         viewer.probes.group.visible = !viewer.probes.group.visible;
+        return;
+      case 'lumels':
+        this.#lumels.element.hidden = !this.#lumels.element.hidden;
         return;
       case 'flashlight':
         return this.#takeFlashlight();
@@ -173,6 +198,7 @@ export class Controls {
     const toggles: Record<string, Toggle> = {
       KeyC: 'fly',
       KeyP: 'probes',
+      KeyL: 'lumels',
       KeyF: 'flashlight',
       KeyI: 'stats',
       Space: 'playing',

@@ -1,4 +1,4 @@
-import type { Session } from '@lumencast/client';
+import { isLightmap, type Session } from '@lumencast/client';
 import { attach, loadGltf, type LumencastLight, type PunctualLight, type Shown } from '@lumencast/three';
 import {
   Box3,
@@ -16,6 +16,7 @@ import type { Figures } from './ui/stats.js';
 import { CameraRig } from './view/camera-rig.js';
 import { meter, withinStops } from './view/exposure.js';
 import { Flashlight } from './view/flashlight.js';
+import { PagesView } from './view/pages.js';
 import { ProbeSpheres } from './view/probes.js';
 import { type AnyRenderer, createRenderer, isWebGPU, Resolution } from './view/renderer.js';
 import { Selection } from './view/selection.js';
@@ -76,6 +77,7 @@ export class Viewer {
   readonly touch: Touch;
   readonly flashlight: Flashlight;
   readonly probes = new ProbeSpheres();
+  readonly pages = new PagesView();
   readonly controls: Controls;
   /** Metering goes on by itself until somebody sets the exposure. */
   autoExposure = true;
@@ -118,7 +120,7 @@ export class Viewer {
       exposure: () => this.exposure,
     });
     this.probes.group.name = 'probes';
-    this.selection.overlay.add(this.probes.group);
+    this.selection.overlay.add(this.probes.group, this.pages.mesh);
     scene.add(this.selection.overlay);
     this.#resolution = new Resolution(renderer, canvas, options.pixelRatio);
     this.controls = new Controls(this);
@@ -160,6 +162,7 @@ export class Viewer {
     this.light.update(this.rig.camera, now);
     this.selection.update();
     if (this.probes.group.visible) this.probes.update(this.session.light(now), now);
+    if (this.pages.mesh.visible) this.pages.update(this.rig.camera, this.light);
     this.#refreshShadows();
     this.renderer.render(this.scene, this.rig.camera);
   }
@@ -187,6 +190,11 @@ export class Viewer {
 
   get lights(): PunctualLight[] {
     return this.selection.lights;
+  }
+
+  /** Shows all pages of lumels before the picture, or no more. */
+  togglePages(): void {
+    this.pages.mesh.visible = !this.pages.mesh.visible;
   }
 
   setMode(shown: Shown): void {
@@ -242,7 +250,20 @@ export class Viewer {
   }
 
   stats(): Figures {
-    return { ...this.session.stats, framesPerSecond: 1000 / this.#frameTime, clients: this.#clients };
+    return {
+      ...this.session.stats,
+      framesPerSecond: 1000 / this.#frameTime,
+      clients: this.#clients,
+      lumels: this.#lumelFigures(),
+    };
+  }
+
+  #lumelFigures(): Figures['lumels'] {
+    const { light, session } = this;
+    const shapes = session.catalog?.fields.filter(isLightmap).map(({ shape }) => shape) ?? [];
+    if (!light.pages || shapes.length === 0) return undefined;
+    const pages = shapes.reduce((sum, shape) => sum + shape.pages, 0);
+    return { pages, pageSize: shapes[0].pageSize, meshes: light.lumelMeshes };
   }
 
   /** Who else watches stands in the server's metrics. */

@@ -65,3 +65,24 @@ export function missingFile(what: string, address: string, answer: string, cause
     answer === '404' ? `${what} is missing: ${address}` : `${what} does not come (${answer}): ${address}`;
   return new Failure(message, 'Is its name right, and is it where this address says?', { cause });
 }
+
+/** What a page shows of a lightmap. */
+export interface ShownLumels {
+  readonly pages: number;
+  readonly pageSize: number;
+  /** Meshes that are lit by it. */
+  readonly meshes: number;
+}
+
+/** What there is of lumels. */
+export function lumelWords({ pages, pageSize, meshes }: ShownLumels): string {
+  const on = `${pages === 1 ? 'one page' : `${pages} pages`} of ${pageSize} × ${pageSize}`;
+  return `On ${on}; they light ${meshes === 1 ? 'one mesh' : `${meshes} meshes`}.`;
+}
+
+/** Why a page shows none of a lightmap that a server casts: it travels as video. */
+export function unshownWords({ secureContext }: { readonly secureContext: boolean }): string {
+  return secureContext
+    ? 'They travel as video, which this browser does not decode for pages. Probes light all.'
+    : 'They travel as video, which browsers decode only for secure pages. Probes light all. Open the page by https or as localhost.';
+}

@@ -17,7 +17,7 @@ import { findFlashlight } from '../src/view/flashlight.js';
 import { irradianceWeights } from '../src/view/probes.js';
 import { isDark, SKY } from '../src/view/sky.js';
 import { setSunAngles, sunAngles } from '../src/view/sun.js';
-import { missingFile, wordsFor } from '../src/words.js';
+import { lumelWords, missingFile, unshownWords, wordsFor } from '../src/words.js';
 
 describe('exposureFor', () => {
   it('scales with the light', () => {
@@ -228,5 +228,20 @@ describe('what the page says', () => {
     const address = 'https://host/light/room.light';
     expect(missingFile('The file', address, '404').message).toBe(`The file is missing: ${address}`);
     expect(missingFile('The file', address, '503').message).toContain('503');
+  });
+});
+
+describe('words for lumels', () => {
+  it('say how many there are', () => {
+    const shown = { pages: 2, pageSize: 512, meshes: 7 };
+    expect(lumelWords(shown)).toBe('On 2 pages of 512 × 512; they light 7 meshes.');
+    expect(lumelWords({ ...shown, pages: 1, meshes: 1 })).toBe(
+      'On one page of 512 × 512; they light one mesh.',
+    );
+  });
+
+  it('say why there are none, and what helps', () => {
+    expect(unshownWords({ secureContext: true })).toMatch(/video.*this browser/);
+    expect(unshownWords({ secureContext: false })).toMatch(/secure pages.*https/);
   });
 });

@@ -1,5 +1,5 @@
 /** Draws a floor of a material of many maps under several volumes, and counts the texture units bound. */
-import type { Vec3 } from '@lumencast/client';
+import { halfBits, type LightmapLight, type Vec3 } from '@lumencast/client';
 import {
   BufferAttribute,
   DataTexture,
@@ -13,6 +13,7 @@ import {
   WebGLRenderer,
 } from 'three';
 import { unitsTaken } from '../../src/units.js';
+import { chartsOf, layout, lightmapField, lightmapLight, region, surface } from '../support/lightmaps.js';
 import {
   fromAbove,
   type Kind,
@@ -25,7 +26,8 @@ import {
 } from './stage.js';
 
 /** What a floor is made of; three.js binds textures for each. */
-export type Part = 'gltf' | 'specular' | 'clearcoat' | 'glass' | 'shadow' | 'environment' | 'morphs';
+export type Part =
+  'gltf' | 'specular' | 'clearcoat' | 'glass' | 'shadow' | 'environment' | 'morphs' | 'lumels';
 
 export interface Crowd {
   readonly row: Radiance[];
@@ -71,20 +73,34 @@ export async function crowded(kind: Kind, parts: readonly Part[], volumes: numbe
     const coefficients = Array.from({ length: 8 * 27 }, (_, i) => (i % 27 < 3 ? 2 : 0));
     return volumeLight(coefficients, { id, center, size, resolution: [2, 2, 2] });
   });
+  const all = parts.includes('lumels') ? [...fields, lightmap()] : fields;
   const of = session(
-    { fields, age: 0 },
-    fields.map(({ field }) => field),
+    { fields: all, age: 0 },
+    all.map(({ field }) => field),
   );
   const camera = fromAbove();
   const onWarning = (message: string) => void warnings.push(message);
   const light = lit(kind, renderer, of, { scene, onWarning });
+  light.setNode(plane, 0);
   light.update(camera);
   const row = await middleRow(renderer, scene, camera);
   const bound = textures?.() ?? fullestProgram(renderer as WebGLRenderer);
   const limit = renderer instanceof WebGLRenderer ? renderer.capabilities.maxTextures : 16;
-  const counted = unitsTaken(scene, kind) + light.grids.length;
+  const counted = unitsTaken(scene, kind) + light.grids.length + Number(light.pages !== undefined);
   renderer.dispose();
   return { row, grids: light.grids.length, warnings, bound, counted, limit };
+}
+
+/** Light at lumels of the floor, as bright as that of the volumes. */
+function lightmap(): LightmapLight {
+  const charts = {
+    ...chartsOf([0, 2, 1, 2, 3, 1]),
+    at: new Float32Array([1, 1, 2, 1, 1, 2, 2, 2]),
+    sizes: [[3, 3]] as const,
+  };
+  const texels = Uint16Array.from({ length: 4 * 64 }, () => halfBits(2 * 0.282095 * Math.PI));
+  const regions = [region({ picture: { kind: 'halves', scale: 1, texels } })];
+  return lightmapLight(regions, layout(surface({ charts })), lightmapField(99));
 }
 
 function materialOf(parts: readonly Part[]): Material {

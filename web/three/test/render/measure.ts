@@ -8,6 +8,7 @@ import { showEnvironment } from '../../src/environment.js';
 import { bright } from './bright.js';
 import { changing } from './changing.js';
 import { crowded } from './crowded.js';
+import { lumels } from './lumels.js';
 import {
   floor,
   type Kind,
@@ -89,7 +90,7 @@ async function environment(
   return seen;
 }
 
-const measurements = { lamp, volume, environment, crowded, bright, changing };
+const measurements = { lamp, volume, environment, crowded, bright, changing, lumels };
 
 declare global {
   interface Window {

@@ -16,9 +16,12 @@ class FakeGrid extends Light {
 export const platform: Platform = {
   createGrid: () => new FakeGrid() as ProbeGrid,
   scaleIn: 'atlas',
-  gridExposure: { value: 1 },
-  freeGrids: () => 2,
+  factors: { lumels: { value: 1 }, still: { value: 1 }, moving: { value: 1 } },
+  pages: { value: null },
+  freeUnits: () => 2,
   max3DTextureSize: 256,
+  maxTextureSize: 2048,
+  createPages: () => undefined,
   patch: () => {},
   unpatch: () => {},
 };

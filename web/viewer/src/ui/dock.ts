@@ -15,7 +15,7 @@ export interface DockActions {
   select(light: number): void;
 }
 
-export type Toggle = 'fly' | 'probes' | 'flashlight' | 'playing' | 'stats' | 'help';
+export type Toggle = 'fly' | 'probes' | 'lumels' | 'flashlight' | 'playing' | 'stats' | 'help';
 
 const SHOWN: readonly [shown: Shown, label: string][] = [
   ['direct', 'Direct'],
@@ -34,6 +34,7 @@ const FIRST: readonly Entry[] = [
 const FURTHER: readonly Entry[] = [
   ['fly', 'fly', 'Fly', 'Fly with W A S D, Q E and the mouse (C)'],
   ['probes', 'probes', 'Probes', 'Show the light probes (P)'],
+  ['lumels', 'lumels', 'Lumels', 'Strength of indirect light, and its lumels (L)'],
   ['stats', 'stats', 'Figures', 'Figures (I)'],
   ['help', 'help', 'Help', 'Keys and gestures (?)'],
 ];

@@ -19,6 +19,7 @@ export function h<K extends keyof HTMLElementTagNameMap>(
 const PATHS = {
   fly: 'M3 12l18-8-6 17-3.5-7z',
   probes: 'M6 6h.01M12 6h.01M18 6h.01M6 12h.01M12 12h.01M18 12h.01M6 18h.01M12 18h.01M18 18h.01',
+  lumels: 'M4 4h16v16H4zM4 12h16M12 4v16M6.5 8h3M14.5 16h3',
   flashlight: 'M7 3h10v4l-2.5 3v11h-5V10L7 7zM7 7h10M12 13v2',
   play: 'M7 4l13 8-13 8z',
   pause: 'M8 5v14M16 5v14',

@@ -11,6 +11,7 @@ const KEYS: readonly [keys: string, meaning: string][] = [
   ['1 2 3', 'direct, indirect, both'],
   ['X', 'exposure by the picture'],
   ['P', 'light probes'],
+  ['L', 'lumels, and strength of indirect light'],
   ['space', 'pause the animation'],
   ['I', 'figures'],
   ['Esc', 'let go'],

@@ -6,6 +6,8 @@ export interface Figures extends SessionStats {
   readonly framesPerSecond: number;
   /** Pages and programs that watch; `undefined` where the server does not say. */
   readonly clients: number | undefined;
+  /** Pages of lumels that are shown, lumels along their sides and meshes that have some. */
+  readonly lumels: { readonly pages: number; readonly pageSize: number; readonly meshes: number } | undefined;
 }
 
 const ROWS: readonly [label: string, title: string, text: (figures: Figures) => string | undefined][] = [
@@ -28,6 +30,12 @@ const ROWS: readonly [label: string, title: string, text: (figures: Figures) => 
     // Nothing is expected where no server has said anything.
     ({ bandwidth, tickRate }) => known(tickRate, () => bytes(bandwidth)),
   ],
+  [
+    'pages',
+    'Pages of lumels, and lumels along their sides',
+    ({ lumels }) => known(lumels, ({ pages, pageSize }) => `${pages} × ${pageSize}²`),
+  ],
+  ['lit', 'Objects that lumels light', ({ lumels }) => known(lumels, ({ meshes }) => meshes.toFixed(0))],
   ['clients', 'Who watches this scene', ({ clients }) => known(clients, (n) => n.toFixed(0))],
   ['frames', 'Pictures a second on this page', ({ framesPerSecond }) => `${framesPerSecond.toFixed(0)} fps`],
 ];
@@ -49,7 +57,7 @@ export class StatsPanel {
   }
 }
 
-function known(value: number | undefined, text: (value: number) => string): string | undefined {
+function known<T>(value: T | undefined, text: (value: T) => string): string | undefined {
   return value === undefined ? undefined : text(value);
 }
 

@@ -1,0 +1,35 @@
+/** Pages of one lightmap. */
+export interface PageSet {
+  /** Lumels along both sides of each. */
+  readonly pageSize: number;
+  readonly pages: number;
+}
+
+/** Where pages lie in the one texture that holds all of them. */
+export interface AtlasPlan {
+  readonly width: number;
+  readonly height: number;
+  /** The first lumel of a page of the lightmap of a number. */
+  corner(lightmap: number, page: number): readonly [x: number, y: number];
+}
+
+/**
+ * Lays the pages of all lightmaps out in rows, as square as can be: one texture takes one unit. Between
+ * pages nothing is left free, as charts keep two lumels from their page's border.
+ * @returns `undefined` where a texture of this device has no room for them
+ */
+export function planAtlas(lightmaps: readonly PageSet[], textureSize: number): AtlasPlan | undefined {
+  const side = Math.max(0, ...lightmaps.map(({ pageSize }) => pageSize));
+  const count = lightmaps.reduce((sum, { pages }) => sum + pages, 0);
+  const columns = Math.ceil(Math.sqrt(count));
+  if (columns * side > textureSize) return undefined;
+  const first = lightmaps.map((_, i) => lightmaps.slice(0, i).reduce((sum, { pages }) => sum + pages, 0));
+  return {
+    width: columns * side,
+    height: Math.ceil(count / Math.max(columns, 1)) * side,
+    corner(lightmap, page) {
+      const cell = first[lightmap] + page;
+      return [(cell % columns) * side, Math.floor(cell / columns) * side];
+    },
+  };
+}

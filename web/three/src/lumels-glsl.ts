@@ -1,0 +1,52 @@
+import { FIRST, LUMELS } from './charted.js';
+
+/**
+ * What a vertex hands on in place of coordinates where its side has no lumels, and where its geometry
+ * knows none at all. Both are so far off that interpolation beyond a triangle's edge, as at samples of a
+ * pixel, comes nowhere near a coordinate. Twin: `LumelNode` in webgpu-lumels.ts.
+ */
+const NOWHERE = '- 1e6';
+const UNKNOWN = '- 3e6';
+/** What is above this is a coordinate, or else {@link NOWHERE}. */
+const BELOW_COORDINATES = '- 5e5';
+const BELOW_NOWHERE = '- 2e6';
+
+export const LUMELS_OF_VERTEX = /* glsl */ `
+attribute vec4 ${LUMELS};
+varying highp vec4 vLumels;
+`;
+
+export const LUMELS_OF_VERTEX_MAIN = /* glsl */ `
+vLumels.xy = ${LUMELS}.x > 1.5 ? ${LUMELS}.xy - ${FIRST}.0 : vec2( ${LUMELS}.x < 0.0 ? ${NOWHERE} : ${UNKNOWN} );
+vLumels.zw = ${LUMELS}.z > 1.5 ? ${LUMELS}.zw - ${FIRST}.0 : vec2( ${NOWHERE} );
+`;
+
+export const LUMELS_OF_FRAGMENT = /* glsl */ `
+uniform float lumencastStill;
+uniform float lumencastMoving;
+uniform float lumencastLumels;
+uniform highp sampler2D lumencastPages;
+varying highp vec4 vLumels;
+
+// Where the lumels of the side that is seen lie.
+vec2 lumelsSeen() {
+#ifdef FLIP_SIDED
+	return gl_FrontFacing ? vLumels.zw : vLumels.xy;
+#else
+	return gl_FrontFacing ? vLumels.xy : vLumels.zw;
+#endif
+}
+
+bool hasLumels() {
+	return lumelsSeen().x > ${BELOW_COORDINATES};
+}
+
+vec3 lumelIrradiance() {
+	vec2 uv = lumelsSeen() / vec2( textureSize( lumencastPages, 0 ) );
+	return textureLod( lumencastPages, uv, 0.0 ).rgb * lumencastLumels;
+}
+
+float gridFactor() {
+	return vLumels.x > ${BELOW_NOWHERE} ? lumencastStill : lumencastMoving;
+}
+`;

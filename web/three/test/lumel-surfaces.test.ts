@@ -1,0 +1,241 @@
+/** Which meshes get geometries with lumels, and when they get their own ones back. */
+import { Group, InstancedMesh, Mesh, MeshPhysicalMaterial, type Object3D, PlaneGeometry, Scene } from 'three';
+import { beforeEach, describe, expect, it } from 'vitest';
+import { isCharted, LUMELS } from '../src/charted.js';
+import { Content, instantiateMesh } from '../src/content.js';
+import { LumelSurfaces } from '../src/lumel-surfaces.js';
+import { load, POSITION } from './support/glb.js';
+import { chartsOf, layout, surface } from './support/lightmaps.js';
+
+const SQUARE = chartsOf([0, 2, 1, 2, 3, 1]);
+const corner = () => [0, 0] as const;
+
+let scene: Scene;
+let content: Content;
+let warnings: string[];
+let surfaces: LumelSurfaces;
+let revision: number;
+let now: number;
+
+beforeEach(() => {
+  scene = new Scene();
+  content = new Content();
+  warnings = [];
+  surfaces = new LumelSurfaces(scene, content, (message) => void warnings.push(message));
+  [revision, now] = [0, 0];
+});
+
+/** A node with a mesh of a square; squares of one geometry share it. */
+function square(node: number, geometry = new PlaneGeometry(2, 2)): Mesh {
+  const mesh = new Mesh(geometry);
+  scene.add(mesh);
+  content.setNode(node, mesh);
+  return mesh;
+}
+
+function set(...nodes: number[]): void {
+  const all = nodes.map((node) =>
+    surface({ node, charts: SQUARE, rectangles: [{ page: 0, x: node, y: 0 }] }),
+  );
+  surfaces.setLayouts([{ layout: layout(...all), corner }]);
+}
+
+function frame(milliseconds = 16): void {
+  scene.updateMatrixWorld();
+  now += milliseconds;
+  surfaces.update(revision, now, Infinity);
+}
+
+const isLit = (object: Object3D) => isCharted((object as Mesh).geometry);
+
+describe('meshes that a layout names', () => {
+  it('get a geometry with lumels, and their own one back when it names them no more', () => {
+    const [one, other] = [square(0), square(1)];
+    const own = [one.geometry, other.geometry];
+    set(0, 1);
+    frame();
+    expect([one, other].map(isLit)).toEqual([true, true]);
+    expect(surfaces.count).toBe(2);
+    set(1);
+    expect([one, other].map(isLit)).toEqual([false, true]);
+    surfaces.dispose();
+    expect([one.geometry, other.geometry]).toEqual(own);
+  });
+
+  it('share what is parted alike, and have lumels of their own', () => {
+    const geometry = new PlaneGeometry(2, 2);
+    const [one, other] = [square(0, geometry), square(1, geometry)];
+    set(0, 1);
+    frame();
+    expect(one.geometry).not.toBe(other.geometry);
+    expect(one.geometry.getAttribute('position')).toBe(other.geometry.getAttribute('position'));
+    expect(one.geometry.index).toBe(other.geometry.index);
+    const first = (mesh: Mesh) => mesh.geometry.getAttribute(LUMELS).getX(0);
+    expect(first(other) - first(one)).toBe(1);
+  });
+
+  it('keep their geometry where nothing of theirs changes', () => {
+    const mesh = square(0);
+    square(1);
+    set(0);
+    frame();
+    const { geometry } = mesh;
+    set(0, 1);
+    frame();
+    expect(mesh.geometry).toBe(geometry);
+    surfaces.setLayouts([{ layout: layout(surface({ charts: SQUARE })), corner: () => [64, 0] }]);
+    frame();
+    expect(mesh.geometry).not.toBe(geometry);
+    expect(isLit(mesh)).toBe(true);
+  });
+
+  it('are lit once they are here', () => {
+    set(4);
+    frame();
+    const late = square(4);
+    frame();
+    expect(isLit(late)).toBe(false);
+    revision++;
+    frame();
+    expect(isLit(late)).toBe(true);
+    // A snapshot has another object stand for the node.
+    content.deleteNode(4);
+    revision++;
+    frame();
+    expect(isLit(late)).toBe(false);
+    const other = square(4);
+    revision++;
+    frame();
+    expect(isLit(other)).toBe(true);
+  });
+
+  it('leave their lumels when they move, and find them where they were', () => {
+    const above = new Group();
+    const mesh = square(0);
+    scene.add(above.add(mesh));
+    set(0);
+    frame();
+    above.position.x = 1;
+    frame();
+    expect([isLit(mesh), surfaces.count]).toEqual([false, 0]);
+    above.position.x = 0;
+    frame();
+    expect(isLit(mesh)).toBe(true);
+    // The server takes them from it, and gives them back where it rests.
+    above.position.x = 2;
+    frame();
+    set();
+    frame();
+    set(0);
+    frame();
+    expect(isLit(mesh)).toBe(true);
+  });
+
+  it('have lumels where they are found when the page is shown again', () => {
+    const mesh = square(0);
+    set(0);
+    frame();
+    mesh.position.x = 1;
+    frame(5000);
+    expect(isLit(mesh)).toBe(true);
+  });
+
+  it('are left alone when the program gives them another geometry', () => {
+    const mesh = square(0);
+    set(0);
+    frame();
+    const other = new PlaneGeometry(3, 3, 2);
+    mesh.geometry = other;
+    frame();
+    surfaces.dispose();
+    expect(mesh.geometry).toBe(other);
+  });
+
+  it('are made a few in a frame', () => {
+    const all = [0, 1, 2].map((node) => square(node));
+    set(0, 1, 2);
+    scene.updateMatrixWorld();
+    const counts = all.map(() => {
+      surfaces.update(revision, (now += 16), 0);
+      return surfaces.count;
+    });
+    expect(counts).toEqual([1, 2, 3]);
+  });
+});
+
+describe('probes alone light', () => {
+  it('what has other triangles, with one warning', () => {
+    const meshes = [0, 1].map((node) => square(node, new PlaneGeometry(2, 2, 3)));
+    meshes[0].name = 'wall';
+    set(0, 1);
+    frame();
+    frame();
+    expect(meshes.map(isLit)).toEqual([false, false]);
+    expect(warnings).toEqual([expect.stringMatching(/triangles.*wall/)]);
+  });
+
+  it('instances of a node, and what light goes through', () => {
+    const instances = new InstancedMesh(new PlaneGeometry(2, 2), undefined, 2);
+    const glass = new Mesh(new PlaneGeometry(2, 2), new MeshPhysicalMaterial({ transmission: 1 }));
+    scene.add(instances, glass);
+    content.setNode(0, instances);
+    content.setNode(1, glass);
+    set(0, 1);
+    frame();
+    expect([instances, glass].map(isLit)).toEqual([false, false]);
+    expect(warnings).toEqual([]);
+  });
+
+  it('further instances, and surfaces whose rectangles do not fit their charts', () => {
+    const mesh = square(0);
+    for (const wrong of [{ copy: 1 }, { rectangles: [] }]) {
+      surfaces.setLayouts([{ layout: layout(surface({ charts: SQUARE, ...wrong })), corner }]);
+      frame();
+      expect(isLit(mesh)).toBe(false);
+    }
+  });
+
+  it('copies that a program makes of what has lumels', () => {
+    const mesh = square(0);
+    const { geometry } = mesh;
+    set(0);
+    frame();
+    const copy = mesh.clone();
+    scene.add(copy);
+    expect(isLit(copy)).toBe(true);
+    frame();
+    expect(copy.geometry).toBe(geometry);
+    expect(isLit(mesh)).toBe(true);
+  });
+});
+
+it('meshes are found by node and primitive in what GLTFLoader has read', async () => {
+  const TRIANGLE = { attributes: { POSITION } };
+  const gltf = await load({
+    scenes: [{ nodes: [0, 1] }],
+    nodes: [{ mesh: 0, children: [2] }, { mesh: 0 }, { mesh: 1 }],
+    meshes: [{ primitives: [TRIANGLE, { ...TRIANGLE, material: 0 }] }, { primitives: [TRIANGLE] }],
+    materials: [{}],
+  });
+  scene.add(gltf.scene);
+  content.add(gltf, { node: 0, material: 0, animation: 0 });
+  const wanted = [
+    [0, 0],
+    [0, 1],
+    [1, 1],
+    [2, 0],
+  ].map(([node, primitive]) => surface({ node, primitive, charts: chartsOf([0, 1, 2]) }));
+  surfaces.setLayouts([{ layout: layout(...wanted), corner }]);
+  frame();
+  expect(surfaces.count).toBe(4);
+  const lit = wanted.map(({ node, primitive }) => content.mesh(node, primitive)!);
+  expect(lit.map(isLit)).toEqual([true, true, true, true]);
+  expect(isLit(content.mesh(1, 0)!)).toBe(false);
+  expect(content.mesh(2, 1)).toBeUndefined();
+  // What is made of the file later has no lumels of the mesh that it is made from.
+  const later: Mesh[] = [];
+  (await instantiateMesh(gltf, 0)).traverse((object) => {
+    if ((object as Mesh).isMesh) later.push(object as Mesh);
+  });
+  expect(later.map(isLit)).toEqual([false, false]);
+});
