@@ -46,14 +46,14 @@ enum FieldKind {
 /// Which kinds of fields hold live light.
 #[derive(Debug, Args)]
 pub(crate) struct LiveFieldsArguments {
-    /// What holds the light beside probes: lumels of still surfaces (lightmap,volume), for native
-    /// clients so far, or nothing (volume).
+    /// What holds the light: lumels of still surfaces and probes for all else (lightmap,volume), or
+    /// probes alone (volume), which follow changes twice as fast.
     #[arg(
         long,
         value_name = "KIND,KIND",
         value_enum,
         value_delimiter = ',',
-        default_value = "volume"
+        default_value = "lightmap,volume"
     )]
     fields: Vec<FieldKind>,
     /// How lumels are sent: as video, with colour at half the resolution (h264) or at full
