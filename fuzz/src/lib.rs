@@ -11,8 +11,8 @@ use std::sync::Arc;
 use glam::{UVec2, UVec3};
 use lumencast_cache::Cache;
 use lumencast_codec::{
-    Catalog, ClientEdit, LayoutResource, LightFile, LightTrack, LumelDecoder, LumelHeader,
-    ProbeDecoder, ProbeHeader, StateFrame, layout_resources, read_charts,
+    Catalog, ClientEdit, Coding, LayoutResource, LightFile, LightTrack, LumelDecoder, LumelHeader,
+    ProbeDecoder, ProbeHeader, StateFrame, Tile, layout_resources, read_charts,
 };
 use lumencast_light::{Charts, Layout, OnTriangle, Order, Rectangle, Surface, SurfaceId};
 use lumencast_scene::{Edit, Scene, Script};
@@ -39,7 +39,16 @@ pub fn probe_frames(data: &[u8]) {
 pub fn lumel_frames(data: &[u8]) {
     // A frame that says its own size fits its tile, so that payloads are reached.
     let size = LumelHeader::read(data).map_or(UVec2::splat(8), |header| header.size);
-    let mut decoder = LumelDecoder::new(size);
+    decode_lumels(data, Coding::Halves, size);
+}
+
+/// Lumel frames that hold video, alone and one after another.
+pub fn video_frames(data: &[u8]) {
+    decode_lumels(data, Coding::H264, UVec2::splat(seeds::VIDEO_SIDE));
+}
+
+fn decode_lumels(data: &[u8], coding: Coding, size: UVec2) {
+    let mut decoder = LumelDecoder::new(coding, Tile { id: 0, page: 0, min: UVec2::ZERO, size });
     // As one frame, and cut in two: the second may be a delta against the first.
     drop(decoder.decode(data));
     let (first, second) = data.split_at(data.len() / 2);

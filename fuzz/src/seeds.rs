@@ -6,7 +6,8 @@ use std::sync::Arc;
 use base64::{Engine, prelude::BASE64_STANDARD};
 use glam::{Quat, UVec2, UVec3, Vec2, Vec3};
 use lumencast_codec::{
-    FieldEncoder, LightFile, ProbeHeader, Resource, SceneInfo, UpdateInfo, layout_resources,
+    FieldEncoder, LightFile, LumelCoding, ProbeHeader, Qp, Resource, SceneInfo, UpdateInfo,
+    layout_resources,
 };
 use lumencast_light::{
     ChartVertex, Charts, Field, FieldId, Grid, Layout, Lightmap, Order, ProbeVolume, Rectangle,
@@ -16,6 +17,9 @@ use lumencast_scene::{FileContents, Scene};
 use serde_json::{Value, json};
 
 use crate::packed;
+
+/// Lumels along a side of the pages of [`video_frames`].
+pub const VIDEO_SIDE: u32 = 20;
 
 /// A file of `vectors/`.
 ///
@@ -68,7 +72,7 @@ fn lightmap(brightness: f32) -> Lightmap {
         charts: charts.clone(),
         rectangles: vec![Rectangle { page: 0, corner: UVec2::new(8 * node, 0) }],
     };
-    let layout = Layout::new(20, 1, vec![surface(0), surface(1)]);
+    let layout = Layout::new(VIDEO_SIDE, 1, vec![surface(0), surface(1)]);
     let mut lightmap = Lightmap::dark(FieldId(0), Arc::new(layout));
     for (lumel, value) in lightmap.irradiance.iter_mut().enumerate() {
         *value = brightness * Vec3::new(1.0, 2.0, (lumel % 7) as f32);
@@ -76,15 +80,25 @@ fn lightmap(brightness: f32) -> Lightmap {
     lightmap
 }
 
-/// Lumel frames of one tile: a keyframe and deltas.
+/// Lumel frames of one tile, as halves: a keyframe and deltas.
 pub fn lumel_frames() -> Vec<Vec<u8>> {
+    frames_of_lumels(LumelCoding::Halves)
+}
+
+/// The same of a page, as video.
+pub fn video_frames() -> Vec<Vec<u8>> {
+    frames_of_lumels(LumelCoding::H264(Qp::new(18).expect("a parameter")))
+}
+
+fn frames_of_lumels(coding: LumelCoding) -> Vec<Vec<u8>> {
     let updates = [1.0, 1.0, 1.1, 3.0].map(|brightness| Field::from(lightmap(brightness)));
-    let mut encoder = FieldEncoder::new(&updates[0]);
+    let mut encoder = FieldEncoder::new(&updates[0], coding);
     let mut encode = |(update, field): (u64, &Field)| {
         let info = UpdateInfo { update, tick: update, ..UpdateInfo::default() };
-        encoder.encode(field, info, |_| true).remove(0).bytes
+        let frames = encoder.encode(field, info, |_| true).expect("frames");
+        frames.into_iter().next().map(|frame| frame.bytes)
     };
-    (0..).zip(&updates).map(&mut encode).collect()
+    (0..).zip(&updates).filter_map(&mut encode).collect()
 }
 
 /// Layouts, and charts.

@@ -22,6 +22,11 @@ fn probe_frames() {
 }
 
 #[test]
+fn video_frames() {
+    feed(lumencast_fuzz::video_frames, &seeds::video_frames(), 20_000);
+}
+
+#[test]
 fn lumel_frames() {
     feed(lumencast_fuzz::lumel_frames, &seeds::lumel_frames(), 20_000);
 }

@@ -3,6 +3,7 @@
 #![expect(clippy::print_stdout, reason = "a program for the terminal")]
 
 mod arm;
+mod assembly;
 mod contenders;
 mod demo;
 #[cfg(test)]

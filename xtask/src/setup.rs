@@ -48,8 +48,15 @@ const PACKAGES: &[Package] = &[
         name: "build-essential",
         release: Release::Stable,
         purpose: Purpose::Demo,
-        why: "a C compiler for the cryptography of QUIC",
-        present: || runs("cc", "--version"),
+        why: "compilers of C for the cryptography of QUIC, of C++ for video",
+        present: || runs("cc", "--version") && runs("c++", "--version"),
+    },
+    Package {
+        name: "nasm",
+        release: Release::Stable,
+        purpose: Purpose::Demo,
+        why: "the assembler of the video library, which is far slower without",
+        present: || cfg!(not(target_arch = "x86_64")) || runs("nasm", "-v"),
     },
     Package {
         name: "chromium",

@@ -5,7 +5,7 @@ use clap::Args;
 
 use crate::run::{cargo, heading, npm, step, target_dir};
 use crate::setup::{self, Purpose};
-use crate::{licences, oracles};
+use crate::{assembly, licences, oracles};
 
 /// Options of `cargo xtask test`.
 #[derive(Args)]
@@ -40,6 +40,8 @@ impl Test {
             left_out.push(format!("light beside Mitsuba's in real scenes: {scenes} is not here"));
         }
         step("tests", tests)?;
+        heading("assembly of the video library");
+        assembly::check()?;
         step("doctests", cargo(&["test", "--workspace", "--doc", "--quiet"]))?;
         let mut documentation = cargo(&["doc", "--workspace", "--no-deps", "--quiet"]);
         documentation.env("RUSTDOCFLAGS", "-D warnings");

@@ -14,6 +14,7 @@ use crate::CacheError;
 use crate::clock::ServerClock;
 use crate::edits::{Edits, SceneEvent};
 use crate::field::FieldCache;
+use crate::handover::Handover;
 use crate::newest::Newest;
 use crate::received::Received;
 use crate::resources::Resources;
@@ -31,13 +32,15 @@ const LONGEST_RUN: f64 = 1.0;
 /// Memory: five copies of the light of those regions that frames have come for, at most
 /// [`lumencast_codec::limits::CATALOG_PROBES`] probes and [`lumencast_codec::limits::CATALOG_LUMELS`]
 /// lumels; three where nothing changes.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Cache {
     catalog: Option<Catalog>,
     /// Whether the catalog is that of a file.
     saved: bool,
     fields: BTreeMap<u32, FieldCache>,
     light: Light,
+    /// Of each lightmap, how its surfaces pass from one layout to the next.
+    handovers: BTreeMap<u32, Handover>,
     resources: Resources,
     clock: ServerClock,
     state: Option<StateFrame>,
@@ -141,7 +144,8 @@ impl Cache {
         let mut shown = Vec::with_capacity(catalog.fields.len());
         for info in &catalog.fields {
             let same = before.as_ref().and_then(|before| {
-                let old = before.field(info.id).filter(|old| old.shape == info.shape)?;
+                let old =
+                    before.field(info.id).filter(|old| old.shape.is_coded_alike(&info.shape))?;
                 Some(before.epoch_of(old))
             });
             let known = self.light.field(FieldId(info.id));
@@ -159,6 +163,7 @@ impl Cache {
         }
         self.fields = caches;
         self.light = Light::new(shown);
+        self.handovers.retain(|id, _| catalog.field(*id).is_some());
         self.resources.follow(&catalog);
         self.catalog = Some(catalog);
         self.saved = saved;
@@ -241,7 +246,7 @@ impl Cache {
 
     /// Brings the light to what is to be seen at `now`.
     fn show(&mut self, now: f64) {
-        self.lay_out();
+        self.lay_out(now);
         for field in self.light.fields_mut() {
             if let Some(cache) = self.fields.get_mut(&field.id().0) {
                 cache.show(now, field);
@@ -249,14 +254,15 @@ impl Cache {
         }
     }
 
-    /// Gives lightmaps their layouts, as far as these are known.
-    fn lay_out(&mut self) {
+    /// Gives lightmaps their layouts at `now`, as far as these are known.
+    fn lay_out(&mut self, now: f64) {
         self.resources.lay_out();
         for lightmap in self.light.fields_mut().iter_mut().filter_map(Field::as_lightmap_mut) {
             let info = self.catalog.as_ref().and_then(|catalog| catalog.field(lightmap.id.0));
             let shape = info.and_then(|info| info.shape.as_lightmap());
             if let Some(layout) = shape.and_then(|shape| self.resources.layout(shape)) {
-                lightmap.layout = layout.clone();
+                let handover = self.handovers.entry(lightmap.id.0).or_default();
+                lightmap.layout = handover.show(layout, now);
             }
         }
     }

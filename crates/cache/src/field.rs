@@ -11,7 +11,7 @@ use crate::volume::VolumeCache;
 
 /// What is known of a field, by its kind. What is shown of it stands beside, in the cache's light, and
 /// comes with each call.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) enum FieldCache {
     Volume(VolumeCache),
     Lightmap(LightmapCache),

@@ -20,6 +20,7 @@ mod clock;
 mod edits;
 mod error;
 mod field;
+mod handover;
 mod lightmap;
 mod newest;
 mod passage;

@@ -1,9 +1,10 @@
 //! A lightmap: its tiles, each on the way to its newest light.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-use lumencast_codec::{LightTrack, LightmapShape, LumelHeader};
-use lumencast_light::{Field, Light, Lightmap};
+use lumencast_codec::{FrameHead, LightTrack, LightmapShape};
+use lumencast_light::{Field, Layout, Light, Lightmap, Surface};
 
 use crate::CacheError;
 use crate::newest::Newest;
@@ -11,7 +12,7 @@ use crate::received::Received;
 use crate::tile::TileCache;
 
 /// The tiles of a lightmap; those for which frames have come hold memory.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct LightmapCache {
     shape: LightmapShape,
     tiles: BTreeMap<u32, TileCache>,
@@ -22,14 +23,24 @@ impl LightmapCache {
         Self { shape: shape.clone(), tiles: BTreeMap::new() }
     }
 
-    /// Gives a lightmap the pages of the one that had its number before, where they are as many and as
-    /// large, and their layout until its own is known.
+    /// Gives a lightmap the pages of the one that had its number before, where they are as large, and
+    /// their layout until its own is known.
     pub(crate) fn light_by(light: &Light, lightmap: &mut Lightmap) {
-        let pages = |lightmap: &Lightmap| (lightmap.layout.page_size, lightmap.layout.pages);
+        let Layout { page_size, pages, .. } = *lightmap.layout;
         let before = light.field(lightmap.id).and_then(Field::as_lightmap);
-        if let Some(before) = before.filter(|before| pages(before) == pages(lightmap)) {
-            lightmap.clone_from(before);
-        }
+        let Some(before) = before.filter(|before| before.layout.page_size == page_size) else {
+            return;
+        };
+        let common = lightmap.irradiance.len().min(before.irradiance.len());
+        lightmap.irradiance[..common].copy_from_slice(&before.irradiance[..common]);
+        let is_there = |surface: &&Surface| surface.rectangles.iter().all(|r| r.page < pages);
+        lightmap.layout = match before.layout.pages == pages {
+            true => before.layout.clone(),
+            false => {
+                let surfaces = before.layout.surfaces().iter().filter(is_there).cloned();
+                Arc::new(Layout::new(page_size, pages, surfaces.collect()))
+            }
+        };
     }
 
     pub(crate) fn add(
@@ -43,16 +54,15 @@ impl LightmapCache {
         let LightTrack { field, region, layer } = track;
         let unknown = CacheError::UnknownRegion { field, region };
         let tile = self.shape.tile(region).ok_or(unknown)?;
-        let info = LumelHeader::read(frame)?.info;
+        let info = FrameHead::read(frame)?.info;
         if layer != 0 {
             return Err(CacheError::WrongLayer { update: info.update, layer });
         }
-        let news = self.tiles.entry(region).or_insert_with(|| TileCache::new(tile)).add(
-            frame,
-            now,
-            tick_seconds,
-            shown,
-        )?;
+        let news = self
+            .tiles
+            .entry(region)
+            .or_insert_with(|| TileCache::new(self.shape.coding, tile))
+            .add(frame, now, tick_seconds, shown)?;
         Ok(Received { info, news })
     }
 

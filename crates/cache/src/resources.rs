@@ -86,6 +86,14 @@ impl Resources {
         for hash in named {
             self.layouts.entry(hash).or_insert(State::Wanted);
         }
+        self.forget();
+    }
+
+    /// Forgets charts that no layout names, once all layouts are known.
+    fn forget(&mut self) {
+        if self.layouts.values().any(State::is_wanted) {
+            return;
+        }
         let known = self.layouts.values().filter_map(State::value);
         let needed: BTreeSet<_> = known.flat_map(|known| known.resource.charts()).collect();
         self.charts.retain(|hash, _| needed.contains(hash));
@@ -113,6 +121,7 @@ impl Resources {
         }
         self.bytes += length;
         self.stale = true;
+        self.forget();
         Ok(())
     }
 

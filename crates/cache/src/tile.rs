@@ -1,27 +1,29 @@
 //! One tile of a lightmap: its decoder, and the passage to its newest light.
 
-use lumencast_codec::{DecodeError, LumelDecoder, Tile};
+use lumencast_codec::{Coding, DecodeError, LumelDecoder, Tile};
 use lumencast_light::Lightmap;
 
 use crate::newest::Newest;
 use crate::passage::Passage;
 
 /// One tile of a lightmap.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct TileCache {
+    coding: Coding,
     tile: Tile,
     decoder: LumelDecoder,
     passage: Passage,
 }
 
 impl TileCache {
-    pub(crate) fn new(tile: Tile) -> Self {
-        Self { tile, decoder: LumelDecoder::new(tile.size), passage: Passage::default() }
+    pub(crate) fn new(coding: Coding, tile: Tile) -> Self {
+        let decoder = LumelDecoder::new(coding, tile);
+        Self { coding, tile, decoder, passage: Passage::default() }
     }
 
     /// See [`Passage::forget_updates`].
     pub(crate) fn forget_updates(&mut self) {
-        self.decoder = LumelDecoder::new(self.tile.size);
+        self.decoder = LumelDecoder::new(self.coding, self.tile);
         self.passage.forget_updates();
     }
 
@@ -39,7 +41,7 @@ impl TileCache {
     ) -> Result<bool, DecodeError> {
         let light = self.decoder.decode(frame)?;
         let places = self.tile.rows(lightmap.layout.page_size);
-        let (info, shown) = (light.header.info, &mut lightmap.irradiance[..]);
+        let (info, shown) = (light.head.info, &mut lightmap.irradiance[..]);
         Ok(self.passage.take_in(info, light.irradiance, (now, tick_seconds), shown, places))
     }
 

@@ -22,7 +22,7 @@ const USUAL: u32 = 256;
 /// Sides of smaller pages, on one of which little scenes fit.
 const SMALLER: [u32; 3] = [128, 256, 512];
 /// Rectangles begin at multiples of this, so that no block of a codec's transform belongs to two.
-const ALIGNMENT: i32 = 4;
+pub(crate) const ALIGNMENT: i32 = 4;
 /// Share of a page that charts fill, about: the first guess.
 const FILLED: f64 = 0.6;
 /// By how much a density is changed until it fits, or until it no longer does.
@@ -152,7 +152,7 @@ fn key(sheet: &Sheet) -> (usize, Option<usize>) {
     (Arc::as_ptr(&sheet.cut).addr(), kept)
 }
 
-fn charts(sheet: &Sheet, density: f32, most: u32) -> Result<Charts, ChartError> {
+pub(crate) fn charts(sheet: &Sheet, density: f32, most: u32) -> Result<Charts, ChartError> {
     let shape = Shape { positions: sheet.positions.to_vec(), triangles: &[], uv: None };
     lay_out(&sheet.cut, &shape, &|chart| sheet.keeps(chart), density, most)
 }

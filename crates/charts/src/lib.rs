@@ -1,8 +1,8 @@
 //! Surfaces of a scene cut into charts, and laid out on pages of lumels.
 //!
 //! [`sheets`] cuts the still surfaces, once for all equal ones, and keeps what it made in a [`Store`].
-//! [`laid_out`] gives them places on pages, at a density; [`usual`] chooses one. [`lumels`] tells where each lumel lies on its
-//! surface.
+//! [`laid_out`] gives them places on pages, at a density; [`usual`] chooses one. [`extended`] finds room
+//! for more. [`lumels`] tells where each lumel lies on its surface.
 //!
 //! ```
 //! use lumencast_charts::{laid_out, lumels, sheets};
@@ -20,6 +20,7 @@
 
 mod cut;
 mod error;
+mod extend;
 mod layout;
 mod lumels;
 mod raster;
@@ -27,6 +28,7 @@ mod sheet;
 mod store;
 
 pub use error::ChartError;
+pub use extend::{Extended, extended};
 pub use layout::{LaidOut, MOST_PAGES, PAGE, laid_out, usual};
 pub use lumels::{Lumel, lumels};
 pub use sheet::{Progress, Sheet, Sheets, sheets};

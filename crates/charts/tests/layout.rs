@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Quat, UVec2, Vec2, Vec3};
 use lumencast_charts::{
-    ChartError, LaidOut, MOST_PAGES, PAGE, Sheets, laid_out, lumels, sheets, usual,
+    ChartError, Extended, LaidOut, MOST_PAGES, PAGE, Sheets, extended, laid_out, lumels, sheets,
+    usual,
 };
 use lumencast_light::{Charts, Surface};
 use lumencast_scene::{
@@ -364,4 +365,40 @@ fn a_mesh_that_one_instance_moves_has_lumels_on_the_other() {
     snapshot.instances[1].still = false;
     let found = cut(&snapshot).sheets;
     assert_eq!(found.iter().map(|sheet| sheet.instance).collect::<Vec<_>>(), [0]);
+}
+
+/// What comes later lies beside what there is, which stays where it is; what goes makes room.
+#[test]
+fn layouts_are_extended() {
+    let scene = Scene::builtin("door").expect("a built-in scene").snapshot();
+    let all = cut(&scene).sheets;
+    let (first, rest) = all.split_at(all.len() / 2);
+    let before = laid_out(first, LightmapSpec::Texel(0.05)).unwrap();
+    let Extended { laid_out: after, left_out } = extended(&before, |_| true, rest).unwrap();
+    check(&scene, &after);
+    assert!(left_out.is_empty());
+    assert_eq!(after.texel, before.texel);
+    assert_eq!(after.layout.surfaces().len(), all.len());
+    for surface in before.layout.surfaces() {
+        assert_eq!(after.layout.surface(surface.id), Some(surface));
+    }
+
+    // Taking turns needs no more room than both together.
+    let is_first = |id| first.iter().any(|sheet| sheet.id == id);
+    let mut layout = after.clone();
+    for round in 0..6 {
+        let back = if round % 2 == 0 { rest } else { first };
+        let keeps = |id| is_first(id) == (round % 2 == 0);
+        layout = extended(&layout, keeps, back).unwrap().laid_out;
+        check(&scene, &layout);
+        assert_eq!(layout.layout.surfaces().len(), all.len());
+    }
+    assert!(layout.layout.pages <= after.layout.pages + 1);
+
+    // Rectangles that are larger than a page, and pages beyond the most.
+    let tight = laid_out(&first[..1], LightmapSpec::Size(64)).unwrap();
+    let huge = LaidOut { texel: tight.texel / 100.0, ..tight };
+    let Extended { laid_out: same, left_out } = extended(&huge, |_| true, rest).unwrap();
+    assert_eq!(left_out.len() + same.layout.surfaces().len(), rest.len() + 1);
+    assert!(left_out.len() > rest.len() / 2);
 }

@@ -15,7 +15,8 @@ use std::sync::Arc;
 use base64::{Engine, prelude::BASE64_STANDARD};
 use glam::{UVec2, Vec3};
 use lumencast_codec::{
-    DecodeError, LightmapShape, LumelDecoder, LumelEncoder, TileLight, UpdateInfo,
+    Coding, DecodeError, LightmapShape, LumelCoding, LumelDecoder, LumelEncoder, TileLight,
+    UpdateInfo,
 };
 use lumencast_light::{FieldId, Layout, Lightmap};
 use serde_json::{Value, json};
@@ -72,9 +73,9 @@ fn sequence(
 ) -> Sequence {
     let layout = Arc::new(Layout::new(page_size, 1, Vec::new()));
     let mut lightmap = Lightmap::dark(FieldId(0), layout);
-    let shape = LightmapShape::of(&lightmap);
+    let shape = LightmapShape::of(&lightmap, Coding::Halves);
     let size = shape.tile(region).expect("a tile").size;
-    let mut encoder = LumelEncoder::new(shape);
+    let mut encoder = LumelEncoder::new(shape, LumelCoding::Halves);
     let mut noise = Noise(page_size.into());
     let first = updates.start;
     let mut frames = Vec::new();
@@ -89,7 +90,7 @@ fn sequence(
             time: 0.04 * update as f64,
             scene_version: update / 3,
         };
-        let encoded = encoder.encode(&lightmap, info, |watched| watched == region);
+        let encoded = encoder.encode(&lightmap, info, |watched| watched == region).expect("frames");
         frames.extend(encoded.into_iter().map(|frame| frame.bytes));
     }
     Sequence { name, size, frames }
@@ -122,12 +123,12 @@ fn noise(_: UVec2, _: u64, noise: &mut Noise) -> Vec3 {
 
 impl Sequence {
     fn expected(&self) -> Vec<Value> {
-        let mut decoder = LumelDecoder::new(self.size);
+        let mut decoder = LumelDecoder::of_halves(self.size);
         let mut before = None;
         let mut frames = Vec::new();
         for frame in &self.frames {
             let light = decoder.decode(frame).expect("a frame of the encoder");
-            let header = light.header;
+            let header = light.head;
             frames.push(json!({
                 "bytes": BASE64_STANDARD.encode(frame),
                 "update": header.info.update,
@@ -164,7 +165,7 @@ fn mutations((index, sequence): (usize, &Sequence)) -> Vec<Value> {
             let byte = noise.next() as u8;
             let mut bytes = sequence.frames[frame].clone();
             bytes[offset] = byte;
-            let mut decoder = LumelDecoder::new(sequence.size);
+            let mut decoder = LumelDecoder::of_halves(sequence.size);
             for earlier in &sequence.frames[..frame] {
                 decoder.decode(earlier).expect("a frame of the encoder");
             }
@@ -213,7 +214,7 @@ fn malformed() -> Vec<Value> {
     ]
     .into_iter()
     .map(|(name, bytes)| {
-        let error = LumelDecoder::new(UVec2::splat(page)).decode(&bytes);
+        let error = LumelDecoder::of_halves(UVec2::splat(page)).decode(&bytes);
         let kind = error.as_ref().map_err(DecodeError::kind).expect_err(name);
         json!({ "name": name, "bytes": BASE64_STANDARD.encode(&bytes), "error": kind })
     })

@@ -161,7 +161,8 @@ mod tests {
         let mut catalog = catalog();
         let layout = Arc::new(Layout::new(600, 2, Vec::new()));
         let lightmap = Lightmap::dark(FieldId(4), layout);
-        catalog.fields.push(FieldInfo::of_lightmap(&lightmap, Some(10), "bake"));
+        let shape = crate::LightmapShape::of(&lightmap, crate::Coding::Halves);
+        catalog.fields.push(FieldInfo::of_lightmap(lightmap.id, shape, Some(10), "bake"));
         catalog
     }
 
@@ -194,7 +195,7 @@ mod tests {
             (read.fields.len() - 1, read.unknown.len())
         };
         assert_eq!(kept("page_size", json!(600)), (1, 0));
-        for coding in [json!("h264"), json!(null), json!(7)] {
+        for coding in [json!("av1"), json!(null), json!(7)] {
             assert_eq!(kept("coding", coding), (0, 1));
         }
         for (member, wrong) in [

@@ -1,5 +1,6 @@
 //! Why bytes were refused.
 
+use lumencast_video::VideoError;
 use thiserror::Error;
 
 /// Why bytes were refused. Nothing changes in a decoder that refuses a frame.
@@ -42,6 +43,15 @@ pub enum DecodeError {
         /// The update that it changes.
         base: u64,
     },
+    /// A frame of video that is older than what was decoded. It is no fault of the sender.
+    #[error("update {update} comes after a newer one")]
+    Late {
+        /// The update that the frame holds.
+        update: u64,
+    },
+    /// Video that cannot be decoded. Wait for a keyframe.
+    #[error(transparent)]
+    Video(VideoError),
     /// The frame's region is not of the size or order that the catalog says.
     #[error("the frame does not fit its region: {0}")]
     Mismatch(&'static str),
@@ -57,6 +67,8 @@ impl DecodeError {
             Self::Malformed(_) => "malformed",
             Self::Json(_) => "json",
             Self::MissingBase { .. } => "missing_base",
+            Self::Late { .. } => "late",
+            Self::Video(_) => "video",
             Self::Mismatch(_) => "mismatch",
         }
     }

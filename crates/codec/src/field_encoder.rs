@@ -3,10 +3,12 @@
 use lumencast_light::Field;
 
 use crate::field_info::FieldInfo;
-use crate::{EncodedRegion, LightmapShape, LumelEncoder, ProbeEncoder, UpdateInfo};
+use crate::{
+    EncodedRegion, LightmapShape, LumelCoding, LumelEncoder, ProbeEncoder, UpdateInfo, VideoError,
+};
 
 /// Encodes the updates of a field, by its kind.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub enum FieldEncoder {
     /// Encodes a volume of probes.
     Volume(ProbeEncoder),
@@ -15,20 +17,35 @@ pub enum FieldEncoder {
 }
 
 impl FieldEncoder {
-    /// Prepares for a field of this shape.
-    pub fn new(field: &Field) -> Self {
+    /// Prepares for a field of this shape, whose lumels, if it has any, are coded so.
+    pub fn new(field: &Field, lumels: LumelCoding) -> Self {
         match field {
             Field::Volume(volume) => {
                 Self::Volume(ProbeEncoder::new(volume.grid.resolution, volume.order))
             }
             Field::Lightmap(lightmap) => {
-                Self::Lightmap(LumelEncoder::new(LightmapShape::of(lightmap)))
+                let shape = LightmapShape::of(lightmap, lumels.coding());
+                Self::Lightmap(LumelEncoder::new(shape, lumels))
             }
         }
     }
 
+    /// Goes on with a field of the same kind whose surfaces lie elsewhere, and begins anew where it has
+    /// other pages.
+    pub fn follow(&mut self, field: &Field, lumels: LumelCoding) {
+        if let (Self::Lightmap(encoder), Field::Lightmap(lightmap)) = (&mut *self, field)
+            && encoder.follow(LightmapShape::of(lightmap, lumels.coding()))
+        {
+            return;
+        }
+        *self = Self::new(field, lumels);
+    }
+
     /// Encodes an update for the regions that somebody watches; see [`ProbeEncoder::encode`] and
     /// [`LumelEncoder::encode`].
+    ///
+    /// # Errors
+    /// [`VideoError`] where lumels cannot be coded as video.
     ///
     /// # Panics
     /// If `field` is of another shape than that given to [`Self::new`].
@@ -37,9 +54,11 @@ impl FieldEncoder {
         field: &Field,
         info: UpdateInfo,
         watched: impl Fn(u32) -> bool,
-    ) -> Vec<EncodedRegion> {
+    ) -> Result<Vec<EncodedRegion>, VideoError> {
         match (self, field) {
-            (Self::Volume(encoder), Field::Volume(volume)) => encoder.encode(volume, info, watched),
+            (Self::Volume(encoder), Field::Volume(volume)) => {
+                Ok(encoder.encode(volume, info, watched))
+            }
             (Self::Lightmap(encoder), Field::Lightmap(lightmap)) => {
                 encoder.encode(lightmap, info, watched)
             }
@@ -77,7 +96,7 @@ impl FieldEncoder {
                 FieldInfo::of_volume(volume, scale_log2, source)
             }
             (Self::Lightmap(encoder), Field::Lightmap(lightmap)) => {
-                FieldInfo::of_lumels(lightmap.id, encoder.shape().clone(), scale_log2, source)
+                FieldInfo::of_lightmap(lightmap.id, encoder.shape().clone(), scale_log2, source)
             }
             (Self::Volume(_), Field::Lightmap(_)) | (Self::Lightmap(_), Field::Volume(_)) => {
                 panic!("a field of another kind")

@@ -1,7 +1,7 @@
 //! What a catalog tells of a field.
 
 use glam::Vec3;
-use lumencast_light::{Field, FieldId, Lightmap, ProbeVolume};
+use lumencast_light::{Field, FieldId, ProbeVolume};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
@@ -84,12 +84,7 @@ impl FieldInfo {
     }
 
     /// A lightmap, computed by the catalog's own server; `source` as in [`FieldInfo::source`].
-    pub fn of_lightmap(lightmap: &Lightmap, scale_log2: Option<i8>, source: &str) -> Self {
-        Self::of_lumels(lightmap.id, LightmapShape::of(lightmap), scale_log2, source)
-    }
-
-    /// The same of a lightmap whose shape is known.
-    pub(crate) fn of_lumels(
+    pub fn of_lightmap(
         id: FieldId,
         shape: LightmapShape,
         scale_log2: Option<i8>,
@@ -133,10 +128,12 @@ impl Shape {
     /// Whether an entry of a catalog is of a kind, and in a basis or coding, that this program knows.
     fn is_known(entry: &Value) -> bool {
         let shape = &entry["shape"];
-        let is_other = |what: &str, known: &str| shape.is_object() && shape[what] != known;
+        let is_one_of = |what: &str, known: &[&str]| {
+            !shape.is_object() || shape[what].as_str().is_some_and(|word| known.contains(&word))
+        };
         match entry["kind"].as_str() {
-            Some("volume") => !is_other("basis", "sh"),
-            Some("lightmap") => !is_other("coding", "halves"),
+            Some("volume") => is_one_of("basis", &["sh"]),
+            Some("lightmap") => is_one_of("coding", &["halves", "h264", "h264_stacked"]),
             _ => false,
         }
     }
@@ -145,6 +142,14 @@ impl Shape {
         match self {
             Self::Volume(shape) => shape.validated().map(Self::Volume),
             Self::Lightmap(shape) => shape.validated().map(Self::Lightmap),
+        }
+    }
+
+    /// Whether frames of the one are frames of the other too. Lightmaps may differ in their layout.
+    pub fn is_coded_alike(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Lightmap(one), Self::Lightmap(other)) => one.is_coded_alike(other),
+            _ => self == other,
         }
     }
 

@@ -9,7 +9,7 @@ use lumencast_scene::Edit;
 use crate::bytes::{Reader, put_varint};
 use crate::state::{read_edits, write_edits};
 use crate::{
-    Catalog, DecodeError, Epoch, FieldEncoder, LumelDecoder, LumelHeader, ProbeDecoder,
+    Catalog, DecodeError, Epoch, FieldEncoder, FrameHead, LumelCoding, LumelDecoder, ProbeDecoder,
     ProbeHeader, Resource, SceneInfo, Shape, UpdateInfo, layout_resources, limits,
 };
 
@@ -81,8 +81,9 @@ impl LightFile {
                 let all = charts.into_iter().chain([layout]);
                 resources.extend(all.map(|resource| (resource.hash(), resource)));
             }
-            let mut encoder = FieldEncoder::new(field);
-            let encoded = encoder.encode(field, info, |_| true);
+            let mut encoder = FieldEncoder::new(field, LumelCoding::Halves);
+            let encoded =
+                encoder.encode(field, info, |_| true).expect("halves can always be coded");
             infos.push(encoder.describe(field, source));
             frames.extend(encoded.into_iter().map(|frame| SavedFrame {
                 field: field.id().0,
@@ -201,7 +202,7 @@ impl LightFile {
                 }
                 Shape::Lightmap(shape) => {
                     let Some(tile) = shape.tile(frame.region) else { continue };
-                    let light = LumelDecoder::new(tile.size).decode(&frame.bytes)?;
+                    let light = LumelDecoder::new(shape.coding, tile).decode(&frame.bytes)?;
                     let field = entry.or_insert_with(|| info.dark());
                     let Some(lightmap) = field.as_lightmap_mut() else { continue };
                     let rows = light.irradiance.chunks(tile.size.x as usize);
@@ -228,7 +229,7 @@ impl SavedFrame {
         let Some(info) = catalog.field(field) else { return Ok(None) };
         let base = match info.shape {
             Shape::Volume(_) => ProbeHeader::read(body.0)?.base,
-            Shape::Lightmap(_) => LumelHeader::read(body.0)?.base,
+            Shape::Lightmap(_) => FrameHead::read(body.0)?.base,
         };
         if base.is_some() {
             return Err(DecodeError::Malformed("a delta in a light file"));

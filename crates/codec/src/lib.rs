@@ -35,8 +35,9 @@ pub use field_encoder::FieldEncoder;
 pub use field_info::{FieldInfo, Shape, UnknownField, Use};
 pub use file::{LightFile, SavedFile, SavedFrame};
 pub use frame_head::FrameHead;
-pub use lightmap_shape::{Coding, LightmapShape};
-pub use lumel::{LumelDecoder, LumelEncoder, LumelHeader, Tile, TileLight};
+pub use lightmap_shape::LightmapShape;
+pub use lumel::{Coding, LumelCoding, LumelDecoder, LumelEncoder, LumelHeader, Tile, TileLight};
+pub use lumencast_video::{Qp, VideoError};
 pub use probe::{ProbeDecoder, ProbeEncoder, ProbeHeader, Region, RegionLight, regions};
 pub use resource::{
     LayoutResource, PlacedSurface, Resource, ResourceHash, layout_resources, read_charts,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lumencast_light::{FieldId, Layout, Lightmap};
 use serde::{Deserialize, Serialize};
 
-use crate::lumel::{Tile, per_side, tile, tiles};
+use crate::lumel::{Coding, Tile, per_side, tile, tiles};
 use crate::{
     DecodeError, LayoutResource, Resource, ResourceHash, layout_resources, limits, read_charts,
 };
@@ -24,21 +24,12 @@ pub struct LightmapShape {
     pub layout: ResourceHash,
 }
 
-/// How lumels are coded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Coding {
-    /// As half floats, without loss.
-    #[default]
-    Halves,
-}
-
 impl LightmapShape {
-    /// The shape of a lightmap. It costs as much as writing its layout.
-    pub fn of(lightmap: &Lightmap) -> Self {
+    /// The shape of a lightmap that is coded so. It costs as much as writing its layout.
+    pub fn of(lightmap: &Lightmap, coding: Coding) -> Self {
         let Layout { page_size, pages, .. } = *lightmap.layout;
         let layout = layout_resources(&lightmap.layout).0.hash();
-        Self { coding: Coding::Halves, page_size, pages, layout }
+        Self { coding, page_size, pages, layout }
     }
 
     /// A lightmap of this shape without light, whose layout has no surfaces: nothing is read from it
@@ -47,19 +38,32 @@ impl LightmapShape {
         Lightmap::dark(id, Arc::new(Layout::new(self.page_size, self.pages, Vec::new())))
     }
 
+    /// Whether frames of the one are frames of the other too: only their layouts may differ.
+    pub fn is_coded_alike(&self, other: &Self) -> bool {
+        Self { layout: other.layout, ..self.clone() } == *other
+    }
+
     /// Number of lumels of all pages.
     pub fn lumel_count(&self) -> usize {
         self.pages as usize * (self.page_size as usize).pow(2)
     }
 
+    /// Lumels of a tile along a side, at most: as video a page is one.
+    fn tile_size(&self) -> u32 {
+        match self.coding {
+            Coding::Halves => limits::TILE_LUMELS,
+            Coding::H264 | Coding::H264Stacked => self.page_size,
+        }
+    }
+
     /// Its tiles, in order of their numbers.
     pub fn tiles(&self) -> impl Iterator<Item = Tile> + use<> {
-        tiles(self.page_size, self.pages)
+        tiles(self.page_size, self.tile_size(), self.pages)
     }
 
     /// The tile of a number.
     pub fn tile(&self, id: u32) -> Option<Tile> {
-        tile(self.page_size, self.pages, id)
+        tile(self.page_size, self.tile_size(), self.pages, id)
     }
 
     /// Its layout, of resources that hold all of it.
@@ -94,7 +98,8 @@ impl LightmapShape {
         DecodeError::limit("lumels of a page along a side", side, most)?;
         let lumels = side.pow(2).saturating_mul(self.pages as usize);
         DecodeError::limit("lumels of a field", lumels, limits::FIELD_LUMELS)?;
-        let tiles = per_side(self.page_size).pow(2) as usize * self.pages as usize;
+        let tiles =
+            per_side(self.page_size, self.tile_size()).pow(2) as usize * self.pages as usize;
         DecodeError::limit("regions of a field", tiles, limits::REGIONS)?;
         Ok(self)
     }

@@ -160,31 +160,41 @@ impl Light {
         })
     }
 
-    /// The lumels' irradiance at a place, lux; `None` where it has none.
-    pub fn at_lumels(&self, place: &Place) -> Option<Vec3> {
+    /// The lumels' irradiance at a place, lux, and how much of its light they make; `None` where it has
+    /// none.
+    pub fn at_lumels(&self, place: &Place) -> Option<(Vec3, f32)> {
         let on = place.on.as_ref()?;
-        self.lightmaps().find_map(|lightmap| lightmap.irradiance_at(on))
+        self.lightmaps().find_map(|lightmap| {
+            Some((lightmap.irradiance_at(on)?, lightmap.layout.share(on.surface)))
+        })
     }
 
     /// Radiance that arrives at a place from a direction, cd/m²; `None` where nothing is known. Lumels
     /// know irradiance alone, which counts as arriving evenly.
     pub fn radiance(&self, place: &Place, direction: Vec3) -> Option<Vec3> {
-        let even = self.at_lumels(place).map(|irradiance| irradiance / PI);
-        even.or_else(|| Some(self.sample(place)?.radiance(direction)))
+        let of_probes = || Some(self.sample(place)?.radiance(direction));
+        mixed(self.at_lumels(place).map(|(irradiance, share)| (irradiance / PI, share)), of_probes)
     }
 
     /// Irradiance at a place of a surface, lux; black where there is no light.
     pub fn irradiance_at(&self, place: &Place) -> Vec3 {
-        self.at_lumels(place).unwrap_or_else(|| {
-            let light = self.sample(place);
-            light.map_or(Vec3::ZERO, |light| light.irradiance(place.normal))
-        })
+        let of_probes = || Some(self.sample(place)?.irradiance(place.normal));
+        mixed(self.at_lumels(place), of_probes).unwrap_or(Vec3::ZERO)
     }
 
     /// The volumes' irradiance on a surface at a world position with a world normal, lux; black where
     /// there is no light.
     pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Vec3 {
         self.irradiance_at(&Place::on_surface(position, normal))
+    }
+}
+
+/// Light of lumels as far as they make it, and of probes for the rest.
+fn mixed(lumels: Option<(Vec3, f32)>, probes: impl FnOnce() -> Option<Vec3>) -> Option<Vec3> {
+    match lumels {
+        None => probes(),
+        Some((light, share)) if share >= 1.0 => Some(light),
+        Some((light, share)) => Some(probes().map_or(light, |probes| probes.lerp(light, share))),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use lumencast_codec::VolumesError;
+use lumencast_codec::{VideoError, VolumesError};
 use lumencast_solve::SolveError;
 use thiserror::Error;
 
@@ -19,6 +19,9 @@ pub enum ServerError {
         max = lumencast_codec::limits::SOURCE_BYTES
     )]
     Source(String),
+    /// Lumels that cannot be coded as asked for.
+    #[error("{0}; code lumels as halves, or on smaller pages")]
+    Coding(#[from] VideoError),
     /// Light that cannot be computed.
     #[error(transparent)]
     Solve(#[from] SolveError),

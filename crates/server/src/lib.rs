@@ -27,6 +27,7 @@ mod report;
 mod server;
 mod temporary;
 mod tick;
+mod unwrapping;
 
 pub use error::ServerError;
 pub use inbox::{Inbox, Limits, Mail, Received, Verdict};

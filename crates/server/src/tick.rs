@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use lumencast_charts::LaidOut;
+use lumencast_charts::{LaidOut, Store};
 use lumencast_codec::{
-    AcceptedEdit, Catalog, EncodedRegion, Epoch, FieldInfo, RefusedEdit, Resource, SceneInfo,
-    SceneState, StateFrame, check_volumes, layout_resources, limits,
+    AcceptedEdit, Catalog, EncodedRegion, Epoch, FieldInfo, LumelCoding, RefusedEdit, Resource,
+    SceneInfo, SceneState, StateFrame, check_volumes, layout_resources, limits,
 };
 use lumencast_gather::Gather;
 use lumencast_light::{FieldId, Light, Lightmap};
@@ -22,6 +22,7 @@ use crate::publish::Outlet;
 use crate::published::{Moment, Published};
 use crate::report::{Report, Stage, Stopwatch};
 use crate::temporary::Temporary;
+use crate::unwrapping::Unwrapping;
 
 /// How a server computes light.
 #[derive(Clone, Debug)]
@@ -41,6 +42,10 @@ pub struct TickOptions {
     pub lightmap: Option<LaidOut>,
     /// Samples of all lumels in a tick: as many as there is time for beside probes, unless it is given.
     pub lumel_samples: Option<u64>,
+    /// Where charts are kept of instances that come later.
+    pub charts: Option<Store>,
+    /// How lumels are coded.
+    pub lumel_coding: LumelCoding,
     /// Edits at set times.
     pub script: Option<Script>,
     /// What computes the light, for the catalog ([`lumencast_codec::FieldInfo::source`]).
@@ -58,6 +63,8 @@ impl Default for TickOptions {
             volumes: Vec::new(),
             lightmap: None,
             lumel_samples: None,
+            charts: None,
+            lumel_coding: LumelCoding::default(),
             script: None,
             source: String::new(),
         }
@@ -109,6 +116,7 @@ pub struct Tick {
     measured: Option<u64>,
     last_now: Option<f64>,
     temporary: Temporary,
+    unwrapping: Unwrapping,
     last: Report,
 }
 
@@ -133,9 +141,12 @@ impl Tick {
             options.volumes.clone()
         };
         check_volumes(&volumes)?;
+        if let Some(laid_out) = &options.lightmap {
+            options.lumel_coding.check(laid_out.layout.page_size)?;
+        }
         let mut solver = Solver::new(&volumes, options.gather)?;
         solver.set_lightmap(&scene.snapshot(), options.lightmap.as_ref());
-        let published = Published::all(&solver, Vec::new());
+        let published = Published::all(&solver, options.lumel_coding, Vec::new());
         let told_scales = vec![None; published.len()];
         let share = match options.lightmap {
             Some(_) => Budget::SHARE_BESIDE_LUMELS,
@@ -144,6 +155,7 @@ impl Tick {
         let budget = Budget::new(options.period, options.samples).filling(share);
         let lumel_pace = LumelPace::new(options.period, options.lumel_samples);
         let last = Report::default();
+        let unwrapping = Unwrapping::new(options.charts.clone());
         Ok(Self {
             scene,
             gathering: Gathering::new(gatherer),
@@ -162,6 +174,7 @@ impl Tick {
             measured: None,
             last_now: None,
             temporary: Temporary::default(),
+            unwrapping,
             last,
         })
     }
@@ -207,7 +220,8 @@ impl Tick {
     pub fn set_volumes(&mut self, volumes: &[VolumeSpec]) -> Result<(), ServerError> {
         check_volumes(volumes)?;
         self.solver.set_volumes(volumes)?;
-        self.published = Published::all(&self.solver, std::mem::take(&mut self.published));
+        let before = std::mem::take(&mut self.published);
+        self.published = Published::all(&self.solver, self.options.lumel_coding, before);
         self.gathering.keep(|id| self.solver.ids().any(|there| there == id));
         self.fields_are_news = true;
         Ok(())
@@ -284,6 +298,7 @@ impl Tick {
         report.seconds[Stage::Publish as usize] = watch.lap();
 
         self.follow(&scene, outlet);
+        self.unwrap(&scene, outlet, matches!(patience, Patience::Endless));
         let (brought, build) = self.gather(&scene, patience);
         let gathering = watch.lap();
         report.seconds[Stage::Accelerate as usize] = build.min(gathering);
@@ -327,13 +342,36 @@ impl Tick {
             let field = self.solver.light().field(*id);
             let published = self.published.iter_mut().find(|published| published.id == *id);
             if let (Some(published), Some(field)) = (published, field) {
-                published.restart(field);
+                published.lay_out(field);
             }
         }
         if !others.is_empty() {
             outlet.resources(self.resources());
             self.fields_are_news = true;
         }
+    }
+
+    /// Gives lumels to what came later, once its surfaces are cut into charts.
+    fn unwrap(&mut self, scene: &Arc<Snapshot>, outlet: &mut dyn Outlet, waits: bool) {
+        if self.unwrapping.is_idle()
+            && let Some(newcomers) = self.solver.newcomers(scene)
+        {
+            self.unwrapping.start(newcomers);
+        }
+        let Some((newcomers, extended)) = self.unwrapping.poll(waits) else { return };
+        let id = newcomers.field();
+        // Their lumels are numbered anew.
+        self.gathering.keep(|field| field != id);
+        let laid_out = extended.as_ref().map(|extended| &extended.laid_out);
+        self.solver.extend_lightmap(scene, &newcomers, laid_out);
+        if let (Some(published), Some(field)) = (
+            self.published.iter_mut().find(|published| published.id == id),
+            self.solver.light().field(id),
+        ) {
+            published.lay_out(field);
+        }
+        outlet.resources(self.resources());
+        self.fields_are_news = true;
     }
 
     /// Applies the script's edits that are due and then the clients', each whole or not at all.
@@ -453,7 +491,7 @@ impl Tick {
 
     fn note_failure(&mut self, field: FieldId, outcome: &str) {
         if let Some(published) = self.published_mut(field) {
-            published.note_failure(outcome);
+            published.note_failure("gathering", outcome);
         }
     }
 

@@ -6,13 +6,14 @@ use std::sync::Arc;
 use glam::Vec3;
 use lumencast_charts::{LaidOut, laid_out, sheets};
 use lumencast_codec::{
-    Catalog, EncodedRegion, Epoch, FrameHead, LayoutResource, LightmapShape, LumelDecoder,
-    Resource, ResourceHash, read_charts,
+    Catalog, EncodedRegion, Epoch, FrameHead, LayoutResource, LightmapShape, LumelCoding,
+    LumelDecoder, Qp, Resource, ResourceHash, read_charts,
 };
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Layout, Lightmap, SurfaceId, luminance};
 use lumencast_scene::{
-    AnimationId, Edit, LightSpec, LightmapSpec, NodeId, Playback, Scene, Snapshot, Transform,
+    AnimationId, Edit, InstanceSource, LightSpec, LightmapSpec, NodeId, NodeName, Playback, Scene,
+    Snapshot, Transform,
 };
 use lumencast_server::{Mail, Outlet, Received, SampleRange, Tick, TickOptions};
 use lumencast_solve::{Bake, Effort, GatherOptions, bake, spread};
@@ -59,11 +60,17 @@ struct Stepped {
 impl Stepped {
     /// A cornell that stands still, with a small page.
     fn new() -> Self {
+        Self::coded(LumelCoding::Halves)
+    }
+
+    /// The same, whose lumels are sent so.
+    fn coded(lumel_coding: LumelCoding) -> Self {
         let mut scene = Scene::builtin("cornell").expect("a built-in scene");
         let options = TickOptions {
             samples: SampleRange::fixed(4),
             lightmap: Some(lumels(&scene.snapshot())),
             lumel_samples: Some(8192),
+            lumel_coding,
             ..TickOptions::default()
         };
         let tracer = CpuPathTracer::new(Options::default()).expect("threads");
@@ -175,17 +182,28 @@ fn lumels_come_near_to_converged_light_and_follow_a_change() {
 /// What is sent is what there is: layouts by their hash, before the catalog that names them, and light.
 #[test]
 fn frames_and_resources_are_what_clients_need() {
-    let mut stepped = Stepped::new();
-    stepped.steps(10);
+    let video = LumelCoding::H264(Qp::new(15).expect("a parameter"));
+    for (coding, most) in [(LumelCoding::Halves, 1e-3), (video, 0.03)] {
+        let mut stepped = Stepped::coded(coding);
+        stepped.steps(10);
+        let shown = shown(&stepped);
+        let off = difference(&shown, stepped.lightmap());
+        assert!(off < most, "{coding:?}: {off}");
+    }
+}
+
+/// What a client makes of all that was sent.
+fn shown(stepped: &Stepped) -> Lightmap {
     let shape = stepped.shape();
     let resources: HashMap<ResourceHash, Resource> =
         stepped.tick.resources().into_iter().map(|r| (r.hash(), r)).collect();
     assert_eq!(read(&shape.layout, &resources), *stepped.lightmap().layout);
 
     let id = stepped.lightmap().id.0;
-    let mut shown = vec![Vec3::ZERO; shape.lumel_count()];
+    let mut shown = stepped.lightmap().clone();
+    shown.irradiance.fill(Vec3::ZERO);
     for tile in shape.tiles() {
-        let mut decoder = LumelDecoder::new(tile.size);
+        let mut decoder = LumelDecoder::new(shape.coding, tile);
         let of_tile =
             stepped.kept.frames.iter().filter(|(f, frame)| (*f, frame.region) == (id, tile.id));
         for (_, frame) in of_tile {
@@ -194,14 +212,11 @@ fn frames_and_resources_are_what_clients_need() {
             for (row, light) in
                 tile.rows(shape.page_size).zip(light.irradiance.chunks(tile.size.x as usize))
             {
-                shown[row].copy_from_slice(light);
+                shown.irradiance[row].copy_from_slice(light);
             }
         }
     }
-    let off = shown.iter().zip(&stepped.lightmap().irradiance);
-    let off = off.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
-    let most = stepped.lightmap().irradiance.iter().map(|e| e.max_element()).fold(0.0, f32::max);
-    assert!(most > 0.0 && off < 1e-3 * most, "{off} of {most}");
+    shown
 }
 
 fn read(hash: &ResourceHash, resources: &HashMap<ResourceHash, Resource>) -> Layout {
@@ -275,15 +290,74 @@ fn what_rests_has_lumels_again() {
 
     let mut scene = Scene::builtin("cornell").expect("a built-in scene");
     scene.apply(&moved(node, 0.3)).expect("an edit");
-    let scene = scene.snapshot();
-    let right = converged(&scene);
+    let (off, mean) = off_from_converged(&stepped, &scene.snapshot(), id);
+    assert!(off < 0.1 * mean, "{off} of {mean}");
+}
+
+/// By how much the light of a surface is off on average, and the mean of what it should be.
+fn off_from_converged(stepped: &Stepped, scene: &Arc<Snapshot>, id: SurfaceId) -> (f32, f32) {
+    let right = converged(scene);
     let read = |lightmap: &Lightmap| -> Vec<f32> {
-        let places = spread(&scene, &right.layout, 4000);
-        let of_box = places.iter().filter_map(|place| place.on.filter(|on| on.surface == id));
-        of_box.map(|on| luminance(lightmap.irradiance_at(&on).expect("lumels"))).collect()
+        let places = spread(scene, &right.layout, 4000);
+        let own = places.iter().filter_map(|place| place.on.filter(|on| on.surface == id));
+        own.map(|on| luminance(lightmap.irradiance_at(&on).expect("lumels"))).collect()
     };
     let (seen, right) = (read(stepped.lightmap()), read(&right));
-    let mean = right.iter().sum::<f32>() / right.len() as f32;
-    let off = seen.iter().zip(&right).map(|(a, b)| (a - b).abs()).sum::<f32>() / right.len() as f32;
-    assert!(right.len() > 200 && off < 0.1 * mean, "{off} of {mean}");
+    assert!(right.len() > 200, "{} points", right.len());
+    let count = right.len() as f32;
+    let off = seen.iter().zip(&right).map(|(a, b)| (a - b).abs()).sum::<f32>() / count;
+    (off, right.iter().sum::<f32>() / count)
+}
+
+/// What is added is lit by probes until it has rested, and its surfaces are cut and gathered at; what
+/// lies on the pages already stays where it is.
+#[test]
+fn what_is_added_gets_lumels() {
+    let mut stepped = Stepped::new();
+    stepped.steps(5);
+    let tall = stepped.node("tall box");
+    let source = stepped.tick.scene().nodes().find(|n| n.id == tall).expect("a box").mesh;
+    let before = stepped.lightmap().layout.clone();
+    let transform =
+        Transform { translation: Some(Vec3::new(-0.6, 0.4, 0.5)), ..Transform::default() };
+    let add = Edit::AddInstance {
+        node: None,
+        name: NodeName::new("another"),
+        source: InstanceSource::Mesh(source.expect("a mesh")),
+        parent: None,
+        transform,
+    };
+    stepped.edit(2, add.clone());
+    let id = SurfaceId { node: stepped.node("another").0, ..SurfaceId::default() };
+    let has = |stepped: &Stepped| stepped.lightmap().layout.surface(id).is_some();
+    let rest = (2.0 / PERIOD) as usize;
+    stepped.steps(rest - 2);
+    assert!(!has(&stepped), "not yet");
+    let mut waited = 0;
+    while !has(&stepped) {
+        stepped.step(Mail::default());
+        waited += 1;
+        assert!(waited < 60, "it has rested for long");
+    }
+    let layout = stepped.lightmap().layout.clone();
+    for surface in before.surfaces() {
+        assert_eq!(layout.surface(surface.id), Some(surface));
+    }
+    stepped.step(Mail::default());
+    let shape = stepped.shape();
+    assert_eq!(read(&shape.layout, &stepped.kept.resources), *layout);
+    let told = stepped.kept.catalogs.last().expect("a catalog");
+    assert_eq!(told.fields.iter().find_map(|field| field.shape.as_lightmap()), Some(&shape));
+    stepped.steps(LONG);
+
+    let mut scene = Scene::builtin("cornell").expect("a built-in scene");
+    scene.apply(&add).expect("an edit");
+    let (off, mean) = off_from_converged(&stepped, &scene.snapshot(), id);
+    assert!(off < 0.1 * mean, "{off} of {mean}");
+
+    // What goes leaves its place to what comes.
+    stepped.edit(3, Edit::RemoveNode { node: NodeId(id.node) });
+    assert!(!has(&stepped));
+    stepped.steps(3);
+    assert_eq!(stepped.lightmap().layout.surfaces(), before.surfaces());
 }

@@ -36,14 +36,27 @@ impl SurfaceLayouts {
         addresses(self) == addresses(other)
     }
 
-    /// The sides of a primitive that have lumels, front and back, with the layer of their first page.
-    fn sides(&self, instance: &Instance, primitive: usize) -> [Option<(&Surface, u32)>; 2] {
+    /// The sides of a primitive that have lumels, front and back.
+    fn sides(&self, instance: &Instance, primitive: usize) -> [Option<Side<'_>>; 2] {
         let (node, copy, primitive) = (instance.node.0, instance.copy, primitive as u32);
         [false, true].map(|back| {
             let id = SurfaceId { node, copy, primitive, back };
-            self.layouts.iter().find_map(|(layout, first)| Some((layout.surface(id)?, *first)))
+            self.layouts.iter().find_map(|(layout, first)| {
+                let surface = layout.surface(id)?;
+                Some(Side { surface, first_layer: *first, share: layout.share(id) })
+            })
         })
     }
+}
+
+/// A side of a primitive that has lumels.
+#[derive(Clone, Copy)]
+struct Side<'a> {
+    surface: &'a Surface,
+    /// The layer of the first page.
+    first_layer: u32,
+    /// How much of the light the lumels make.
+    share: f32,
 }
 
 /// The charts of the sides of each primitive of an instance.
@@ -94,15 +107,15 @@ impl Charted {
         let first = rectangles.len();
         for (number, primitive) in primitives.iter().enumerate() {
             let of = layouts.sides(instance, number);
-            let of = of.map(|side| side.filter(|(surface, _)| fits(&surface.charts, primitive)));
-            for (surface, layer) in of.into_iter().flatten() {
+            let of = of.map(|side| side.filter(|side| fits(&side.surface.charts, primitive)));
+            for Side { surface, first_layer, share } in of.into_iter().flatten() {
                 rectangles.extend(surface.rectangles.iter().map(|rectangle| layout::Rectangle {
                     corner: rectangle.corner.as_vec2(),
-                    layer: layer + rectangle.page,
-                    _pad: 0,
+                    layer: first_layer + rectangle.page,
+                    share,
                 }));
             }
-            sides.push(of.map(|side| side.map(|(surface, _)| surface.charts.clone())));
+            sides.push(of.map(|side| side.map(|side| side.surface.charts.clone())));
         }
         if rectangles.len() == first {
             return None;

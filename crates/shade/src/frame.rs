@@ -37,13 +37,16 @@ impl Frame<'_> {
             light_count: self.snapshot.lights.len() as u32,
             parts: part(emission, layout::parts::EMISSION)
                 | part(direct, layout::parts::DIRECT)
-                | part(indirect, layout::parts::INDIRECT),
+                | part(indirect, layout::parts::INDIRECT)
+                | part(settings.checkers, layout::parts::CHECKERS),
             filter_samples: settings.shadows.filter_samples.max(1),
             search_samples: settings.shadows.search_samples,
             pre_exposure: settings.pre_exposure,
             sample_count: self.samples,
             filter_radius: settings.shadows.filter_radius,
             frame: self.number,
+            still: settings.strengths.still,
+            moving: settings.strengths.moving,
             occlusion_radius: settings.drawn_occlusion().map_or(0.0, |occlusion| occlusion.radius),
             ..layout::Frame::default()
         }

@@ -49,6 +49,8 @@ pub use error::ShadeError;
 pub use lumencast_gpu::{Abilities, Gpu, GpuError};
 pub use renderer::Renderer;
 pub use screen::{Measured, Screen, Show};
-pub use settings::{Lighting, Materials, Occlusion, Settings, Shading, Shadows, Transparency};
+pub use settings::{
+    Lighting, Materials, Occlusion, Settings, Shading, Shadows, Strengths, Transparency,
+};
 pub use timing::PassTimes;
 pub use wgpu;

@@ -279,6 +279,7 @@ fn place(instance: &Instance) -> layout::Instance {
         world_from_object: layout::rows(to),
         normal_from_object: layout::rows(&normal),
         mirrors: u32::from(to.matrix3.determinant() < 0.0),
+        still: instance.still.into(),
         ..layout::Instance::default()
     }
 }

@@ -26,6 +26,21 @@ impl Lighting {
     pub const NONE: Self = Self { direct: false, ..Self::DIRECT };
 }
 
+/// How strong indirect light is drawn: 1 is as it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Strengths {
+    /// On what neither moves nor deforms.
+    pub still: f32,
+    /// On all else.
+    pub moving: f32,
+}
+
+impl Default for Strengths {
+    fn default() -> Self {
+        Self { still: 1.0, moving: 1.0 }
+    }
+}
+
 /// Which materials to believe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Materials {
@@ -117,6 +132,10 @@ pub struct Settings {
     pub shading: Shading,
     /// Which light.
     pub lighting: Lighting,
+    /// How strong indirect light is.
+    pub strengths: Strengths,
+    /// Whether every other lumel is drawn dark, to see how large they are.
+    pub checkers: bool,
     /// Which materials.
     pub materials: Materials,
     /// Shadows of punctual lights.
@@ -140,6 +159,8 @@ impl Default for Settings {
             samples: 4,
             shading: Shading::Pixels,
             lighting: Lighting::FIELD,
+            strengths: Strengths::default(),
+            checkers: false,
             materials: Materials::Full,
             shadows: Shadows::default(),
             occlusion: None,

@@ -37,8 +37,8 @@ pub struct Instance {
     pub normal_from_object: Rows,
     pub mirrors: u32,
     pub lumels: u32,
+    pub still: u32,
     pub _pad0: u32,
-    pub _pad1: u32,
 }
 
 /// A rectangle of lumels. Group 0, binding 3.
@@ -47,7 +47,7 @@ pub struct Instance {
 pub struct Rectangle {
     pub corner: Vec2,
     pub layer: u32,
-    pub _pad: u32,
+    pub share: f32,
 }
 
 /// What holds for all of a frame's passes. Group 1, binding 0.
@@ -63,9 +63,9 @@ pub struct Frame {
     pub filter_radius: f32,
     pub frame: u32,
     pub occlusion_radius: f32,
+    pub still: f32,
+    pub moving: f32,
     pub _pad0: u32,
-    pub _pad1: u32,
-    pub _pad2: u32,
 }
 
 /// Light from afar. Group 1, binding 1.
@@ -259,6 +259,8 @@ pub mod parts {
     pub const DIRECT: u32 = 2;
     /// Light of the field.
     pub const INDIRECT: u32 = 4;
+    /// Every other lumel is dark.
+    pub const CHECKERS: u32 = 8;
 }
 
 /// Values of [`PunctualLight::kind`].

@@ -93,8 +93,8 @@ fn layouts_agree() {
         m,
         View { clip_from_world, world_from_clip, view_from_clip, eye, perspective, forward, turn }
     );
-    same!(m, Instance { world_from_object, normal_from_object, mirrors, lumels, _pad0, _pad1 });
-    same!(m, Rectangle { corner, layer, _pad });
+    same!(m, Instance { world_from_object, normal_from_object, mirrors, lumels, still, _pad0 });
+    same!(m, Rectangle { corner, layer, share });
     same!(
         m,
         Frame {
@@ -107,9 +107,9 @@ fn layouts_agree() {
             filter_radius,
             frame,
             occlusion_radius,
+            still,
+            moving,
             _pad0,
-            _pad1,
-            _pad2,
         }
     );
     same!(m, Environment { zenith, kind, ground, turn, horizon, _pad });

@@ -34,6 +34,13 @@ impl FieldSolver {
     }
 
     /// The lightmap, where it is one.
+    pub(crate) fn as_lightmap(&self) -> Option<&LightmapSolver> {
+        match self {
+            Self::Volume(_) => None,
+            Self::Lightmap(lightmap) => Some(lightmap),
+        }
+    }
+
     pub(crate) fn as_lightmap_mut(&mut self) -> Option<&mut LightmapSolver> {
         match self {
             Self::Volume(_) => None,

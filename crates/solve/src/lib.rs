@@ -29,6 +29,7 @@ mod error;
 mod field;
 pub mod fit;
 mod lightmap;
+mod newcomers;
 mod noise;
 mod options;
 mod placement;
@@ -42,7 +43,8 @@ mod walls;
 
 pub use bake::{Bake, Baked, Done, Effort, Receivers, Spent, bake};
 pub use error::SolveError;
-pub use lightmap::{LightmapSolver, seam_differences, spread, with_backs};
+pub use lightmap::{LightmapSolver, sides_of_seams, spread, with_backs};
+pub use newcomers::Newcomers;
 pub use options::{FitOptions, GatherOptions};
 pub use placement::{Survey, default_volume, survey, volumes};
 pub use request::{Asked, Request, Turn};

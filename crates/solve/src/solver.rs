@@ -12,6 +12,7 @@ use crate::error::SolveError;
 use crate::field::FieldSolver;
 use crate::fit::{FitSettings, Part, fit};
 use crate::lightmap::LightmapSolver;
+use crate::newcomers::Newcomers;
 use crate::options::GatherOptions;
 use crate::request::{Asked, Request, Turn, What};
 use crate::surfaces::Surfaces;
@@ -185,6 +186,38 @@ impl Solver {
             }
         }
         others
+    }
+
+    /// Instances that came later, and rest by now, without lumels.
+    pub fn newcomers(&self, scene: &Arc<Snapshot>) -> Option<Newcomers> {
+        self.fields.iter().find_map(|field| {
+            let lightmap = field.as_lightmap()?;
+            let instances = lightmap.newcomers(scene.time);
+            let new = || {
+                let laid_out = lightmap.laid_out();
+                Newcomers::new(lightmap.id(), laid_out, instances.clone(), scene.clone())
+            };
+            (!instances.is_empty()).then(new)
+        })
+    }
+
+    /// Gives instances that came later the lumels of a layout, or none where there was none for them.
+    /// What was asked for at the field's lumels before must not be taken in any more.
+    pub fn extend_lightmap(
+        &mut self,
+        scene: &Snapshot,
+        newcomers: &Newcomers,
+        laid_out: Option<&LaidOut>,
+    ) {
+        let lightmaps = self.fields.iter_mut().filter_map(FieldSolver::as_lightmap_mut);
+        for lightmap in lightmaps.filter(|lightmap| lightmap.id() == newcomers.field) {
+            let laid_out = laid_out.unwrap_or(&newcomers.before);
+            lightmap.extend(scene, laid_out, &newcomers.instances);
+            let published = self.light.fields_mut().iter_mut().filter_map(Field::as_lightmap_mut);
+            for published in published.filter(|published| published.id == newcomers.field) {
+                published.clone_from(lightmap.lightmap());
+            }
+        }
     }
 
     /// The scene was edited: light may be another from now on.

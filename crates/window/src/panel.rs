@@ -62,6 +62,8 @@ const SAMPLES: [u32; 4] = [1, 2, 4, 8];
 /// Sides of shadow maps that can be chosen.
 const SHADOWS: [u32; 5] = [0, 512, 1024, 2048, 4096];
 
+/// How strong indirect light can be made.
+const STRENGTH: RangeInclusive<f32> = 0.0..=4.0;
 /// How far occlusion can be made to reach, metres.
 const RADIUS: RangeInclusive<f32> = 0.01..=2.0;
 
@@ -79,6 +81,9 @@ pub(crate) fn show(
         ui.checkbox(&mut lighting.indirect, "Indirect");
         ui.checkbox(&mut lighting.emission, "Emission");
     });
+    let strengths = &mut controls.settings.strengths;
+    ui.add(Slider::new(&mut strengths.still, STRENGTH).text("indirect, on what is still"));
+    ui.add(Slider::new(&mut strengths.moving, STRENGTH).text("indirect, on what moves"));
     ui.separator();
     exposure(ui, &mut controls.exposure);
     choice(ui, "Tone map", &mut controls.tone_map, &ToneMap::ALL, |map| map.to_string());
@@ -142,6 +147,7 @@ fn drawing(ui: &mut Ui, controls: &mut Controls) {
         Transparency::Coverage => "coverage".into(),
         Transparency::Sorted => "sorted".into(),
     });
+    ui.checkbox(&mut settings.checkers, "Lumels as a checkerboard");
     let shadows = &mut settings.shadows;
     choice(ui, "Shadow maps", &mut shadows.resolution, &SHADOWS, |side| match side {
         0 => "none".into(),

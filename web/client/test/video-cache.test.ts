@@ -59,9 +59,33 @@ describe('a video frame', () => {
     ['a toe of 33', [33, 96, 1], 'malformed'],
     ['a range of nothing', [7, 0, 1], 'malformed'],
     ['no range', [7], 'truncated'],
-    ['no access unit', [7, 96], 'truncated'],
   ])('with %s is refused', (_, bytes, kind) => {
     expect(() => splitVideoFrame(join(head, bytes))).toThrow(expect.objectContaining({ kind }));
+  });
+});
+
+describe('a frame without a picture', () => {
+  it('is none as a keyframe', () => {
+    const keyframe = frameHead({ update: 4, tick: 9, scaleLog2: -2 });
+    const malformed = expect.objectContaining({ kind: 'malformed' });
+    expect(() => splitVideoFrame(join(keyframe, [7, 96]))).toThrow(malformed);
+  });
+
+  it('says that the page is still that of its base, also of a picture on its way', async () => {
+    const server = video();
+    const cache = joined(server);
+    const newest = () => lightOf(cache, 9)?.age;
+    add(cache, server.step(1)[0], 0);
+    await decoders.answer();
+    expect(add(cache, server.idle()[0], 5)).toBe(true);
+    expect([shown(cache, 9), newest(), decoders.given.length]).toEqual([[1, 1], 4, 0]);
+    add(cache, server.step(2)[0], 6);
+    for (const now of [7, 8]) expect(add(cache, server.idle()[0], now)).toBe(true);
+    expect(newest()).toBe(4);
+    await decoders.answer();
+    expect([shown(cache, 9 + TICK)?.[0], newest()]).toEqual([2, 1]);
+    expect(add(cache, server.step(3)[0], 9)).toBe(true);
+    expect(decoders.given.length).toBe(1);
   });
 });
 

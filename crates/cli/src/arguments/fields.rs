@@ -3,6 +3,7 @@
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use lumencast_charts::LaidOut;
+use lumencast_codec::{LumelCoding, Qp};
 use lumencast_gather::Gather;
 use lumencast_scene::{Scene, VolumeSpec};
 use lumencast_solve::Effort;
@@ -45,21 +46,52 @@ enum FieldKind {
 /// Which kinds of fields hold live light.
 #[derive(Debug, Args)]
 pub(crate) struct LiveFieldsArguments {
-    /// What holds the light beside probes: lumels of still surfaces (lightmap,volume), for native
-    /// clients so far, or nothing (volume).
+    /// What holds the light: lumels of still surfaces and probes for all else (lightmap,volume), or
+    /// probes alone (volume), which follow changes twice as fast.
     #[arg(
         long,
         value_name = "KIND,KIND",
         value_enum,
         value_delimiter = ',',
-        default_value = "volume"
+        default_value = "lightmap,volume"
     )]
     fields: Vec<FieldKind>,
+    /// How lumels are sent: as video, with colour at half the resolution (h264) or at full
+    /// (h264-stacked), or as they are (halves), which takes a fast link.
+    #[arg(long, value_enum, default_value_t = SentAs::H264)]
+    lumel_coding: SentAs,
+    /// How coarse the video is; 6 more make half the bytes or less.
+    #[arg(long, value_name = "12..36", default_value_t, value_parser = qp)]
+    qp: Qp,
     #[command(flatten)]
     lightmap: LightmapArguments,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SentAs {
+    #[value(name = "h264")]
+    H264,
+    #[value(name = "h264-stacked")]
+    H264Stacked,
+    Halves,
+}
+
+fn qp(text: &str) -> Result<Qp, String> {
+    let (least, most) = (Qp::RANGE.start(), Qp::RANGE.end());
+    let qp = text.parse().ok().and_then(Qp::new);
+    qp.ok_or_else(|| format!("a whole number from {least} to {most}"))
+}
+
 impl LiveFieldsArguments {
+    /// How lumels are sent.
+    pub(crate) fn coding(&self) -> LumelCoding {
+        match self.lumel_coding {
+            SentAs::H264 => LumelCoding::H264(self.qp),
+            SentAs::H264Stacked => LumelCoding::H264Stacked(self.qp),
+            SentAs::Halves => LumelCoding::Halves,
+        }
+    }
+
     /// The lumels of a scene, if there are to be some and it has surfaces for them.
     pub(crate) fn lumels(
         &self,

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
+use lumencast_charts::Store;
 use lumencast_gather::Gather;
 use lumencast_scene::{Scene, Script};
 use lumencast_server::{SampleRange, TickOptions};
@@ -63,6 +64,8 @@ impl TickArguments {
             volumes: volumes.volumes(scene, gatherer)?,
             lightmap,
             lumel_samples: None,
+            charts: Store::of_user(),
+            lumel_coding: self.fields.coding(),
             script: self.edits.as_deref().map(read_script).transpose()?,
         })
     }

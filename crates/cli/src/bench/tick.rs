@@ -51,15 +51,30 @@ impl BenchTick {
         let mut tick = Tick::new(scene, gatherer, options, Epoch(0))?;
         let ticks = SETTLING + (self.seconds * self.tick.rate).ceil().clamp(1.0, 1e7) as usize;
         let bar = output::bar(ticks as u64, "Ticks");
-        let mut sent = Sent::default();
+        let lightmaps = tick.light().lightmaps().map(|lightmap| lightmap.id.0).collect();
+        let mut sent = Sent { lightmaps, ..Sent::default() };
+        let mut first_half = 0;
         let reports: Vec<Report> = (0..ticks)
             .map(|number| {
                 bar.inc(1);
+                if number == ticks / 2 {
+                    first_half = sent.lumels;
+                }
                 tick.step(number as f64 * period, Mail::default(), &mut sent)
             })
             .collect();
         bar.finish_and_clear();
-        let figures = self.figures(&tick, &reports[SETTLING..], &sent, ticks as u64);
+        let mut figures = self.figures(&tick, &reports[SETTLING..], &sent, ticks as u64);
+        let lumels: usize =
+            tick.light().lightmaps().map(|lightmap| lightmap.irradiance.len()).sum();
+        if lumels > 0 {
+            let half = (ticks as f64 / 2.0) * period;
+            figures["lightmap"] = json!({
+                "lumels": lumels,
+                "bytes_a_second": sent.lumels as f64 / (2.0 * half),
+                "bytes_a_second_of_second_half": (sent.lumels - first_half) as f64 / half,
+            });
+        }
         if self.json {
             return output::json(&figures);
         }
@@ -137,6 +152,10 @@ struct Sent {
     catalog: u64,
     /// Bytes of probes by field and layer.
     probes: BTreeMap<(u32, u8), u64>,
+    /// Fields that are lightmaps.
+    lightmaps: Vec<u32>,
+    /// Bytes of their frames.
+    lumels: u64,
     /// The sum over probes of the squared error relative to c0; `weight` is their number.
     squared_error: f64,
     weight: f64,
@@ -166,7 +185,12 @@ impl Outlet for Sent {
     }
 
     fn light(&mut self, field: u32, frame: EncodedRegion) {
-        *self.probes.entry((field, frame.layer)).or_default() += frame.bytes.len() as u64;
+        let bytes = frame.bytes.len() as u64;
+        if self.lightmaps.contains(&field) {
+            self.lumels += bytes;
+            return;
+        }
+        *self.probes.entry((field, frame.layer)).or_default() += bytes;
         let probes = ProbeHeader::read(&frame.bytes).map_or(0, |header| header.probes()) as f64;
         self.squared_error += f64::from(frame.error).powi(2) * probes;
         self.weight += probes;
@@ -215,6 +239,13 @@ fn print_figures(figures: &Value) {
             field["raw_bytes_an_update"]["paper"],
             field["raw_bytes_an_update"]["implementation"],
             field["bytes_by_layer"],
+        );
+    }
+    if let Some(lumels) = figures["lightmap"]["lumels"].as_u64() {
+        say!(
+            "lightmap    {lumels} lumels: {:.1} KB/s, in the second half {:.1} KB/s",
+            number("/lightmap/bytes_a_second") / 1e3,
+            number("/lightmap/bytes_a_second_of_second_half") / 1e3,
         );
     }
     say!("codec       RMS error {:.3} % of c0", 100.0 * number("/codec_rms_error_of_c0"));

@@ -1,70 +1,53 @@
-//! Frames of one tile → light.
+//! Frames of one region of a lightmap → light.
 
-use glam::{UVec2, Vec3};
+use glam::UVec2;
 
-use super::halves::{Lumel, to_rgb};
-use super::header::LumelHeader;
-use super::model::code_tile;
+use super::coding::Coding;
+use super::page_decoder::PageDecoder;
+use super::tile_decoder::TileDecoder;
+use super::tile_light::TileLight;
+use super::tiles::Tile;
 use crate::DecodeError;
-use crate::range_coder::Decoder;
 
 /// Decodes the frames of one tile of a lightmap. Holds the newest, which deltas refer to: 6 bytes a
-/// lumel.
-#[derive(Clone, Debug)]
-pub struct LumelDecoder {
-    size: UVec2,
-    newest: Option<(u64, Vec<Lumel>)>,
-}
+/// lumel; as video 1.5, 3 where planes are stacked, and what [`lumencast_video::H264Decoder`] takes.
+pub struct LumelDecoder(Kind);
 
-/// Light of a tile at one update.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TileLight {
-    /// What the frame's header says.
-    pub header: LumelHeader,
-    /// Irradiance (r, g, b), lux, row after row.
-    pub irradiance: Vec<Vec3>,
+enum Kind {
+    Tile(TileDecoder),
+    Page(Box<PageDecoder>),
 }
 
 impl LumelDecoder {
-    /// For a tile of `size` lumels, as the catalog says.
-    pub fn new(size: UVec2) -> Self {
-        Self { size, newest: None }
+    /// For a tile of a lightmap that is coded so, as the catalog says.
+    pub fn new(coding: Coding, tile: Tile) -> Self {
+        Self(match coding.packing() {
+            None => Kind::Tile(TileDecoder::new(tile.size)),
+            Some(packing) => Kind::Page(Box::new(PageDecoder::new(tile.size.x, packing))),
+        })
+    }
+
+    /// For a tile of `size` lumels that is coded as halves.
+    pub fn of_halves(size: UVec2) -> Self {
+        Self(Kind::Tile(TileDecoder::new(size)))
     }
 
     /// Decodes a frame. Frames may come in any order and may be missing.
     ///
     /// # Errors
-    /// Any [`DecodeError`]; the decoder is then as it was. [`DecodeError::MissingBase`] is no fault
-    /// of the sender: the frame's base was lost, or has been replaced by a newer one.
+    /// Any [`DecodeError`]; the decoder is then as it was, or waits for a keyframe where video was
+    /// damaged. [`DecodeError::MissingBase`] is no fault of the sender: the frame's base was lost, or
+    /// has been replaced by a newer one; nor is [`DecodeError::Late`].
     pub fn decode(&mut self, frame: &[u8]) -> Result<TileLight, DecodeError> {
-        let (header, payload) = LumelHeader::split(frame)?;
-        if header.size != self.size {
-            return Err(DecodeError::Mismatch("size"));
+        match &mut self.0 {
+            Kind::Tile(decoder) => decoder.decode(frame),
+            Kind::Page(decoder) => decoder.decode(frame),
         }
-        let update = header.info.update;
-        let base = header.base.map(|base| self.base(update, base)).transpose()?;
-        let mut decoder =
-            Decoder::new(payload).ok_or(DecodeError::Malformed("start of the payload"))?;
-        let lumels = code_tile(&mut decoder, self.size, base, None)?;
-        if !decoder.at_end() {
-            return Err(DecodeError::Malformed("bytes after the end"));
-        }
-        let scaled = |lumel: &Lumel| to_rgb(*lumel, header.scale_log2);
-        let irradiance: Vec<Vec3> = lumels.iter().map(scaled).collect();
-        if !irradiance.iter().all(|irradiance| irradiance.is_finite()) {
-            return Err(DecodeError::Malformed("a value is not finite"));
-        }
-        // Late frames do not replace newer ones.
-        if self.newest.as_ref().is_none_or(|(newest, _)| *newest < update) {
-            self.newest = Some((update, lumels));
-        }
-        Ok(TileLight { header, irradiance })
     }
+}
 
-    fn base(&self, update: u64, base: u64) -> Result<&[Lumel], DecodeError> {
-        match &self.newest {
-            Some((newest, lumels)) if *newest == base => Ok(lumels),
-            _ => Err(DecodeError::MissingBase { update, base }),
-        }
+impl std::fmt::Debug for LumelDecoder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LumelDecoder").finish_non_exhaustive()
     }
 }

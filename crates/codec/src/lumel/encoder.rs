@@ -1,46 +1,60 @@
-//! Lightmap → frames, tile by tile.
+//! Lightmap → frames.
 
 use lumencast_light::{Lightmap, ScaleRule};
+use lumencast_video::VideoError;
 
-use super::halves::{Lumel, from_rgb};
-use super::header::LumelHeader;
-use super::model::code_tile;
-use super::tiles::Tile;
-use crate::range_coder::Encoder;
+use super::coding::LumelCoding;
+use super::page_encoder::PageEncoder;
+use super::tile_encoder::TileEncoder;
 use crate::{EncodedRegion, LightmapShape, UpdateInfo};
-
-/// Every so many updates one of a tile is a keyframe, staggered over tiles.
-const KEYFRAME_EVERY: u64 = 60;
 
 /// Encodes the updates of one lightmap.
 ///
-/// Costs, in memory: 6 bytes a lumel of the tiles that are watched.
-#[derive(Clone, Debug)]
+/// Costs, in memory: 6 bytes a lumel of the tiles that are watched; as video what
+/// [`lumencast_video::H264Encoder`] takes, and a few bytes a lumel beside.
 pub struct LumelEncoder {
     shape: LightmapShape,
     scale: ScaleRule,
-    tiles: Vec<TileState>,
+    regions: Regions,
 }
 
-#[derive(Clone, Debug)]
-struct TileState {
-    tile: Tile,
-    newest: Option<Coded>,
+/// What each region keeps.
+enum Regions {
+    Tiles(Vec<TileEncoder>),
+    Pages {
+        encoders: Vec<PageEncoder>,
+        /// The page whose turn is next.
+        next: usize,
+    },
 }
 
-/// What decoders hold of a tile.
-#[derive(Clone, Debug)]
-struct Coded {
-    update: u64,
-    scale_log2: i8,
-    lumels: Vec<Lumel>,
-}
+/// So many lumels become pictures in an update; further pages have their turn in those that follow.
+const LUMELS_AN_UPDATE: usize = 1 << 20;
 
 impl LumelEncoder {
-    /// For lightmaps of a shape.
-    pub fn new(shape: LightmapShape) -> Self {
-        let tiles = shape.tiles().map(|tile| TileState { tile, newest: None }).collect();
-        Self { shape, scale: ScaleRule::default(), tiles }
+    /// For lightmaps of a shape, whose coding is that of `coding`.
+    ///
+    /// # Panics
+    /// If the codings differ.
+    pub fn new(shape: LightmapShape, coding: LumelCoding) -> Self {
+        assert_eq!(shape.coding, coding.coding(), "the shape tells how lumels are coded");
+        let regions = match coding.video() {
+            None => Regions::Tiles(shape.tiles().map(TileEncoder::new).collect()),
+            Some((packing, qp)) => {
+                let encoder = |tile| PageEncoder::new(tile, packing, qp);
+                Regions::Pages { encoders: shape.tiles().map(encoder).collect(), next: 0 }
+            }
+        };
+        Self { shape, scale: ScaleRule::default(), regions }
+    }
+
+    /// Goes on with lightmaps that differ in their layout alone; whether these do.
+    pub(crate) fn follow(&mut self, shape: LightmapShape) -> bool {
+        let is_alike = self.shape.is_coded_alike(&shape);
+        if is_alike {
+            self.shape = shape;
+        }
+        is_alike
     }
 
     /// The shape.
@@ -53,9 +67,14 @@ impl LumelEncoder {
         self.scale.log2()
     }
 
-    /// Encodes an update for the tiles that somebody watches. A tile newly watched begins with a
+    /// Encodes an update for the regions that somebody watches. One newly watched begins with a
     /// keyframe, and so does one whose scale has changed. Values below 0 and those that are no numbers
-    /// count as 0.
+    /// count as 0. As video, pages that have not changed have no frame, and where there are many, they
+    /// take turns.
+    ///
+    /// # Errors
+    /// [`VideoError`] where pages cannot be coded as video ([`LumelCoding::check`]). Those that follow
+    /// begin with keyframes.
     ///
     /// # Panics
     /// If `lightmap` is not of the shape given to [`LumelEncoder::new`].
@@ -64,43 +83,44 @@ impl LumelEncoder {
         lightmap: &Lightmap,
         info: UpdateInfo,
         watched: impl Fn(u32) -> bool,
-    ) -> Vec<EncodedRegion> {
+    ) -> Result<Vec<EncodedRegion>, VideoError> {
         let LightmapShape { page_size, pages, .. } = self.shape;
         assert_eq!((lightmap.layout.page_size, lightmap.layout.pages), (page_size, pages));
         let scale_log2 = self.scale.update(&lightmap.irradiance);
-        let mut frames = Vec::with_capacity(self.tiles.len());
-        for state in &mut self.tiles {
-            if watched(state.tile.id) {
-                frames.push(state.encode(lightmap, info, scale_log2));
-            } else {
-                state.newest = None;
+        let mut frames = Vec::new();
+        match &mut self.regions {
+            Regions::Tiles(encoders) => {
+                for encoder in encoders {
+                    if watched(encoder.tile().id) {
+                        frames.push(encoder.encode(lightmap, info, scale_log2));
+                    } else {
+                        encoder.rest();
+                    }
+                }
+            }
+            Regions::Pages { encoders, next } => {
+                let mut room = LUMELS_AN_UPDATE;
+                for _ in 0..encoders.len() {
+                    let encoder = &mut encoders[*next];
+                    let lumels = encoder.tile().lumel_count();
+                    if !watched(encoder.tile().id) {
+                        encoder.rest();
+                    } else if lumels <= room || room == LUMELS_AN_UPDATE {
+                        room = room.saturating_sub(lumels);
+                        frames.extend(encoder.encode(lightmap, info, scale_log2)?);
+                    } else {
+                        break;
+                    }
+                    *next = (*next + 1) % self.shape.pages as usize;
+                }
             }
         }
-        frames
+        Ok(frames)
     }
 }
 
-impl TileState {
-    fn encode(&mut self, lightmap: &Lightmap, info: UpdateInfo, scale_log2: i8) -> EncodedRegion {
-        let Tile { id, size, .. } = self.tile;
-        let rows = self.tile.rows(lightmap.layout.page_size);
-        let lumels: Vec<Lumel> = rows
-            .flat_map(|row| &lightmap.irradiance[row])
-            .map(|irradiance| from_rgb(*irradiance, scale_log2))
-            .collect();
-        let base = self.newest.as_ref().filter(|newest| {
-            !(info.update + u64::from(id)).is_multiple_of(KEYFRAME_EVERY)
-                && newest.scale_log2 == scale_log2
-                && (1..=255).contains(&info.update.wrapping_sub(newest.update))
-        });
-        let mut bytes = Vec::with_capacity(64 + lumels.len());
-        let header = LumelHeader { info, base: base.map(|base| base.update), scale_log2, size };
-        header.write(&mut bytes);
-        let mut encoder = Encoder::new(bytes);
-        code_tile(&mut encoder, size, base.map(|base| &base.lumels[..]), Some(&lumels))
-            .expect("halves can be coded");
-        let new_group = base.is_none();
-        self.newest = Some(Coded { update: info.update, scale_log2, lumels });
-        EncodedRegion { region: id, layer: 0, new_group, bytes: encoder.finish(), error: 0.0 }
+impl std::fmt::Debug for LumelEncoder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LumelEncoder").field("shape", &self.shape).finish_non_exhaustive()
     }
 }

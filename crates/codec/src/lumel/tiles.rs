@@ -4,8 +4,6 @@ use std::ops::Range;
 
 use glam::UVec2;
 
-use crate::limits::TILE_LUMELS as SIDE;
-
 /// A part of a page, the unit of tracks: the regions of a lightmap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tile {
@@ -15,7 +13,7 @@ pub struct Tile {
     pub page: u32,
     /// Its first lumel.
     pub min: UVec2,
-    /// Lumels along x and y, 1 to 256.
+    /// Lumels along x and y.
     pub size: UVec2,
 }
 
@@ -34,23 +32,23 @@ impl Tile {
     }
 }
 
-/// Cuts pages into tiles of at most 256² lumels, page after page, row after row.
-pub(crate) fn tiles(page_size: u32, pages: u32) -> impl Iterator<Item = Tile> {
-    let count = pages * per_side(page_size).pow(2);
-    (0..count).filter_map(move |id| tile(page_size, pages, id))
+/// Cuts pages into tiles of at most `side`² lumels, page after page, row after row.
+pub(crate) fn tiles(page_size: u32, side: u32, pages: u32) -> impl Iterator<Item = Tile> {
+    let count = pages * per_side(page_size, side).pow(2);
+    (0..count).filter_map(move |id| tile(page_size, side, pages, id))
 }
 
 /// Tiles along a side of a page.
-pub(crate) fn per_side(page_size: u32) -> u32 {
-    page_size.div_ceil(SIDE)
+pub(crate) fn per_side(page_size: u32, side: u32) -> u32 {
+    page_size.div_ceil(side)
 }
 
 /// The tile of a number.
-pub(crate) fn tile(page_size: u32, pages: u32, id: u32) -> Option<Tile> {
-    let per_side = per_side(page_size);
+pub(crate) fn tile(page_size: u32, side: u32, pages: u32, id: u32) -> Option<Tile> {
+    let per_side = per_side(page_size, side);
     let page = id.checked_div(per_side.pow(2)).filter(|page| *page < pages)?;
-    let min = SIDE * UVec2::new(id % per_side, id / per_side % per_side);
-    let size = (UVec2::splat(page_size) - min).min(UVec2::splat(SIDE));
+    let min = side * UVec2::new(id % per_side, id / per_side % per_side);
+    let size = (UVec2::splat(page_size) - min).min(UVec2::splat(side));
     Some(Tile { id, page, min, size })
 }
 
@@ -60,19 +58,26 @@ mod tests {
 
     #[test]
     fn tiles_cover_every_lumel_once() {
-        for (page_size, pages, count) in [(1, 1, 1), (256, 2, 2), (300, 3, 12), (1024, 1, 16)] {
+        let cases = [
+            (1, 256, 1, 1),
+            (256, 256, 2, 2),
+            (300, 256, 3, 12),
+            (1024, 256, 1, 16),
+            (300, 300, 3, 3),
+        ];
+        for (page_size, side, pages, count) in cases {
             let mut seen = vec![0; pages as usize * (page_size as usize).pow(2)];
-            let tiles: Vec<Tile> = tiles(page_size, pages).collect();
+            let tiles: Vec<Tile> = tiles(page_size, side, pages).collect();
             assert_eq!(tiles.len(), count);
             for (number, cut) in (0..).zip(&tiles) {
-                assert_eq!((cut.id, tile(page_size, pages, number)), (number, Some(*cut)));
+                assert_eq!((cut.id, tile(page_size, side, pages, number)), (number, Some(*cut)));
                 assert_eq!(cut.rows(page_size).flatten().count(), cut.lumel_count());
                 cut.rows(page_size).flatten().for_each(|lumel| seen[lumel] += 1);
             }
             assert!(seen.iter().all(|times| *times == 1));
-            assert_eq!(tile(page_size, pages, count as u32), None);
+            assert_eq!(tile(page_size, side, pages, count as u32), None);
         }
-        let last = tiles(300, 2).last();
+        let last = tiles(300, 256, 2).last();
         let (min, size) = (UVec2::splat(256), UVec2::splat(44));
         assert_eq!(last, Some(Tile { id: 7, page: 1, min, size }));
     }

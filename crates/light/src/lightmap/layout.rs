@@ -1,5 +1,6 @@
 //! Where the surfaces of a scene lie on pages.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::{UVec2, Vec2, Vec3};
@@ -48,13 +49,27 @@ pub struct Layout {
     pub pages: u32,
     /// In order of their numbers.
     surfaces: Vec<Surface>,
+    /// Of surfaces that pass from probes to lumels, or back.
+    shares: BTreeMap<SurfaceId, f32>,
 }
 
 impl Layout {
     /// A layout of surfaces, which may stand in any order.
     pub fn new(page_size: u32, pages: u32, mut surfaces: Vec<Surface>) -> Self {
         surfaces.sort_by_key(|surface| surface.id);
-        Self { page_size, pages, surfaces }
+        Self { page_size, pages, surfaces, shares: BTreeMap::new() }
+    }
+
+    /// The same, some of whose surfaces have that share of their light from lumels, 0 to 1, and the rest
+    /// from probes, since they pass from one to the other.
+    #[must_use]
+    pub fn with_shares(self, shares: BTreeMap<SurfaceId, f32>) -> Self {
+        Self { shares, ..self }
+    }
+
+    /// How much of a surface's light its lumels make.
+    pub fn share(&self, id: SurfaceId) -> f32 {
+        self.shares.get(&id).copied().unwrap_or(1.0)
     }
 
     /// The surfaces, in order of their numbers.

@@ -10,7 +10,7 @@ use lumencast_light::{
     ProbeVolume, Rectangle, Surface, SurfaceId,
 };
 use lumencast_scene::{Mesh, MeshId, Snapshot, View};
-use lumencast_shade::{Lighting, Settings};
+use lumencast_shade::{Lighting, Settings, Strengths};
 use lumencast_testkit::scenes::{Stage, lambert};
 
 const PAGE: u32 = 64;
@@ -162,6 +162,41 @@ fn read_as_on_the_processor() {
         }
     }
     assert!(seen > 1000 && largest > 500.0, "{seen} pixels, {largest}");
+}
+
+/// Indirect light of what is still and of what moves is as strong as is asked for; a checkerboard has
+/// bright and dark lumels.
+#[test]
+fn strengths_and_checkers_are_those_of_the_settings() {
+    let scene = scene();
+    let light = light(&scene);
+    let mut renderer = renderer(&scene, &settings());
+    renderer.set_light(&light).unwrap();
+    let views = [0, 1, 2].map(view);
+    let mut pictures = |settings| renderer.pictures(&views, &settings).unwrap();
+    let plain = pictures(settings());
+    let strengths = Strengths { still: 0.5, moving: 2.0 };
+    let weighed = pictures(Settings { strengths, ..settings() });
+    for (number, (plain, weighed)) in plain.iter().zip(&weighed).enumerate() {
+        let strength = if number == 2 { 2.0 } else { 0.5 };
+        for (plain, weighed) in plain.iter().zip(weighed) {
+            assert!((strength * *plain - *weighed).length() <= 2e-3 * weighed.length());
+        }
+    }
+    let checkers = pictures(Settings { checkers: true, ..settings() });
+    for (number, (plain, checkers)) in plain.iter().zip(&checkers).enumerate() {
+        let shares = plain.iter().zip(checkers).filter(|(plain, _)| plain.x > 0.0);
+        let (mut bright, mut dark) = (0, 0);
+        for (plain, checker) in shares {
+            match checker.x / plain.x {
+                share if share > 0.99 => bright += 1,
+                share if (0.24..0.26).contains(&share) => dark += 1,
+                share => panic!("plate {number}: {share}"),
+            }
+        }
+        // The plate that moves has no lumels.
+        assert!(bright > 200 && (dark > 200) == (number < 2), "{bright} bright, {dark} dark");
+    }
 }
 
 /// What lies beyond a chart's border by more than filtering reaches never shows.

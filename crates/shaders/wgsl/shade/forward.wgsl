@@ -207,7 +207,12 @@ fn radiance_of(in: Varying, p: Point, faces_front: bool, turn: f32) -> vec3f {
             if !front {
                 arriving = Lumels(in.rectangles.y, lumels.zw);
             }
-            radiance += indirect_light(b, site, arriving, p.substance.roughness, occlusion, visible);
+            let strength = select(frame.moving, frame.still, instances[in.instance].still == 1u);
+            radiance +=
+                strength * indirect_light(b, site, arriving, p.substance.roughness, occlusion, visible);
+            if (frame.parts & PART_CHECKERS) != 0u && is_dark_checker(arriving) {
+                radiance *= 0.25;
+            }
         }
     }
     return radiance;

@@ -15,15 +15,18 @@ struct Frame {
     frame: u32,
     // Ambient occlusion ends at this distance, metres.
     occlusion_radius: f32,
+    // Indirect light of what is still, and of what moves, is multiplied by these.
+    still: f32,
+    moving: f32,
     _pad0: u32,
-    _pad1: u32,
-    _pad2: u32,
 }
 
 // Which light is drawn.
 const PART_EMISSION: u32 = 1u;
 const PART_DIRECT: u32 = 2u;
 const PART_INDIRECT: u32 = 4u;
+// Every other lumel is dark.
+const PART_CHECKERS: u32 = 8u;
 
 // A shadow map: one layer of the array.
 struct ShadowView {

@@ -38,10 +38,12 @@ fn indirect_light(
     if OCCLUDED {
         of_specular = min(of_specular, visible);
     }
-    if lumels.rectangle != NO_LUMELS {
-        light.a = lumel_light(lumels);
-    } else if OCCLUDED {
-        of_diffuse = min(of_diffuse, many_bounces(visible, b.diffuse));
+    let share = lumel_share(lumels);
+    if OCCLUDED {
+        of_diffuse = mix(min(of_diffuse, many_bounces(visible, b.diffuse)), of_diffuse, share);
+    }
+    if share > 0.0 {
+        light.a = mix(light.a, lumel_light(lumels), share);
     }
     var sum = b.diffuse * under * of_diffuse * light.a / PI;
     sum += (b.f0 * by.x + b.f90 * by.y) * specular_occlusion(n_v, of_specular, b.alpha) * light.b;

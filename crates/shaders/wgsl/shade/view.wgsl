@@ -21,8 +21,9 @@ struct Instance {
     mirrors: u32,
     // Where its rectangles of lumels begin in the list of all.
     lumels: u32,
+    // 1 where it neither moves nor deforms.
+    still: u32,
     _pad0: u32,
-    _pad1: u32,
 }
 
 // A rectangle of lumels: charts of one side of a primitive of an instance.
@@ -30,5 +31,6 @@ struct Rectangle {
     // Its first lumel, on a layer of the pages' texture.
     corner: vec2f,
     layer: u32,
-    _pad: u32,
+    // How much of the light its lumels make; the rest is the probes'.
+    share: f32,
 }

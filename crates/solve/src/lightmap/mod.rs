@@ -26,7 +26,7 @@ use filter::{Noisy, REACH, filter};
 use places::{LumelPlace, lumel_places};
 pub use points::spread;
 use seams::Seams;
-pub use seams::seam_differences;
+pub use seams::sides_of_seams;
 use sums::{Sum, have_changed};
 
 /// What a lumel has in place of a receiver where no surface covers it.
@@ -71,6 +71,10 @@ pub struct LightmapSolver {
     placed: HashMap<InstanceId, Affine3A>,
     /// Those that are elsewhere now, or have lumels that wait for light.
     moved: BTreeMap<InstanceId, Moved>,
+    /// Still instances without lumels: where they are, and since when, seconds of scene time.
+    newcomers: BTreeMap<InstanceId, Moved>,
+    /// Those that get none: their surfaces take none, or there is no room.
+    without: BTreeSet<InstanceId>,
     /// The version of the scene that was followed last.
     followed: Option<u64>,
     lightmap: Lightmap,
@@ -86,6 +90,9 @@ impl LightmapSolver {
         for (place, receiver) in places.iter().zip(0..) {
             receiver_of[place.lumel as usize] = receiver;
         }
+        let placed = placed(scene, &layout);
+        let still = scene.instances.iter().filter(|instance| instance.still);
+        let ids = still.map(|instance| (instance.node.0, instance.copy));
         Self {
             settings,
             texel: laid_out.texel,
@@ -97,8 +104,10 @@ impl LightmapSolver {
             seams: Arc::new(Seams::new(scene, &layout)),
             news: BTreeSet::new(),
             beside: Arc::new(empty_beside(&places, layout.page_size)),
-            placed: placed(scene, &layout),
+            without: ids.filter(|id| !placed.contains_key(id)).collect(),
+            placed,
             moved: BTreeMap::new(),
+            newcomers: BTreeMap::new(),
             followed: None,
             layout: layout.clone(),
             lightmap: Lightmap::dark(id, layout),
@@ -136,7 +145,7 @@ impl LightmapSolver {
     /// another layout.
     pub fn follow(&mut self, scene: &Snapshot) -> bool {
         let is_same = self.followed.replace(scene.version) == Some(scene.version);
-        if is_same && self.moved.is_empty() {
+        if is_same && self.moved.is_empty() && self.newcomers.is_empty() {
             return false;
         }
         let now: HashMap<InstanceId, Affine3A> = scene
@@ -145,18 +154,80 @@ impl LightmapSolver {
             .filter(|instance| instance.still)
             .map(|instance| ((instance.node.0, instance.copy), instance.world_from_object))
             .collect();
+        self.follow_newcomers(&now, scene.time);
         let ids: Vec<InstanceId> = self.placed.keys().copied().collect();
         let mut is_other = false;
         for id in ids {
             is_other |= self.follow_instance(id, now.get(&id).copied(), scene);
         }
         if is_other {
-            let Layout { page_size, pages, .. } = *self.layout;
-            let is_there = |surface: &&Surface| !self.moved.contains_key(&instance_of(surface));
-            let surfaces = self.layout.surfaces().iter().filter(is_there).cloned().collect();
-            self.lightmap.layout = Arc::new(Layout::new(page_size, pages, surfaces));
+            self.list_surfaces();
         }
         is_other
+    }
+
+    /// Publishes where the surfaces lie that have not moved.
+    fn list_surfaces(&mut self) {
+        let Layout { page_size, pages, .. } = *self.layout;
+        let is_there = |surface: &&Surface| !self.moved.contains_key(&instance_of(surface));
+        let surfaces = self.layout.surfaces().iter().filter(is_there).cloned().collect();
+        self.lightmap.layout = Arc::new(Layout::new(page_size, pages, surfaces));
+    }
+
+    /// Remembers since when instances rest that have no lumels yet.
+    fn follow_newcomers(&mut self, now: &HashMap<InstanceId, Affine3A>, time: f64) {
+        self.newcomers.retain(|id, _| now.contains_key(id));
+        for (id, at) in now {
+            if self.placed.contains_key(id) || self.without.contains(id) {
+                continue;
+            }
+            let resting = Moved { at: Some(*at), since: time };
+            let known = self.newcomers.entry(*id).or_insert(resting);
+            if known.at != Some(*at) {
+                *known = resting;
+            }
+        }
+    }
+
+    /// Instances without lumels that have rested long enough to get some.
+    pub(crate) fn newcomers(&self, time: f64) -> Vec<InstanceId> {
+        let rested = self.newcomers.iter().filter(|(_, at)| time - at.since >= REST);
+        rested.map(|(id, _)| *id).collect()
+    }
+
+    /// Where all surfaces lie, and how large a lumel is.
+    pub(crate) fn laid_out(&self) -> LaidOut {
+        LaidOut { layout: Layout::clone(&self.layout), texel: self.texel, coarser: false }
+    }
+
+    /// Has lumels of a layout from now on, which keeps the place of surfaces that there are. What is
+    /// known of lumels is kept. Instances that are `tried` and have none in the layout get none; those
+    /// that have some show them once they were gathered at.
+    pub(crate) fn extend(&mut self, scene: &Snapshot, laid_out: &LaidOut, tried: &[InstanceId]) {
+        let mut new = Self::new(self.id(), scene, laid_out, self.settings);
+        for (receiver, lumel) in new.lumels.iter().enumerate() {
+            let before = self.receiver_of.get(*lumel as usize).map_or(usize::MAX, |r| *r as usize);
+            if self.receivers.get(before) == Some(&new.receivers[receiver]) {
+                new.sums[receiver] = self.sums[before];
+            }
+        }
+        let known = self.lightmap.irradiance.len().min(new.lightmap.irradiance.len());
+        new.lightmap.irradiance[..known].copy_from_slice(&self.lightmap.irradiance[..known]);
+        new.without = std::mem::take(&mut self.without);
+        new.without.extend(tried.iter().filter(|id| !new.placed.contains_key(id)));
+        new.newcomers = std::mem::take(&mut self.newcomers);
+        new.newcomers.retain(|id, _| !new.placed.contains_key(id) && !new.without.contains(id));
+        new.moved = std::mem::take(&mut self.moved);
+        new.moved.retain(|id, _| new.placed.contains_key(id));
+        for id in tried.iter().filter(|id| new.placed.contains_key(id)) {
+            let at = new.placed.get(id).copied();
+            new.moved.insert(*id, Moved { at, since: scene.time });
+        }
+        for id in new.moved.keys().copied().collect::<Vec<_>>() {
+            new.hurry(id);
+        }
+        new.list_surfaces();
+        *self = new;
     }
 
     /// Whether an instance that is at a place now, or gone, has lumels otherwise than before.

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use glam::{Vec2, Vec3};
-use lumencast_light::{Layout, Lightmap, Surface, luminance};
+use lumencast_light::{Layout, Lightmap, Surface};
 use lumencast_scene::Snapshot;
 
 use super::places::{PlacedSurface, surfaces};
@@ -183,21 +183,15 @@ fn project(x: &mut [Vec3], yields: &[f32], point: &[(u32, f32); 8], strength: f3
     }
 }
 
-/// By how much the light that both sides of a lightmap's seams read differs, as shares of what they read,
-/// at points spread over all seams.
-pub fn seam_differences(scene: &Snapshot, lightmap: &Lightmap) -> Vec<f32> {
+/// The irradiance, lux, that both sides of a lightmap's seams read, at points spread over all seams.
+pub fn sides_of_seams(scene: &Snapshot, lightmap: &Lightmap) -> Vec<[Vec3; 2]> {
     let seams = Seams::at(scene, &lightmap.layout, JUDGED);
     let read = |taps: &[(u32, f32)]| -> Vec3 {
         let light = |lumel: u32| lightmap.irradiance[seams.lumels[lumel as usize] as usize];
         taps.iter().map(|(lumel, weight)| weight.abs() * light(*lumel)).sum()
     };
-    let difference = |taps: &[(u32, f32); 8]| {
-        let (one, other) = taps.split_at(4);
-        let [a, b] = [read(one), read(other)].map(luminance);
-        let most = a.max(b);
-        (most > 0.0).then(|| (a - b).abs() / most)
-    };
-    seams.points.iter().filter_map(difference).collect()
+    let sides = |taps: &[(u32, f32); 8]| [read(&taps[..4]), read(&taps[4..])];
+    seams.points.iter().map(sides).collect()
 }
 
 /// The sides of a triangle's edges, with what names the edge: the positions of its ends, to the bit.

@@ -21,6 +21,8 @@ export class VideoTile implements TileCache {
   private key = -1;
   /** The run of the server, counted; pictures of another one are late. */
   private run = 0;
+  /** The newest frame without a picture, and the update of the picture that it confirms. */
+  private confirmed: { readonly arrival: Arrival; readonly picture: number } | undefined;
   /** Seconds in which the light was made that came since it was last looked at. */
   private unseen: number | undefined;
 
@@ -44,6 +46,7 @@ export class VideoTile implements TileCache {
     this.sent = undefined;
     this.key = -1;
     this.newest = undefined;
+    this.confirmed = undefined;
   }
 
   add(frame: Uint8Array, now: number, tickSeconds: number): Received {
@@ -55,6 +58,10 @@ export class VideoTile implements TileCache {
     }
     if (base === undefined) this.key = update;
     this.sent = update;
+    if (unit.length === 0) {
+      this.confirm({ head, arrived: now });
+      return { head, news: true };
+    }
     const run = this.run;
     this.decoder ??= this.open();
     void this.decoder.decode(unit, base === undefined).then((planes) => {
@@ -62,6 +69,18 @@ export class VideoTile implements TileCache {
     });
     const newest = this.newest?.head.update ?? -1;
     return { head, news: update > newest };
+  }
+
+  /** The page is still what the frame's base shows, whose picture may be on its way. */
+  private confirm(arrival: Arrival & { readonly head: VideoHeader }): void {
+    const { base } = arrival.head;
+    const { confirmed } = this;
+    if (this.newest?.head.update === base) this.newest = arrival;
+    else
+      this.confirmed = {
+        arrival,
+        picture: confirmed?.arrival.head.update === base ? confirmed!.picture : base!,
+      };
   }
 
   /** The picture of a frame that came at `arrived` is there, or nothing came of it. */
@@ -75,7 +94,7 @@ export class VideoTile implements TileCache {
     if (before && head.update <= before.update) return;
     const { scale, toe, octaves } = head;
     this.shown.replace({ kind: 'planes', scale, toe, octaves, ...planes });
-    this.newest = { head, arrived };
+    this.newest = this.confirmed?.picture === head.update ? this.confirmed.arrival : { head, arrived };
     this.unseen = (this.unseen ?? 0) + (before ? (head.tick - before.tick) * tickSeconds : 0);
     this.onLight(this.region, head);
     this.onLate();

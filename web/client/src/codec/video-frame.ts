@@ -14,7 +14,7 @@ const MOST_TOE = 32;
 /** Parts of a power of two in which they are told. */
 const PARTS = 8;
 
-/** Header and access unit of a video frame. */
+/** Header and access unit of a video frame; the unit is empty where the page is that of the frame's base. */
 export function splitVideoFrame(frame: Uint8Array): { header: VideoHeader; unit: Uint8Array } {
   const { head, reader } = splitFrame(frame);
   const toe = reader.u8();
@@ -22,6 +22,8 @@ export function splitVideoFrame(frame: Uint8Array): { header: VideoHeader; unit:
   const range = reader.u8();
   if (range === 0) throw new WireError('malformed', 'a range of nothing');
   const unit = reader.rest();
-  if (unit.length === 0) throw new WireError('truncated', 'a frame without an access unit');
+  if (unit.length === 0 && head.base === undefined) {
+    throw new WireError('malformed', 'a keyframe without a picture');
+  }
   return { header: { ...head, toe, octaves: range / PARTS }, unit };
 }

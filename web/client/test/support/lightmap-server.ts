@@ -53,6 +53,18 @@ export class LightmapServer {
     return json({ snapshot: [], acks: {}, tick, ...times, version: tick, tick_ms: 1, samples: 1 });
   }
 
+  /** The frames of an update of video in which nothing has changed. */
+  idle(): SentFrame[] {
+    const base = this.update++;
+    const { update, scaleLog2 } = this;
+    const info = { update, base, sceneVersion: 5, scaleLog2 };
+    const frame = (region: number) => ({
+      track: `f${FIELD}/r${region}/l0`,
+      bytes: join(frameHead(info), [7, 96]),
+    });
+    return Array.from({ length: this.shape.pages }, (_, region) => frame(region));
+  }
+
   /** The frames of an update in which all lumels are so bright; a frame of video says it in its unit. */
   step(value: number): SentFrame[] {
     this.update++;

@@ -1,5 +1,9 @@
 //! `lumencast bench lightmap`: how right the light of lumels is.
 
+mod coded;
+mod edges;
+mod live;
+
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -7,14 +11,18 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::Vec3;
 use lumencast_charts::LaidOut;
+use lumencast_codec::{LumelCoding, Qp};
 use lumencast_gather::path_trace::{CpuPathTracer, Levels, Options};
 use lumencast_gather::{Gather, Job, Receiver};
 use lumencast_light::{FieldId, Lightmap, Place};
-use lumencast_scene::Snapshot;
+use lumencast_scene::{Scene, Snapshot};
+use lumencast_server::TickOptions;
 use lumencast_solve::blend::BlendSettings;
-use lumencast_solve::{LightmapSolver, seam_differences, spread};
+use lumencast_solve::{GatherOptions, LightmapSolver, sides_of_seams, spread};
 use serde_json::json;
 
+use self::coded::Coded;
+use self::live::{Goals, Live};
 use super::quantile;
 use crate::arguments::{LightmapArguments, Materials, SceneSource};
 use crate::charting;
@@ -22,9 +30,13 @@ use crate::output::{self, say};
 
 /// Points of surfaces at which light is judged.
 const POINTS: usize = 4096;
+/// The same where light from beyond charts is looked for.
+const POISON_POINTS: usize = 1 << 17;
 /// Samples that lumels, and points of the reference, take at a time.
 const PASS: u32 = 16;
 const REFERENCE_PASS: u32 = 256;
+/// All samples weigh alike.
+const MEAN: BlendSettings = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
 /// Shares of backs above which a point lies within something.
 const BURIED: f32 = 0.5;
 
@@ -58,6 +70,9 @@ pub(crate) struct BenchLightmap {
     /// Samples of a point of the reference, at most.
     #[arg(long, default_value_t = 65_536, value_parser = clap::value_parser!(u32).range(512..=1 << 24))]
     reference_samples: u32,
+    /// Also casts the scene for 20 seconds as `serve` does, and makes a lamp twice as bright half-way.
+    #[arg(long)]
+    live: bool,
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
@@ -78,11 +93,10 @@ struct Reference {
 impl BenchLightmap {
     pub(crate) fn run(self) -> Result<()> {
         let mut scene = self.scene.open()?;
+        let name = scene.name().to_owned();
         let snapshot = scene.snapshot();
-        let options =
-            Options { materials: self.materials.model(), threads: None, levels: Levels::One };
         let mut tracer =
-            CpuPathTracer::new(options).context("cannot start the threads that trace")?;
+            CpuPathTracer::new(self.options()).context("cannot start the threads that trace")?;
 
         let spec = self.lightmap.spec(&scene);
         let start = Instant::now();
@@ -90,8 +104,7 @@ impl BenchLightmap {
             .context("the scene has no still surface that lumels can lie on")?;
         let layout_seconds = start.elapsed().as_secs_f64();
 
-        let mean = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
-        let mut solver = LightmapSolver::new(FieldId(0), &snapshot, &laid_out, mean);
+        let mut solver = LightmapSolver::new(FieldId(0), &snapshot, &laid_out, MEAN);
         let start = Instant::now();
         self.gather(&mut solver, &snapshot, &mut tracer)?;
         let gather_seconds = start.elapsed().as_secs_f64();
@@ -102,21 +115,33 @@ impl BenchLightmap {
         solver.solve(true);
         let filter_seconds = start.elapsed().as_secs_f64();
 
-        let mut seams: Vec<f64> =
-            seam_differences(&snapshot, solver.lightmap()).into_iter().map(f64::from).collect();
-        seams.sort_unstable_by(f64::total_cmp);
-        let seam = (!seams.is_empty()).then(|| quantile(&seams, 0.99));
+        let sides = sides_of_seams(&snapshot, solver.lightmap());
+        let seam = edges::relative(&sides);
 
         let places = spread(&snapshot, &laid_out.layout, POINTS);
         let reference = self.reference(&places, &snapshot, &mut tracer)?;
         let psnr = |lightmap: &Lightmap| reference.psnr(&places, lightmap);
         let (as_gathered, filtered) = (psnr(gathered), psnr(solver.lightmap()));
 
+        let coded = Coded::all(solver.lightmap())?;
+        let coded_psnr: Vec<f64> = coded.iter().map(|coded| psnr(&coded.shown)).collect();
+        let coded: Vec<(Coded, f64)> = coded.into_iter().zip(coded_psnr).collect();
+        let sent = coded.iter().find(|(coded, _)| coded.is_default()).map(|(coded, _)| coded);
+        let shown = sent.map_or(solver.lightmap(), |coded| &coded.shown);
+        let seam_codes = edges::codes(&sides_of_seams(&snapshot, shown), reference.white);
+        let many = spread(&snapshot, &laid_out.layout, POISON_POINTS);
+        let poison = edges::poisoned(shown, &many, reference.white);
+
+        let live = match self.live {
+            true => Some(self.live(scene, &laid_out, solver.lightmap(), reference.white)?),
+            false => None,
+        };
+
         let LaidOut { layout, texel, .. } = &laid_out;
         let judged = reference.irradiance.iter().flatten().count();
         if self.json {
             return output::json(&json!({
-                "scene": scene.name(),
+                "scene": name,
                 "pages": layout.pages,
                 "page_size": layout.page_size,
                 "texel": texel,
@@ -129,7 +154,10 @@ impl BenchLightmap {
                 "materials": self.materials.to_string(),
                 "points": judged,
                 "irradiance_db": { "gathered": as_gathered, "filtered": filtered },
-                "seams": { "points": seams.len(), "p99": seam },
+                "coded": coded.iter().map(|(coded, db)| coded.json(*db)).collect::<Vec<_>>(),
+                "seams": { "points": sides.len(), "p99": seam, "coded_codes_p99": seam_codes },
+                "poison_codes": poison,
+                "live": live.as_ref().map(Live::json),
                 "reference": { "noise_db": reference.noise, "samples": reference.samples },
                 "seconds": {
                     "layout": layout_seconds, "gather": gather_seconds, "filter": filter_seconds,
@@ -138,7 +166,7 @@ impl BenchLightmap {
         }
         say!(
             "{}: {} × {}², a lumel every {:.1} cm, {} lumels ({} within something)",
-            scene.name(),
+            name,
             layout.pages,
             layout.page_size,
             100.0 * texel,
@@ -149,8 +177,26 @@ impl BenchLightmap {
             "irradiance: {filtered:.1} dB, as gathered {as_gathered:.1} dB, {} samples a lumel",
             self.samples
         );
+        for (coded, db) in &coded {
+            say!(
+                "coded: {db:.1} dB by {}, qp {}, keyframe {:.1} KB, {:.1} ms, decoded in {:.1} ms",
+                coded.name(),
+                coded.qp,
+                coded.bytes as f64 / 1e3,
+                1e3 * coded.encode_seconds,
+                1e3 * coded.decode_seconds
+            );
+        }
         if let Some(seam) = seam {
-            say!("seams: both sides differ by {:.2} % in the 99th percentile", 100.0 * seam);
+            say!(
+                "seams: both sides differ by {:.2} % in the 99th percentile, as sent by {:.1} codes",
+                100.0 * seam,
+                seam_codes.unwrap_or_default()
+            );
+        }
+        say!("light from beyond charts changes points by {poison:.1} codes at most");
+        if let Some(live) = &live {
+            live.say();
         }
         say!(
             "reference: {judged} points, noise {:.1} dB after {} samples",
@@ -161,6 +207,41 @@ impl BenchLightmap {
             "seconds: layout {layout_seconds:.1}, light {gather_seconds:.1}, filter {filter_seconds:.1}"
         );
         Ok(())
+    }
+
+    /// How the lumels of a scene follow it while it is cast.
+    fn live(
+        &self,
+        scene: Scene,
+        laid_out: &LaidOut,
+        before: &Lightmap,
+        white: f32,
+    ) -> Result<Live> {
+        let options = Options { levels: Levels::Two, ..self.options() };
+        let mut tracer =
+            CpuPathTracer::new(options).context("cannot start the threads that trace")?;
+        let after = match live::brighter(&scene) {
+            None => None,
+            Some(edit) => {
+                let mut edited = self.scene.open()?;
+                edited.apply(&edit)?;
+                let snapshot = edited.snapshot();
+                let mut solver = LightmapSolver::new(FieldId(0), &snapshot, laid_out, MEAN);
+                self.gather(&mut solver, &snapshot, &mut tracer)?;
+                solver.solve(true);
+                Some((edit, solver.lightmap().clone()))
+            }
+        };
+        let goals = Goals { before: before.clone(), after, white };
+        let gather = GatherOptions { bounces: self.bounces, ..GatherOptions::default() };
+        let lightmap = Some(laid_out.clone());
+        let lumel_coding = LumelCoding::H264(Qp::default());
+        let options = TickOptions { gather, lightmap, lumel_coding, ..TickOptions::default() };
+        live::measure(scene, Box::new(tracer), options, &goals)
+    }
+
+    fn options(&self) -> Options {
+        Options { materials: self.materials.model(), threads: None, levels: Levels::One }
     }
 
     fn gather(

@@ -1,0 +1,87 @@
+//! What coding lumels as video costs and loses.
+
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use lumencast_codec::{LightmapShape, LumelCoding, LumelDecoder, LumelEncoder, Qp, UpdateInfo};
+use lumencast_light::Lightmap;
+use serde_json::{Value, json};
+
+/// Parameters that are tried.
+const QPS: [u8; 4] = [12, 15, 18, 24];
+
+/// A lightmap as one way of coding shows it.
+pub(super) struct Coded {
+    pub(super) qp: u8,
+    pub(super) stacked: bool,
+    /// What clients see.
+    pub(super) shown: Lightmap,
+    /// Bytes of a keyframe of all pages.
+    pub(super) bytes: usize,
+    pub(super) encode_seconds: f64,
+    pub(super) decode_seconds: f64,
+}
+
+impl Coded {
+    /// Every parameter, with colour at half the resolution and at full.
+    pub(super) fn all(lightmap: &Lightmap) -> Result<Vec<Self>> {
+        let qps = QPS.into_iter().filter_map(Qp::new);
+        let codings = qps.flat_map(|qp| [LumelCoding::H264(qp), LumelCoding::H264Stacked(qp)]);
+        let page_size = lightmap.layout.page_size;
+        codings
+            .filter(|coding| coding.check(page_size).is_ok())
+            .map(|coding| Self::of(lightmap, coding))
+            .collect()
+    }
+
+    fn of(lightmap: &Lightmap, coding: LumelCoding) -> Result<Self> {
+        let (LumelCoding::H264(qp) | LumelCoding::H264Stacked(qp)) = coding else {
+            anyhow::bail!("not a video coding")
+        };
+        let shape = LightmapShape::of(lightmap, coding.coding());
+        let mut encoder = LumelEncoder::new(shape.clone(), coding);
+        let (mut encode_seconds, mut decode_seconds, mut bytes) = (0.0, 0.0, 0);
+        let mut shown = lightmap.clone();
+        // Pages take turns, so that the last has been coded after as many updates as there are pages.
+        for update in 0..u64::from(shape.pages) {
+            let start = Instant::now();
+            let info = UpdateInfo { update, ..UpdateInfo::default() };
+            let frames = encoder.encode(lightmap, info, |_| true)?;
+            encode_seconds += start.elapsed().as_secs_f64();
+            for frame in frames.iter().filter(|frame| frame.new_group) {
+                bytes += frame.bytes.len();
+                let tile = shape.tile(frame.region).context("a page that there is not")?;
+                let start = Instant::now();
+                let light = LumelDecoder::new(shape.coding, tile).decode(&frame.bytes)?;
+                decode_seconds += start.elapsed().as_secs_f64();
+                let rows = light.irradiance.chunks(tile.size.x as usize);
+                for (row, values) in tile.rows(shape.page_size).zip(rows) {
+                    shown.irradiance[row].copy_from_slice(values);
+                }
+            }
+        }
+        let stacked = matches!(coding, LumelCoding::H264Stacked(_));
+        Ok(Self { qp: qp.get(), stacked, shown, bytes, encode_seconds, decode_seconds })
+    }
+
+    /// Whether servers send it so unless told otherwise.
+    pub(super) fn is_default(&self) -> bool {
+        (self.qp, self.stacked) == (Qp::default().get(), false)
+    }
+
+    pub(super) fn name(&self) -> &'static str {
+        if self.stacked { "h264-stacked" } else { "h264" }
+    }
+
+    /// As JSON, with what was measured of `shown`.
+    pub(super) fn json(&self, irradiance_db: f64) -> Value {
+        json!({
+            "coding": self.name(),
+            "qp": self.qp,
+            "irradiance_db": irradiance_db,
+            "keyframe_bytes": self.bytes,
+            "encode_ms": 1e3 * self.encode_seconds,
+            "decode_ms": 1e3 * self.decode_seconds,
+        })
+    }
+}

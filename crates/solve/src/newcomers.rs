@@ -1,0 +1,53 @@
+//! Instances that came after surfaces were laid out on pages.
+
+use std::sync::Arc;
+
+use lumencast_charts::{ChartError, Extended, LaidOut, Store, extended, sheets};
+use lumencast_light::FieldId;
+use lumencast_scene::Snapshot;
+
+/// Still instances that rest and have no lumels yet. Cutting them into charts takes its time, and needs
+/// nothing but what is here: [`Newcomers::lay_out`] may run on any thread.
+#[derive(Clone, Debug)]
+pub struct Newcomers {
+    pub(crate) field: FieldId,
+    pub(crate) before: LaidOut,
+    /// By their nodes and their numbers there.
+    pub(crate) instances: Vec<(u32, u32)>,
+    scene: Arc<Snapshot>,
+}
+
+impl Newcomers {
+    pub(crate) fn new(
+        field: FieldId,
+        before: LaidOut,
+        instances: Vec<(u32, u32)>,
+        scene: Arc<Snapshot>,
+    ) -> Self {
+        Self { field, before, instances, scene }
+    }
+
+    /// The field that they are to have lumels of.
+    pub fn field(&self) -> FieldId {
+        self.field
+    }
+
+    /// The layout with their surfaces too, the fronts alone, and without those of instances that are
+    /// gone. `goes_on` is asked now and then.
+    ///
+    /// # Errors
+    /// [`ChartError::Interrupted`] where `goes_on` answers no, and whatever the unwrapper finds wrong.
+    pub fn lay_out(
+        &self,
+        store: Option<&Store>,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Extended, ChartError> {
+        let all = &self.scene.instances;
+        let mut scene = Snapshot::clone(&self.scene);
+        scene.instances.retain(|i| self.instances.contains(&(i.node.0, i.copy)));
+        let sheets = sheets(&scene, store, &|_| goes_on())?.sheets;
+        let is_there =
+            |node: u32, copy: u32| all.iter().any(|i| (i.node.0, i.copy) == (node, copy));
+        extended(&self.before, |surface| is_there(surface.node, surface.copy), &sheets)
+    }
+}

@@ -1,0 +1,175 @@
+//! H.264 by openh264.
+
+use openh264::OpenH264API;
+use openh264::decoder::{DecodedYUV, Decoder};
+use openh264::encoder::{
+    BitRate, Complexity, Encoder, EncoderConfig, FrameRate, FrameType, IntraFramePeriod, QpRange,
+    RateControlMode, SpsPpsStrategy, UsageType, VuiConfig,
+};
+use openh264::formats::{YUVSlices, YUVSource};
+use openh264_sys2::{ENCODER_OPTION_TRACE_LEVEL, WELS_LOG_QUIET};
+
+use crate::VideoError;
+use crate::picture::{Picture, PictureDecoder, PictureEncoder};
+
+/// A quantisation parameter: each 6 more double the step. The encoder takes 12 to 36.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Qp(u8);
+
+impl Qp {
+    /// The finest and the coarsest.
+    pub const RANGE: std::ops::RangeInclusive<u8> = 12..=36;
+
+    /// The parameter, if the encoder takes it.
+    pub fn new(qp: u8) -> Option<Self> {
+        Self::RANGE.contains(&qp).then_some(Self(qp))
+    }
+
+    /// As a number.
+    pub fn get(self) -> u8 {
+        self.0
+    }
+}
+
+impl Default for Qp {
+    /// 15: lumels lose at most about 1.5 dB by it.
+    fn default() -> Self {
+        Self(15)
+    }
+}
+
+impl std::fmt::Display for Qp {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// Encodes H.264 in Annex B, a keyframe with its parameter sets in front.
+///
+/// openh264 is made for calls between people, so its own rules are off: it neither skips frames, nor
+/// keeps a bit rate, nor looks for cuts, backgrounds or parts that the eye might forgive.
+pub struct H264Encoder {
+    encoder: Encoder,
+    size: (u32, u32),
+}
+
+/// Beyond what any picture needs: rate control has nothing to hold back.
+const AMPLE: BitRate = BitRate::from_bps(200_000_000);
+/// What the encoder states, and nobody reads: pictures come when there is light.
+const RATE: FrameRate = FrameRate::from_hz(30.0);
+/// Longest and shortest side.
+const LIMITS: (u32, u32) = (3840, 2160);
+
+impl H264Encoder {
+    /// For pictures of a size.
+    ///
+    /// # Errors
+    /// [`VideoError::Size`] beyond 3840 × 2160, either way round; [`VideoError::Encoder`].
+    pub fn new(width: u32, height: u32, qp: Qp) -> Result<Self, VideoError> {
+        if width.max(height) > LIMITS.0 || width.min(height) > LIMITS.1 {
+            return Err(VideoError::Size { width, height });
+        }
+        let config = EncoderConfig::new()
+            .rate_control_mode(RateControlMode::Quality)
+            .qp(QpRange::new(qp.0, qp.0))
+            .bitrate(AMPLE)
+            .max_frame_rate(RATE)
+            .skip_frames(false)
+            .scene_change_detect(false)
+            .adaptive_quantization(false)
+            .background_detection(false)
+            .long_term_reference(false)
+            .usage_type(UsageType::CameraVideoRealTime)
+            .complexity(Complexity::Medium)
+            .intra_frame_period(IntraFramePeriod::auto())
+            .sps_pps_strategy(SpsPpsStrategy::ConstantId)
+            .num_threads(1)
+            .vui(VuiConfig::bt709_full());
+        let mut encoder =
+            Encoder::with_api_config(OpenH264API::from_source(), config).map_err(failed)?;
+        hush(&mut encoder);
+        Ok(Self { encoder, size: (width, height) })
+    }
+}
+
+/// Keeps the library from writing to the standard error that it keeps no bit rate.
+fn hush(encoder: &mut Encoder) {
+    let mut level = WELS_LOG_QUIET;
+    #[expect(unsafe_code, reason = "the wrapper sets the level once it has written already")]
+    // SAFETY: the option takes a pointer to an int, and reads it before it returns.
+    unsafe {
+        encoder.raw_api().set_option(ENCODER_OPTION_TRACE_LEVEL, (&raw mut level).cast());
+    }
+}
+
+impl PictureEncoder for H264Encoder {
+    fn encode(&mut self, picture: &Picture, keyframe: bool) -> Result<Vec<u8>, VideoError> {
+        let Picture { width, height, .. } = *picture;
+        if (width, height) != self.size {
+            return Err(VideoError::Size { width, height });
+        }
+        if keyframe {
+            self.encoder.force_intra_frame();
+        }
+        let coded = self.encoder.encode(&planes(picture)).map_err(failed)?;
+        match coded.frame_type() {
+            FrameType::Skip | FrameType::Invalid => {
+                Err(VideoError::Encoder("it has left a picture out".into()))
+            }
+            _ => Ok(coded.to_vec()),
+        }
+    }
+}
+
+fn planes(picture: &Picture) -> YUVSlices<'_> {
+    let (width, height) = (picture.width as usize, picture.height as usize);
+    let [u, v] = &picture.chroma;
+    let strides = (width, width / 2, width / 2);
+    YUVSlices::new((&picture.luma, u, v), (width, height), strides)
+}
+
+fn failed(error: openh264::Error) -> VideoError {
+    VideoError::Encoder(error.to_string())
+}
+
+/// Decodes what [`H264Encoder`] makes.
+pub struct H264Decoder(Decoder);
+
+impl H264Decoder {
+    /// Waits for a keyframe.
+    ///
+    /// # Errors
+    /// [`VideoError::Unit`] when the library cannot make a decoder.
+    pub fn new() -> Result<Self, VideoError> {
+        Decoder::new().map(Self).map_err(undecodable)
+    }
+}
+
+impl PictureDecoder for H264Decoder {
+    fn decode(&mut self, unit: &[u8]) -> Result<Picture, VideoError> {
+        let decoded = self.0.decode(unit).map_err(undecodable)?;
+        decoded.as_ref().map(picture).ok_or_else(|| VideoError::Unit("it holds no picture".into()))
+    }
+}
+
+fn undecodable(error: openh264::Error) -> VideoError {
+    VideoError::Unit(error.to_string())
+}
+
+/// The planes without the padding between their rows.
+fn picture(decoded: &DecodedYUV<'_>) -> Picture {
+    let (width, height) = decoded.dimensions();
+    let (y, u, v) = decoded.strides();
+    let plane = |samples: &[u8], stride: usize, width: usize, height: usize| -> Vec<u8> {
+        samples.chunks(stride).take(height).flat_map(|row| &row[..width]).copied().collect()
+    };
+    Picture {
+        width: width as u32,
+        height: height as u32,
+        luma: plane(decoded.y(), y, width, height),
+        chroma: [
+            plane(decoded.u(), u, width / 2, height / 2),
+            plane(decoded.v(), v, width / 2, height / 2),
+        ],
+    }
+}
