@@ -75,21 +75,27 @@ const SURFACES = [
   ['the ceiling', [0.6, 2, -0.2]],
 ] as const;
 
-/** Surfaces at these points. WebGPURenderer takes changes of lamps over once a frame of the browser. */
+/** Surfaces at these points. */
 async function seen(page: Page, points: readonly (readonly [number, number, number])[]): Promise<Pixel[]> {
   const at = await Promise.all(points.map((point) => onScreen(page, point)));
-  return page.evaluate(async (at) => {
-    await new Promise(requestAnimationFrame);
-    return window.lumencast!.pixels(at);
-  }, at);
+  await settled(page);
+  return page.evaluate((at) => window.lumencast!.pixels(at), at);
+}
+
+/** Lets changes reach the picture: WebGPURenderer takes those of lamps over once a frame of the browser. */
+function settled(page: Page): Promise<void> {
+  return page.evaluate(async () => {
+    for (let i = 0; i < 2; i++) {
+      await new Promise(requestAnimationFrame);
+      window.lumencast!.viewer.draw();
+    }
+  });
 }
 
 /** Points all over the picture, with one part of the light shown. */
 async function seenAll(page: Page, shown: 'both' | 'indirect'): Promise<Pixel[]> {
-  await page.evaluate(async (shown) => {
-    window.lumencast!.setMode(shown);
-    await new Promise(requestAnimationFrame);
-  }, shown);
+  await page.evaluate((shown) => window.lumencast!.setMode(shown), shown);
+  await settled(page);
   return look(page, shown);
 }
 
