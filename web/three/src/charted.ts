@@ -6,6 +6,7 @@ import type { Charts } from '@lumencast/client';
 import {
   BufferAttribute,
   BufferGeometry,
+  InstancedBufferAttribute,
   type InterleavedBufferAttribute,
   type Mesh,
   type TypedArray,
@@ -20,6 +21,12 @@ import {
 export const LUMELS = 'lumels';
 export const FIRST = 2;
 export const NO_LUMELS = -1;
+
+/**
+ * The attribute that tells how much of a geometry's diffuse light its lumels make, 0 to 1; probes make the
+ * rest. One value is for all vertices: it counts instances, of which a mesh has one.
+ */
+export const LUMEL_SHARE = 'lumelShare';
 
 /** Charts of the two sides of a primitive. */
 export type Sides = readonly [front: Charts | undefined, back: Charts | undefined];
@@ -180,12 +187,14 @@ export function chartedGeometry(
   original: BufferGeometry,
   { attributes, index }: Parted,
   lumels: BufferAttribute,
+  share = 1,
 ): BufferGeometry {
   const geometry = new BufferGeometry();
   geometry.name = original.name;
   geometry.userData = original.userData;
   for (const [name, attribute] of Object.entries(attributes)) geometry.setAttribute(name, attribute);
   geometry.setAttribute(LUMELS, lumels);
+  geometry.setAttribute(LUMEL_SHARE, new InstancedBufferAttribute(Float32Array.of(share), 1));
   geometry.setIndex(index);
   // Triangles keep their order, and so does what counts them.
   for (const { start, count, materialIndex } of original.groups)
@@ -199,11 +208,24 @@ export function chartedGeometry(
   return geometry;
 }
 
+/** Sets how much of a geometry's diffuse light its lumels make. */
+export function setLumelShare(geometry: BufferGeometry, share: number): void {
+  const attribute = geometry.getAttribute(LUMEL_SHARE);
+  if (attribute.getX(0) === share) return;
+  attribute.setX(0, share);
+  attribute.needsUpdate = true;
+}
+
+/** What a geometry does not share with others of the same charts. */
+const OWN: readonly string[] = [LUMELS, LUMEL_SHARE];
+
 /** Frees what a geometry alone has; what it shares stays for the others. */
 export function disposeCharted(geometry: BufferGeometry, isLast: boolean): void {
   if (!isLast) {
     geometry.setIndex(null);
-    for (const name of Object.keys(geometry.attributes)) if (name !== LUMELS) geometry.deleteAttribute(name);
+    for (const name of Object.keys(geometry.attributes)) {
+      if (!OWN.includes(name)) geometry.deleteAttribute(name);
+    }
   }
   geometry.dispose();
 }

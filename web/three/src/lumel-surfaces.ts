@@ -9,10 +9,12 @@ import {
   lumelsAttribute,
   part,
   type Parted,
+  setLumelShare,
   type Sides,
   withoutCharts,
 } from './charted.js';
 import type { Content } from './content.js';
+import { laterShare } from './handover.js';
 import { materialsOf } from './patch.js';
 
 /** Where surfaces lie in the texture of all pages. */
@@ -38,14 +40,19 @@ interface Wanted {
   readonly corners: readonly [front: Corners, back: Corners];
 }
 
-/** A mesh that has lumels for as long as it stands where it stood when it got them. */
+/** A mesh that has lumels, or is on its way to them or back. */
 interface Lit {
   readonly wanted: Wanted;
   readonly mesh: Mesh;
   readonly original: BufferGeometry;
   readonly charted: BufferGeometry;
   readonly kept: Kept;
+  /** Where the mesh stood when it got its lumels: elsewhere they do not show its light. */
   readonly worldFromObject: Matrix4;
+  /** How much of its light lumels make. At 0 it shows its own geometry. */
+  share: number;
+  /** Whether that grows, or falls. */
+  comes: boolean;
 }
 
 /** What geometries with the same charts share. */
@@ -58,20 +65,23 @@ interface Kept {
 
 /**
  * Gives still meshes geometries that know where their lumels lie, as layouts say, and their own ones back
- * when layouts name them no more or when they begin to move: lumels are where the mesh was.
+ * when layouts name them no more or when they begin to move: lumels are where the mesh was. Both take
+ * half a second, in which light passes from probes to lumels or back. What has not been seen by probes
+ * has its lumels at once: meshes of the first layouts, and those that come later than their layout.
  */
 export class LumelSurfaces {
   /** By node and primitive. */
   #wanted: ReadonlyMap<string, Wanted> = new Map();
   readonly #lit = new Map<string, Lit>();
   readonly #lumelsOf = new WeakMap<Mesh, Lit>();
-  /** Those whose geometry is to be made. */
-  readonly #waiting = new Set<string>();
+  /** Those whose geometry is to be made, and the share of lumels that those begin with that have none. */
+  readonly #waiting = new Map<string, number>();
   /** Those whose mesh is not here yet. */
   readonly #missing = new Set<string>();
   readonly #kept: Kept[] = [];
   #revision = -1;
   #updatedAt = -Infinity;
+  #hasLayouts = false;
   #hasWarned = false;
 
   constructor(
@@ -91,18 +101,27 @@ export class LumelSurfaces {
   setLayouts(layouts: readonly PlacedLayout[]): void {
     const former = this.#wanted;
     this.#wanted = wantedBy(layouts);
-    for (const [key, lit] of this.#lit) {
-      const wanted = this.#wanted.get(key);
-      if (!wanted) this.#release(key, lit);
-      else if (!isSame(wanted, lit.wanted)) this.#waiting.add(key);
-    }
-    for (const set of [this.#waiting, this.#missing]) {
-      for (const key of set) if (!this.#wanted.has(key)) set.delete(key);
+    const share = this.#hasLayouts ? 0 : 1;
+    this.#hasLayouts ||= layouts.length > 0;
+    for (const keys of [this.#waiting, this.#missing]) {
+      for (const key of keys.keys()) if (!this.#wanted.has(key)) keys.delete(key);
     }
     for (const [key, wanted] of this.#wanted) {
-      const before = former.get(key);
-      if (!before || !isSame(wanted, before)) this.#waiting.add(key);
+      const lit = this.#lit.get(key);
+      // It rests again, wherever it was before.
+      if (lit && !former.has(key)) place(lit);
+      const known = lit?.wanted ?? former.get(key);
+      if (!known || !isSame(wanted, known)) this.#waiting.set(key, this.#waiting.get(key) ?? share);
     }
+  }
+
+  /** Gives all meshes their own geometries back at once, and takes the next layouts for the first. */
+  clear(): void {
+    this.#wanted = new Map();
+    this.#hasLayouts = false;
+    this.#waiting.clear();
+    this.#missing.clear();
+    for (const [key, lit] of this.#lit) this.#release(key, lit);
   }
 
   /**
@@ -111,13 +130,14 @@ export class LumelSurfaces {
    * that waits.
    */
   update(revision: number, now: number, budget = BUDGET): void {
-    const wasHidden = now - this.#updatedAt > GAP;
+    const elapsed = now - this.#updatedAt;
     this.#updatedAt = now;
-    if (this.#wanted.size === 0) return;
-    if (wasHidden) this.#placeAnew();
+    if (this.#wanted.size === 0 && this.#lit.size === 0) return;
+    for (const lit of this.#lit.values()) lit.share = laterShare(lit.share, lit.comes, elapsed);
+    if (elapsed > GAP) for (const lit of this.#lit.values()) place(lit);
     if (revision !== this.#revision) {
       this.#revision = revision;
-      for (const key of this.#missing) this.#waiting.add(key);
+      for (const key of this.#missing) this.#waiting.set(key, 1);
       this.#missing.clear();
       for (const [key, lit] of this.#lit) if (this.#meshOf(lit.wanted) !== lit.mesh) this.#leave(key, lit);
     }
@@ -126,29 +146,17 @@ export class LumelSurfaces {
     if (this.#lit.size > 0) this.scene.traverse((object) => this.#clean(object));
   }
 
-  /** Gives all meshes their own geometries back. */
-  dispose(): void {
-    this.setLayouts([]);
-  }
-
-  #placeAnew(): void {
-    for (const { mesh, worldFromObject } of this.#lit.values()) {
-      mesh.updateWorldMatrix(true, false);
-      worldFromObject.copy(mesh.matrixWorld);
-    }
-  }
-
   #make(budget: number): void {
     if (this.#waiting.size === 0) return;
     const end = performance.now() + budget;
-    for (const key of this.#waiting) {
+    for (const [key, share] of this.#waiting) {
       this.#waiting.delete(key);
-      if (this.#light(key, this.#wanted.get(key)!) && performance.now() >= end) return;
+      if (this.#light(key, this.#wanted.get(key)!, share) && performance.now() >= end) return;
     }
   }
 
-  /** Gives a mesh its lumels; whether a geometry had to be made. */
-  #light(key: string, wanted: Wanted): boolean {
+  /** Gives a mesh its lumels, with a share if it has none yet; whether a geometry had to be made. */
+  #light(key: string, wanted: Wanted, firstShare: number): boolean {
     const before = this.#lit.get(key);
     const mesh = this.#meshOf(wanted);
     if (before) this.#release(key, before);
@@ -165,13 +173,15 @@ export class LumelSurfaces {
     }
     kept.users++;
     const lumels = lumelsAttribute(kept.parted, wanted.sides, wanted.corners);
-    const charted = chartedGeometry(original, kept.parted, lumels);
-    mesh.updateWorldMatrix(true, false);
-    const worldFromObject = before?.mesh === mesh ? before.worldFromObject : mesh.matrixWorld.clone();
-    const lit = { wanted, mesh, original, charted, kept, worldFromObject };
+    const known = before?.mesh === mesh ? before : undefined;
+    const share = known?.share ?? firstShare;
+    const charted = chartedGeometry(original, kept.parted, lumels, share);
+    const worldFromObject = new Matrix4();
+    const lit = { wanted, mesh, original, charted, kept, worldFromObject, share, comes: true };
+    if (known) worldFromObject.copy(known.worldFromObject);
+    else place(lit);
     this.#lit.set(key, lit);
     this.#lumelsOf.set(mesh, lit);
-    mesh.geometry = charted;
     return true;
   }
 
@@ -193,10 +203,13 @@ export class LumelSurfaces {
 
   /** Lumels show a mesh's light only where they were gathered at. */
   #follow(key: string, lit: Lit): void {
-    const { mesh, original, charted, worldFromObject } = lit;
+    const { mesh, original, charted, share, worldFromObject } = lit;
     if (mesh.geometry !== original && mesh.geometry !== charted) return this.#leave(key, lit);
-    const isInPlace = mesh.matrixWorld.equals(worldFromObject);
-    mesh.geometry = isInPlace ? charted : original;
+    const isWanted = this.#wanted.has(key);
+    lit.comes = isWanted && mesh.matrixWorld.equals(worldFromObject);
+    if (share === 0 && !isWanted) return this.#release(key, lit);
+    mesh.geometry = share > 0 || lit.comes ? charted : original;
+    setLumelShare(charted, share);
   }
 
   /** A copy that the program has made of a mesh with lumels has none of its own. */
@@ -209,7 +222,7 @@ export class LumelSurfaces {
   /** The mesh is no longer the one that is wanted. */
   #leave(key: string, lit: Lit): void {
     this.#release(key, lit);
-    this.#missing.add(key);
+    if (this.#wanted.has(key)) this.#missing.add(key);
   }
 
   #release(key: string, { mesh, original, charted, kept }: Lit): void {
@@ -228,6 +241,12 @@ export class LumelSurfaces {
       `meshes whose triangles are not those of the server's file are lit by probes alone${name && `, such as ${name}`}`,
     );
   }
+}
+
+/** Says that a mesh has its lumels where it now stands. */
+function place({ mesh, worldFromObject }: Lit): void {
+  mesh.updateWorldMatrix(true, false);
+  worldFromObject.copy(mesh.matrixWorld);
 }
 
 function wantedBy(layouts: readonly PlacedLayout[]): ReadonlyMap<string, Wanted> {

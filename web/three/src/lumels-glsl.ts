@@ -1,4 +1,4 @@
-import { FIRST, LUMELS } from './charted.js';
+import { FIRST, LUMEL_SHARE, LUMELS } from './charted.js';
 
 /**
  * What a vertex hands on in place of coordinates where its side has no lumels, and where its geometry
@@ -13,12 +13,15 @@ const BELOW_NOWHERE = '- 2e6';
 
 export const LUMELS_OF_VERTEX = /* glsl */ `
 attribute vec4 ${LUMELS};
+attribute float ${LUMEL_SHARE};
 varying highp vec4 vLumels;
+flat varying float vLumelShare;
 `;
 
 export const LUMELS_OF_VERTEX_MAIN = /* glsl */ `
 vLumels.xy = ${LUMELS}.x > 1.5 ? ${LUMELS}.xy - ${FIRST}.0 : vec2( ${LUMELS}.x < 0.0 ? ${NOWHERE} : ${UNKNOWN} );
 vLumels.zw = ${LUMELS}.z > 1.5 ? ${LUMELS}.zw - ${FIRST}.0 : vec2( ${NOWHERE} );
+vLumelShare = ${LUMEL_SHARE};
 `;
 
 export const LUMELS_OF_FRAGMENT = /* glsl */ `
@@ -27,6 +30,7 @@ uniform float lumencastMoving;
 uniform float lumencastLumels;
 uniform highp sampler2D lumencastPages;
 varying highp vec4 vLumels;
+flat varying float vLumelShare;
 
 // Where the lumels of the side that is seen lie.
 vec2 lumelsSeen() {
@@ -46,7 +50,13 @@ vec3 lumelIrradiance() {
 	return textureLod( lumencastPages, uv, 0.0 ).rgb * lumencastLumels;
 }
 
+// How much of the light lumels make.
+float lumelShare() {
+	return hasLumels() ? vLumelShare : 0.0;
+}
+
 float gridFactor() {
-	return vLumels.x > ${BELOW_NOWHERE} ? lumencastStill : lumencastMoving;
+	if ( vLumels.x < ${BELOW_NOWHERE} ) return lumencastMoving;
+	return mix( lumencastMoving, hasLumels() ? 0.0 : lumencastStill, vLumelShare );
 }
 `;

@@ -112,11 +112,10 @@ export class Lumels {
 
   dispose(): void {
     this.#clear();
-    this.#surfaces.dispose();
   }
 
   #clear(): void {
-    this.#surfaces.setLayouts([]);
+    this.#surfaces.clear();
     this.#layouts = [];
     this.#light?.removeFromParent();
     this.#light = undefined;

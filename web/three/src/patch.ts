@@ -13,8 +13,8 @@ import { LUMELS_OF_FRAGMENT, LUMELS_OF_VERTEX, LUMELS_OF_VERTEX_MAIN } from './l
  * - irradiance of probe grids times 2^w, w the fourth channel of the atlas' last sub-volume, which is
  *   free: 0 in grids that three.js bakes, the logarithm of the field's scale in ours; and times a
  *   factor of {@link uniforms};
- * - in materials of meshes that have lumels, irradiance of these in place of the grids' ({@link LUMELS}
- *   says what an attribute means).
+ * - in materials of meshes that have lumels, irradiance of these in place of the grids', or a share of it
+ *   ({@link LUMELS} and its neighbours say what attributes mean).
  */
 export function patchedLights(withLumels = false): string {
   const lights = Object.entries(FALLOFF_GLSL).reduce(
@@ -35,10 +35,11 @@ export function patchedIrradiance(): string {
   const probes = replaceText(
     ShaderChunk.lights_fragment_begin,
     'if ( isInsideLightProbeGrid(',
-    'if ( ! hasLumels() && isInsideLightProbeGrid(',
+    'if ( lumelShare() < 1.0 && isInsideLightProbeGrid(',
   );
   const grids = '#if NUM_LIGHT_PROBE_GRIDS > 0';
-  return replaceText(probes, grids, `if ( hasLumels() ) irradiance += lumelIrradiance();\n\n${grids}`);
+  const lumels = 'if ( hasLumels() ) irradiance += lumelShare() * lumelIrradiance();';
+  return replaceText(probes, grids, `${lumels}\n\n${grids}`);
 }
 
 export function patchedShadowCoordinates(): string {

@@ -64,7 +64,7 @@ export interface PagesTarget {
 export interface IndirectFactors {
   /** What the texture of pages holds. */
   readonly lumels: { value: number };
-  /** Light of probe grids on meshes that have lumels, where these have none. */
+  /** Light of probe grids on meshes that have lumels, where these have none, by as much as lumels count. */
   readonly still: { value: number };
   /** Light of probe grids on all other meshes. */
   readonly moving: { value: number };

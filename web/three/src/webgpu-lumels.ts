@@ -1,6 +1,6 @@
 import type { LightProbeGrid } from 'three/addons/lighting/LightProbeGrid.js';
 import { LightProbeGridNode } from 'three/addons/tsl/lighting/LightProbeGridNode.js';
-import { Light, type Texture } from 'three';
+import { InterpolationSamplingType, Light, type Texture } from 'three';
 import {
   attribute,
   float,
@@ -8,6 +8,7 @@ import {
   frontFacing,
   If,
   INFINITY,
+  mix,
   renderGroup,
   texture,
   uniform,
@@ -16,7 +17,7 @@ import {
   vec3,
 } from 'three/tsl';
 import { AnalyticLightNode, type Node, type NodeBuilder, type NodeFrame } from 'three/webgpu';
-import { FIRST, LUMELS } from './charted.js';
+import { FIRST, LUMEL_SHARE, LUMELS } from './charted.js';
 import { sizeOf } from './webgpu-pages.js';
 
 /** Uniforms of all scenes; other than neutral only while a scene is drawn. */
@@ -32,11 +33,12 @@ const BELOW_COORDINATES = -5e5;
 
 /** What probe grids hand to one another while a shader is built. */
 interface ProbeContext {
+  irradiance: Node<'vec3'>;
   lightProbeIrradiance?: Node<'vec3'>;
   lightProbePriority?: Node<'float'>;
 }
 
-/** A light that lets what it lights read irradiance at lumels, in place of that of probe grids. */
+/** A light that lets what it lights read irradiance at lumels, in place of that of probe grids or beside it. */
 export class LumelLight extends Light {
   readonly _lightNode = LumelNode;
 
@@ -47,8 +49,9 @@ export class LumelLight extends Light {
 }
 
 /**
- * Stands among the nodes of probe grids as one of the highest priority, wherever a side has lumels. A
- * shader is built for each set of attributes: of geometries without charts it knows nothing of lumels.
+ * Adds irradiance at lumels wherever a side has some. Where it is all there is, this stands among the nodes
+ * of probe grids as one of the highest priority, so that none is read. A shader is built for each set of
+ * attributes: of geometries without charts it knows nothing of lumels.
  */
 class LumelNode extends AnalyticLightNode<LumelLight> {
   static get type(): string {
@@ -56,48 +59,64 @@ class LumelNode extends AnalyticLightNode<LumelLight> {
   }
 
   override setup(builder: NodeBuilder): undefined {
-    const stored = lumelsAttributeOf(builder);
-    if (!stored) return;
+    const seen = seenBy(builder);
+    if (!seen) return;
+    const { at, share } = seen;
     const pages = texture(this.light!.pages);
-    const at = seen(stored);
-    const context = builder.context as ProbeContext;
+    const context = builder.context as unknown as ProbeContext;
     context.lightProbeIrradiance ??= vec3().toVar('lightProbeIrradiance');
     context.lightProbePriority ??= INFINITY.negate().toVar('lightProbePriority');
-    const { lightProbeIrradiance, lightProbePriority } = context;
-    If(at.x.greaterThan(BELOW_COORDINATES), () => {
+    const { irradiance, lightProbeIrradiance, lightProbePriority } = context;
+    // three.js declares irradiance where it is first used: not within the branch.
+    const light = vec3(0).toVar();
+    If(hasLumels(seen), () => {
       const uv = at.div(sizeOf(pages));
       const texel = pages.sample(uv).level(float(0)) as Node<'vec4'>;
-      lightProbeIrradiance.assign(texel.rgb.mul(factors.lumels));
-      lightProbePriority.assign(INFINITY);
+      light.assign(texel.rgb.mul(factors.lumels.mul(share)));
+      If(share.greaterThanEqual(1), () => {
+        lightProbeIrradiance.assign(vec3(0));
+        lightProbePriority.assign(INFINITY);
+      });
     });
+    irradiance.addAssign(light);
   }
 }
 
-/** What tells where lumels lie, of the front alone or of both sides; `undefined` where nothing does. */
-function lumelsAttributeOf({ geometry }: NodeBuilder): Stored | undefined {
+/** What a fragment knows of the lumels of the side that is seen. */
+interface Seen {
+  /** Where they lie, or {@link NOWHERE}. */
+  readonly at: Node<'vec2'>;
+  /** How much of the light they make. */
+  readonly share: Node<'float'>;
+}
+
+/** `undefined` where the geometry knows nothing of lumels. Varyings of one name are one. */
+function seenBy({ geometry }: NodeBuilder): Seen | undefined {
   const stored = geometry?.getAttribute(LUMELS);
   if (!stored) return undefined;
-  if (stored.itemSize !== 4) return { front: attribute<'vec2'>(LUMELS, 'vec2'), back: undefined };
+  const handedOn = (stored: Node<'vec2'>, name: string) =>
+    varying(stored.x.greaterThan(1.5).select(stored.sub(FIRST), vec2(NOWHERE)), name);
   const both = attribute<'vec4'>(LUMELS, 'vec4');
-  return { front: both.xy, back: both.zw };
+  const hasBack = stored.itemSize === 4;
+  const front = handedOn(hasBack ? both.xy : attribute<'vec2'>(LUMELS, 'vec2'), 'vLumelsOfFront');
+  const back = hasBack ? handedOn(both.zw, 'vLumelsOfBack') : vec2(NOWHERE);
+  const share = varying(attribute<'float'>(LUMEL_SHARE, 'float'), 'vLumelShare');
+  return {
+    at: frontFacing.select(front, back),
+    share: share.setInterpolation(InterpolationSamplingType.FLAT),
+  };
 }
 
-interface Stored {
-  readonly front: Node<'vec2'>;
-  readonly back: Node<'vec2'> | undefined;
-}
-
-/** Where the lumels of the side that is seen lie. */
-function seen({ front, back }: Stored): Node<'vec2'> {
-  const handedOn = (stored: Node<'vec2'> | undefined) =>
-    stored ? varying(stored.x.greaterThan(1.5).select(stored.sub(FIRST), vec2(NOWHERE))) : vec2(NOWHERE);
-  return frontFacing.select(handedOn(front), handedOn(back));
+function hasLumels({ at }: Seen): Node<'bool'> {
+  return at.x.greaterThan(BELOW_COORDINATES);
 }
 
 /** By what light of probe grids counts on a geometry, known once a shader is built for it. */
-const gridFactor = Fn((_: unknown, builder: NodeBuilder) =>
-  lumelsAttributeOf(builder) ? factors.still : factors.moving,
-) as unknown as () => Node<'float'>;
+const gridFactor = Fn((_: unknown, builder: NodeBuilder) => {
+  const seen = seenBy(builder);
+  if (!seen) return factors.moving;
+  return mix(factors.moving, hasLumels(seen).select(float(0), factors.still), seen.share);
+}) as unknown as () => Node<'float'>;
 
 /** A part of three.js' node that its types leave out. */
 interface WithIntensity {

@@ -18,6 +18,7 @@ import {
   disposeCharted,
   FIRST,
   isCharted,
+  LUMEL_SHARE,
   LUMELS,
   lumelsAttribute,
   NO_LUMELS,
@@ -188,7 +189,7 @@ describe('a geometry parted by charts', () => {
     one.addEventListener('dispose', () => freed(Object.keys(one.attributes), one.index));
     disposeCharted(one, false);
     // three.js frees the buffers of all attributes that a disposed geometry has.
-    expect(freed).toHaveBeenCalledWith([LUMELS], null);
+    expect(freed).toHaveBeenCalledWith([LUMELS, LUMEL_SHARE], null);
   });
 });
 

@@ -137,13 +137,13 @@ describe('patchMaterials', () => {
     const shader = compile(patched(withLumels(material)), ShaderLib[kind]);
     const [vertex, fragment] = [shader.vertexShader, shader.fragmentShader];
     // Once declared, before it is used.
-    for (const text of ['attribute vec4 lumels;', 'varying highp vec4 vLumels;']) {
+    for (const text of ['vec4 lumels;', 'float lumelShare;', 'vec4 vLumels;', 'float vLumelShare;']) {
       expect(vertex.split(text)).toHaveLength(2);
     }
     expect(vertex.indexOf('vLumels.xy =')).toBeGreaterThan(vertex.indexOf('void main()'));
     expect(fragment.indexOf('vec3 lumelIrradiance()')).toBeLessThan(fragment.indexOf('void main()'));
-    expect(fragment).toContain('if ( ! hasLumels() && isInsideLightProbeGrid(');
-    const added = fragment.indexOf('irradiance += lumelIrradiance()');
+    expect(fragment).toContain('if ( lumelShare() < 1.0 && isInsideLightProbeGrid(');
+    const added = fragment.indexOf('irradiance += lumelShare() * lumelIrradiance()');
     expect(added).toBeGreaterThan(fragment.indexOf('vec3 irradiance = getAmbientLightIrradiance'));
     // Where a scene has no grids, too.
     expect(added).toBeLessThan(fragment.indexOf('vec3 probeWorldPos'));

@@ -1,7 +1,16 @@
 /** Which meshes get geometries with lumels, and when they get their own ones back. */
-import { Group, InstancedMesh, Mesh, MeshPhysicalMaterial, type Object3D, PlaneGeometry, Scene } from 'three';
+import {
+  type BufferAttribute,
+  Group,
+  InstancedMesh,
+  Mesh,
+  MeshPhysicalMaterial,
+  type Object3D,
+  PlaneGeometry,
+  Scene,
+} from 'three';
 import { beforeEach, describe, expect, it } from 'vitest';
-import { isCharted, LUMELS } from '../src/charted.js';
+import { isCharted, LUMEL_SHARE, LUMELS } from '../src/charted.js';
 import { Content, instantiateMesh } from '../src/content.js';
 import { LumelSurfaces } from '../src/lumel-surfaces.js';
 import { load, POSITION } from './support/glb.js';
@@ -48,6 +57,9 @@ function frame(milliseconds = 16): void {
 
 const isLit = (object: Object3D) => isCharted((object as Mesh).geometry);
 
+/** How much of a mesh's light lumels make; 0 where it shows its own geometry. */
+const share = ({ geometry }: Mesh) => geometry.attributes[LUMEL_SHARE]?.getX(0) ?? 0;
+
 describe('meshes that a layout names', () => {
   it('get a geometry with lumels, and their own one back when it names them no more', () => {
     const [one, other] = [square(0), square(1)];
@@ -57,8 +69,10 @@ describe('meshes that a layout names', () => {
     expect([one, other].map(isLit)).toEqual([true, true]);
     expect(surfaces.count).toBe(2);
     set(1);
+    frame();
+    frame(500);
     expect([one, other].map(isLit)).toEqual([false, true]);
-    surfaces.dispose();
+    surfaces.clear();
     expect([one.geometry, other.geometry]).toEqual(own);
   });
 
@@ -86,7 +100,7 @@ describe('meshes that a layout names', () => {
     surfaces.setLayouts([{ layout: layout(surface({ charts: SQUARE })), corner: () => [64, 0] }]);
     frame();
     expect(mesh.geometry).not.toBe(geometry);
-    expect(isLit(mesh)).toBe(true);
+    expect(share(mesh)).toBe(1);
   });
 
   it('are lit once they are here', () => {
@@ -97,7 +111,7 @@ describe('meshes that a layout names', () => {
     expect(isLit(late)).toBe(false);
     revision++;
     frame();
-    expect(isLit(late)).toBe(true);
+    expect(share(late)).toBe(1);
     // A snapshot has another object stand for the node.
     content.deleteNode(4);
     revision++;
@@ -106,7 +120,7 @@ describe('meshes that a layout names', () => {
     const other = square(4);
     revision++;
     frame();
-    expect(isLit(other)).toBe(true);
+    expect(share(other)).toBe(1);
   });
 
   it('leave their lumels when they move, and find them where they were', () => {
@@ -117,18 +131,25 @@ describe('meshes that a layout names', () => {
     frame();
     above.position.x = 1;
     frame();
+    expect([share(mesh), surfaces.count]).toEqual([1, 1]);
+    frame(125);
+    expect(share(mesh)).toBe(0.75);
+    frame(375);
     expect([isLit(mesh), surfaces.count]).toEqual([false, 0]);
     above.position.x = 0;
     frame();
-    expect(isLit(mesh)).toBe(true);
+    frame(125);
+    expect(share(mesh)).toBe(0.25);
     // The server takes them from it, and gives them back where it rests.
     above.position.x = 2;
-    frame();
     set();
-    frame();
+    frame(0);
+    frame(1000);
+    expect(isLit(mesh)).toBe(false);
     set(0);
     frame();
-    expect(isLit(mesh)).toBe(true);
+    frame(250);
+    expect(share(mesh)).toBe(0.5);
   });
 
   it('have lumels where they are found when the page is shown again', () => {
@@ -147,7 +168,7 @@ describe('meshes that a layout names', () => {
     const other = new PlaneGeometry(3, 3, 2);
     mesh.geometry = other;
     frame();
-    surfaces.dispose();
+    surfaces.clear();
     expect(mesh.geometry).toBe(other);
   });
 
@@ -160,6 +181,101 @@ describe('meshes that a layout names', () => {
       return surfaces.count;
     });
     expect(counts).toEqual([1, 2, 3]);
+  });
+});
+
+describe('light passes from probes to lumels, and back', () => {
+  it('within half a second, from where it is', () => {
+    const [mesh] = [square(0), square(1)];
+    set(1);
+    frame();
+    set(0, 1);
+    frame();
+    expect([share(mesh), isLit(mesh)]).toEqual([0, true]);
+    for (const expected of [0.25, 0.5, 0.75]) {
+      frame(125);
+      expect(share(mesh)).toBe(expected);
+    }
+    set(1);
+    frame(0);
+    frame(125);
+    expect(share(mesh)).toBe(0.5);
+    set(0, 1);
+    frame(0);
+    frame(125);
+    expect(share(mesh)).toBe(0.75);
+    frame(125);
+    expect(share(mesh)).toBe(1);
+    frame(125);
+    expect(share(mesh)).toBe(1);
+  });
+
+  it('at 60 Hz by a thirtieth a frame, and tells the device so', () => {
+    const [mesh] = [square(0), square(1)];
+    set(0, 1);
+    frame();
+    set(1);
+    frame();
+    const attribute = mesh.geometry.attributes[LUMEL_SHARE] as BufferAttribute;
+    const versions = Array.from({ length: 3 }, () => {
+      const { version } = attribute;
+      const before = share(mesh);
+      frame(1000 / 60);
+      expect(before - share(mesh)).toBeCloseTo(1 / 30, 6);
+      return attribute.version - version;
+    });
+    expect(versions).toEqual([1, 1, 1]);
+    set(0, 1);
+    frame(0);
+    frame(500);
+    const { version } = attribute;
+    frame();
+    expect([share(mesh), attribute.version]).toEqual([1, version]);
+  });
+
+  it('from other places of its lumels at once, with the share that it had', () => {
+    const mesh = square(0);
+    square(1);
+    set(1);
+    frame();
+    set(0, 1);
+    frame();
+    frame(250);
+    const { geometry } = mesh;
+    const first = () => mesh.geometry.getAttribute(LUMELS).getX(0);
+    const before = first();
+    surfaces.setLayouts([{ layout: layout(surface({ charts: SQUARE })), corner: () => [64, 0] }]);
+    frame(0);
+    expect(mesh.geometry).not.toBe(geometry);
+    expect([share(mesh), first() - before]).toEqual([0.5, 66]);
+  });
+
+  it('at once where all lumels have gone, and with the next layout', () => {
+    const mesh = square(0);
+    set(0);
+    frame();
+    surfaces.clear();
+    expect(isLit(mesh)).toBe(false);
+    surfaces.setLayouts([]);
+    frame();
+    set(0);
+    frame();
+    expect(share(mesh)).toBe(1);
+  });
+
+  it('for each of those that share a geometry', () => {
+    const geometry = new PlaneGeometry(2, 2);
+    const [one, other] = [square(0, geometry), square(1, geometry)];
+    set(0, 1);
+    frame();
+    set(1);
+    frame();
+    frame(250);
+    expect([one, other].map(share)).toEqual([0.5, 1]);
+    frame(250);
+    expect([one, other].map(share)).toEqual([0, 1]);
+    expect(one.geometry).toBe(geometry);
+    expect(Object.keys(other.geometry.attributes)).toContain('position');
   });
 });
 

@@ -162,9 +162,55 @@ describe.skipIf(!chromiumProgram)('lumels', () => {
     }, 60_000);
 
     it('leave what moves to probes, and come back with it', async () => {
-      const lit = { tiles: { 0: { picture: halves(even(3)), revision: 1 } } };
-      const seen = await middles([lit, { moved: 0.5 }, { moved: 0 }]);
-      [3, Math.PI, 3].forEach((value, i) => expect(seen[i][0]).toBeCloseTo(value, 2));
+      const lit = { tiles: { 0: { picture: halves(even(9), 16), revision: 1 } } };
+      const [half, whole] = [{ after: 250 }, { after: 500 }];
+      const seen = await middles([lit, { moved: 0.5 }, half, half, half, { moved: 0 }, half, whole]);
+      const between = (9 + Math.PI) / 2;
+      const expected = [9, 9, between, Math.PI, Math.PI, Math.PI, between, 9];
+      expected.forEach((value, i) => expect(seen[i][0]).toBeCloseTo(value, 2));
+    }, 60_000);
+
+    it('make a share of the light while layouts change, on both sides', async () => {
+      const lit = {
+        tiles: {
+          0: { picture: halves(even(9), 16), revision: 1 },
+          3: { picture: halves(even(5), 16), revision: 1 },
+        },
+      };
+      const seen = await rows([
+        { ...lit, named: false },
+        { named: true },
+        { after: 250 },
+        { turned: true, after: 0 },
+        { turned: false, strengths: { static: 0.5, dynamic: 0.25 }, after: 0 },
+        { named: false, strengths: { static: 1, dynamic: 1 }, after: 0 },
+        { after: 125 },
+        { after: 125 },
+      ]);
+      const share = (part: number, lumels: number) => part * lumels + (1 - part) * Math.PI;
+      const expected = [
+        ...[share(0, 9), share(0, 9), share(0.5, 9), share(0.5, 5)],
+        ...[0.5 * 0.5 * 9 + 0.5 * 0.25 * Math.PI, share(0.5, 9), share(0.25, 9), share(0, 9)],
+      ];
+      // From below, left is right.
+      expected.forEach((value, i) => {
+        expect(seen[i][i === 3 ? SIZE - MIDDLE : MIDDLE][0] * Math.PI).toBeCloseTo(value, 2);
+      });
+      expect(opened.complaints).toEqual([]);
+    }, 60_000);
+
+    it('come evenly: at 60 Hz a thirtieth of the way a frame', async () => {
+      const lit = { tiles: { 0: { picture: halves(even(9), 16), revision: 1 } } };
+      const frames = Array.from({ length: 31 }, () => ({}));
+      const [first, ...seen] = await middles([{ ...lit, named: false }, { named: true }, ...frames]);
+      // The last one is without lumels.
+      seen.pop();
+      const way = 9 - Math.PI;
+      seen.forEach(([value], i) => {
+        expect(value).toBeCloseTo(Math.PI + Math.min(i / 30, 1) * way, 2);
+        expect(Math.abs(value - (seen[i - 1] ?? first)[0])).toBeLessThan(way / 30 + 0.01);
+      });
+      expect(seen.at(-1)![0]).toBeCloseTo(9, 2);
     }, 60_000);
 
     it('are seen as a checkerboard', async () => {

@@ -8,6 +8,7 @@ import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { preview, type PreviewServer } from 'vite';
 import { launchBrowser } from '../../testing/chromium.js';
 import { buildPage, difference, draw, look, onScreen, openPage, type Pixel, shoot } from './browser.js';
+import { lit, POINTS, seen, setStrengths, settled, STILL, SURFACES } from './lumels.js';
 import { freePort, lumencastProgram, Server } from './server.js';
 
 const VIEWPORT = { width: 760, height: 560 };
@@ -56,41 +57,7 @@ async function open(light: string, renderer: 'webgl' | 'webgpu'): Promise<Page> 
   return page;
 }
 
-const setStrengths = (page: Page, still: number, moving: number) =>
-  page.evaluate(
-    ([still, moving]) => {
-      Object.assign(window.lumencast!.light.strengths, { static: still, dynamic: moving });
-    },
-    [still, moving],
-  );
-
 const brightness = (pixels: readonly Pixel[]) => pixels.flat().reduce((sum, value) => sum + value, 0);
-
-/** Points of the room's surfaces that lumels light: walls, floor and ceiling. */
-const SURFACES = [
-  ['the wall behind', [0.4, 1.2, -1]],
-  ['the left wall', [-1, 1.2, 0]],
-  ['the right wall', [1, 1.2, 0]],
-  ['the floor', [0.1, 0, 0.7]],
-  ['the ceiling', [0.6, 2, -0.2]],
-] as const;
-
-/** Surfaces at these points. */
-async function seen(page: Page, points: readonly (readonly [number, number, number])[]): Promise<Pixel[]> {
-  const at = await Promise.all(points.map((point) => onScreen(page, point)));
-  await settled(page);
-  return page.evaluate((at) => window.lumencast!.pixels(at), at);
-}
-
-/** Lets changes reach the picture: WebGPURenderer takes those of lamps over once a frame of the browser. */
-function settled(page: Page): Promise<void> {
-  return page.evaluate(async () => {
-    for (let i = 0; i < 2; i++) {
-      await new Promise(requestAnimationFrame);
-      window.lumencast!.viewer.draw();
-    }
-  });
-}
 
 /** Points all over the picture, with one part of the light shown. */
 async function seenAll(page: Page, shown: 'both' | 'indirect'): Promise<Pixel[]> {
@@ -109,15 +76,14 @@ describe.each(['webgl', 'webgpu'] as const)('drawn by %s, a room', (renderer) =>
   afterAll(() => page?.close());
 
   it('is lit by lumels, and what has none by probes', async () => {
-    const points = SURFACES.map(([, point]) => point);
     // Indirect light alone, without that of lumels, and without that of probes.
     await page.evaluate(() => window.lumencast!.setMode('indirect'));
-    const all = await seen(page, points);
+    const all = await seen(page);
     await setStrengths(page, 0, 1);
-    const dark = await seen(page, points);
+    const dark = await seen(page);
     const byProbes = await seenAll(page, 'indirect');
     await setStrengths(page, 1, 0);
-    expect(await seen(page, points)).toEqual(all);
+    expect(await seen(page)).toEqual(all);
     const byLumels = await seenAll(page, 'indirect');
     await setStrengths(page, 1, 1);
     SURFACES.forEach(([name], i) => {
@@ -132,9 +98,8 @@ describe.each(['webgl', 'webgpu'] as const)('drawn by %s, a room', (renderer) =>
 
   it('stands still where its light is the same by lumels and by probes, but for leaks', async () => {
     const other = await open('probes.light', renderer);
-    const points = SURFACES.map(([, point]) => point);
     for (const at of [page, other]) await at.evaluate(() => window.lumencast!.setMode('both'));
-    const [lumels, probes] = [await seen(page, points), await seen(other, points)];
+    const [lumels, probes] = [await seen(page), await seen(other)];
     await shoot(page, `lumels-${renderer}.png`);
     await shoot(other, `probes-${renderer}.png`);
     expect(difference(lumels, probes)).toBeLessThan(0.15);
@@ -183,16 +148,16 @@ describe.each(['webgl', 'webgpu'] as const)('drawn by %s, a room', (renderer) =>
   it('has strengths on sliders', async () => {
     await page.keyboard.press('l');
     await draw(page);
-    const points = [SURFACES[0][1]];
-    const [[bright]] = await seen(page, points);
+    const wall = POINTS.slice(0, 1);
+    const [[bright]] = await seen(page, wall);
     const slide = (name: string, value: string) => page.fill(`.lumels [aria-label="${name}"]`, value);
     await slide('Static', '0.5');
     await draw(page);
     expect(await page.innerText('.lumels')).toContain('50 %');
-    const [[dim]] = await seen(page, points);
+    const [[dim]] = await seen(page, wall);
     expect(dim).toBeLessThan(0.9 * bright);
     await slide('Dynamic', '0.1');
-    const [[same]] = await seen(page, points);
+    const [[same]] = await seen(page, wall);
     expect(same).toBe(dim);
     await slide('Static', '1');
     await slide('Dynamic', '1');
@@ -200,24 +165,17 @@ describe.each(['webgl', 'webgpu'] as const)('drawn by %s, a room', (renderer) =>
   });
 
   it('gives what is moved by hand to probes, and its lumels back', async () => {
-    const lit = () =>
-      page.evaluate(() => {
-        const { light, scene, viewer } = window.lumencast!;
-        scene.updateMatrixWorld();
-        viewer.draw();
-        return light.lumelMeshes;
-      });
     const move = (by: number) =>
       page.evaluate((by) => {
         const box = window.lumencast!.scene.getObjectByName('tall_box')!;
         box.position.x += by;
         box.updateMatrixWorld(true);
       }, by);
-    expect(await lit()).toBe(4);
+    expect(await lit(page)).toBe(STILL);
     await move(0.2);
-    expect(await lit()).toBe(3);
+    await expect.poll(() => lit(page)).toBe(STILL - 1);
     await move(-0.2);
-    expect(await lit()).toBe(4);
+    expect(await lit(page)).toBe(STILL);
   });
 
   it('goes without them when the light does', async () => {
@@ -235,7 +193,7 @@ describe.each(['webgl', 'webgpu'] as const)('drawn by %s, a room', (renderer) =>
       light.dispose();
       return [before, count()];
     });
-    expect(charted).toEqual([4, 0]);
+    expect(charted).toEqual([STILL, 0]);
     expect(errors).toEqual([]);
   });
 });

@@ -34,6 +34,10 @@ export interface Step {
   readonly strengths?: { static: number; dynamic: number };
   readonly preExposure?: number;
   readonly show?: 'both' | 'direct';
+  /** Milliseconds since the last picture, a frame's unless told. */
+  readonly after?: number;
+  /** Whether the layout names the left floor. */
+  readonly named?: boolean;
   /** Metres that the left floor is moved along z, though nobody has told the server. */
   readonly moved?: number;
   /** The left floor is seen from below, where it has the lumels of its back. */
@@ -77,16 +81,18 @@ export async function lumels(kind: Drawer, steps: readonly Step[]): Promise<Radi
     kind: 'lightmap',
     shape: { coding: 'halves', pageSize: PAGE, pages: 1, layout: '0'.repeat(64) },
   } as const;
-  const layout: LightmapLayout = {
-    pageSize: PAGE,
-    pages: 1,
+  const nothing: LightmapLayout = { pageSize: PAGE, pages: 1, surfaces: [] };
+  const both: LightmapLayout = {
+    ...nothing,
     surfaces: [false, true].map((back) => ({
       ...{ node: 0, copy: 0, primitive: 0, back, charts: CHARTS },
       // The back's lumels lie in the last tile.
       rectangles: [{ page: 0, x: back ? TILE : 0, y: back ? TILE : 0 }],
     })),
   };
+  let layout = both;
   let lightmap: LightmapLight | undefined;
+  let now = 0;
   const fields = () => (lightmap ? [lightmap, volume] : [volume]);
   const of = {
     ...session({ fields: [], age: 0 }, [field, volume.field]),
@@ -112,6 +118,7 @@ export async function lumels(kind: Drawer, steps: readonly Step[]): Promise<Radi
     }
     const all = [...regions.values()];
     const scale = Math.max(...all.map(({ picture }) => picture.scale));
+    if (step.named !== undefined) layout = step.named ? both : nothing;
     if (all.length > 0)
       lightmap = {
         ...{ kind: 'lightmap', field, layout, regions: all, scale },
@@ -129,7 +136,7 @@ export async function lumels(kind: Drawer, steps: readonly Step[]): Promise<Radi
     }
     // What has moved is known by its matrix, which is the last picture's.
     scene.updateMatrixWorld();
-    light.update(camera);
+    light.update(camera, (now += step.after ?? 1000 / 60));
     rows.push(await middleRow(renderer, scene, camera));
   }
   light.dispose();

@@ -1,0 +1,152 @@
+/**
+ * Light at lumels, live: a real server casts it as video, real pages decode and draw it, also while things
+ * are moved and after the server's death.
+ */
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import type { Browser, Page } from 'playwright-core';
+import { afterAll, beforeAll, expect, it, vi } from 'vitest';
+import { launchBrowser } from '../../testing/chromium.js';
+import { buildPage, difference, look, openPage, PATIENCE, settle, shoot } from './browser.js';
+import { lit, seen, setStrengths, STILL, SURFACES } from './lumels.js';
+import { freePort, lumencastProgram, Server } from './server.js';
+
+/** Small: every pixel is drawn by the processor. */
+const VIEWPORT = { width: 400, height: 300 };
+
+const program = lumencastProgram();
+
+let folder: string;
+let browser: Browser;
+let server: Server;
+let page: Page;
+const errors: string[] = [];
+
+/** Few probes, lumels and samples leave some of the processor to the pages. */
+const start = (port: number) =>
+  Server.start(program, 'cornell', port, [
+    ...['--page', folder, '--samples', '4..16', '--volume', '4x4x4', '--lightmap', '64'],
+  ]);
+
+/** The page at an exposure that suits lumels, and all that stands still lit by these. */
+async function open(renderer: 'webgl' | 'webgpu'): Promise<Page> {
+  const page = await openPage(browser, server.address, VIEWPORT, { renderer }, errors);
+  await page.evaluate(() => (window.lumencast!.viewer.exposure = 2 ** -1));
+  await vi.waitFor(async () => expect(await lit(page)).toBe(STILL), { timeout: PATIENCE, interval: 100 });
+  return page;
+}
+
+/** Pictures are compared with each other: nothing is to move by itself. */
+const stopTheBall = () =>
+  page.evaluate(() =>
+    window.lumencast!.light.edit({ edit: 'set_animation', animation: 0, playing: false, time: 0 }),
+  );
+
+/** Kinds of the pictures of lumels, and how many there have been. */
+const pictures = () =>
+  page.evaluate(() => {
+    const { fields } = window.lumencast!.session.light();
+    const regions = fields.flatMap((field) => (field.kind === 'lightmap' ? field.regions : []));
+    return {
+      kinds: regions.map(({ picture }) => picture.kind),
+      revision: Math.max(0, ...regions.map(({ revision }) => revision)),
+    };
+  });
+
+/** Checks that the walls' indirect light is that of lumels. */
+async function expectLumelsOnWalls(): Promise<void> {
+  await page.evaluate(() => window.lumencast!.setMode('indirect'));
+  const bright = await seen(page);
+  await setStrengths(page, 0, 1);
+  const dark = await seen(page);
+  await setStrengths(page, 1, 1);
+  await page.evaluate(() => window.lumencast!.setMode('both'));
+  SURFACES.forEach(([name], i) => {
+    expect(Math.max(...bright[i]), name).toBeGreaterThan(40);
+    expect(Math.max(...dark[i]), name).toBeLessThan(4);
+  });
+}
+
+beforeAll(async () => {
+  folder = mkdtempSync(join(tmpdir(), 'lumencast-lumels-live-'));
+  await buildPage(folder);
+  browser = await launchBrowser();
+  server = await start(await freePort());
+  page = await open('webgl');
+  await stopTheBall();
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await server?.kill();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+it('comes as video, and lights what stands still', async () => {
+  const first = await pictures();
+  expect(first.kinds).toEqual(['planes']);
+  await expectLumelsOnWalls();
+  await expect.poll(async () => (await pictures()).revision).toBeGreaterThan(first.revision);
+  expect(errors).toEqual([]);
+});
+
+it('is the same on two pages, whatever draws them', async () => {
+  const other = await open('webgpu');
+  await settle(page, 75);
+  await expect.poll(async () => difference(await seen(page), await seen(other))).toBeLessThan(0.03);
+  // Edges of what is drawn differ by renderer.
+  expect(difference(await look(page, 'both'), await look(other, 'both'))).toBeLessThan(0.05);
+  await shoot(page, 'lumels-live-webgl.png');
+  await shoot(other, 'lumels-live-webgpu.png');
+  await other.close();
+});
+
+it('leaves what is moved, and comes back where it is put down', async () => {
+  const [node, home] = await page.evaluate(() => {
+    const { light, scene } = window.lumencast!;
+    const box = scene.getObjectByName('tall_box')!;
+    return [light.content.nodeOf(box)!, box.position.toArray()] as const;
+  });
+  const move = (by: number) =>
+    page.evaluate(
+      ([node, [x, y, z], by]) =>
+        window.lumencast!.light.edit({ edit: 'move_node', node, translation: [x + by, y, z] }),
+      [node, home, by] as const,
+    );
+  for (const by of [0.15, 0]) {
+    // It is moved about until it has lost its lumels, however late that shows.
+    let steps = 0;
+    const moved = async () => {
+      await move(0.05 + 0.05 * (steps++ % 2));
+      return lit(page);
+    };
+    await expect.poll(moved).toBe(STILL - 1);
+    await move(by);
+    await expect.poll(() => lit(page)).toBe(STILL);
+  }
+  expect(errors).toEqual([]);
+});
+
+it('stays when the server dies, and goes on when it is back', async () => {
+  await settle(page, 75);
+  const before = await look(page, 'both');
+  const { port } = server;
+  const epoch = () => page.evaluate(() => window.lumencast!.session.catalog!.epoch);
+  const [former, { revision }] = [await epoch(), await pictures()];
+  await server.kill();
+  await page.waitForSelector('.notice.standing');
+  expect(difference(before, await look(page, 'both'))).toBeLessThan(0.05);
+  expect(await lit(page)).toBe(STILL);
+  await expectLumelsOnWalls();
+
+  server = await start(port);
+  await expect.poll(epoch).not.toBe(former);
+  await stopTheBall();
+  await expect.poll(async () => (await pictures()).revision).toBeGreaterThan(revision);
+  await expect.poll(() => lit(page)).toBe(STILL);
+  await settle(page, 75);
+  expect((await pictures()).kinds).toEqual(['planes']);
+  await expectLumelsOnWalls();
+  expect(difference(before, await look(page, 'both'))).toBeLessThan(0.25);
+});
