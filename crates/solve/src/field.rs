@@ -52,7 +52,7 @@ impl FieldSolver {
     pub(crate) fn arriving(&self) -> Field {
         match self {
             Self::Volume(volume) => volume.arriving().clone().into(),
-            Self::Lightmap(lightmap) => lightmap.lightmap().clone().into(),
+            Self::Lightmap(lightmap) => lightmap.dark().into(),
         }
     }
 

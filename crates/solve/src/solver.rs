@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use lumencast_charts::LaidOut;
 use lumencast_gather::{Gathered, Job};
-use lumencast_light::{Field, FieldId, Light, ProbeVolume};
+use lumencast_light::{Field, FieldId, Light, Lightmap, ProbeVolume};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::error::SolveError;
@@ -145,15 +145,18 @@ impl Solver {
         let seed = (turn.pass << 8 | low) ^ (high << 40);
         let solver = self.field_mut(field)?;
         let probes = solver.probe_count();
-        let (job, is_turn) = match (solver, turn.lumels) {
+        let (job, what) = match (solver, turn.lumels) {
             (FieldSolver::Lightmap(lightmap), Some(samples)) => {
-                (lightmap.next_job(scene.clone(), samples), true)
+                let (job, budgets) = lightmap.next_job(scene.clone(), samples);
+                (job, What::Lumels { budgets })
             }
-            (solver, _) => (solver.job(scene.clone(), turn.samples), false),
+            (solver, _) => {
+                let job = solver.job(scene.clone(), turn.samples);
+                let budgets = job.budgets.clone();
+                (job, What::Light { budgets, probes })
+            }
         };
         let job = Job { previous: turn.previous, bounces, clamp, seed, ..job };
-        let budgets = job.budgets.clone();
-        let what = if is_turn { What::Lumels { budgets } } else { What::Light { budgets, probes } };
         Some(Request { job, asked: Asked { field, what } })
     }
 
@@ -175,16 +178,11 @@ impl Solver {
     /// another one.
     pub fn follow(&mut self, scene: &Snapshot) -> Vec<FieldId> {
         let mut others = Vec::new();
-        for lightmap in self.fields.iter_mut().filter_map(FieldSolver::as_lightmap_mut) {
-            if lightmap.follow(scene) {
-                let fields = self.light.fields_mut().iter_mut();
-                let published = fields.filter_map(Field::as_lightmap_mut);
-                for published in published.filter(|published| published.id == lightmap.id()) {
-                    published.layout = lightmap.lightmap().layout.clone();
-                }
+        self.each_lightmap(|lightmap, published| {
+            if lightmap.follow(scene, published) {
                 others.push(lightmap.id());
             }
-        }
+        });
         others
     }
 
@@ -209,15 +207,12 @@ impl Solver {
         newcomers: &Newcomers,
         laid_out: Option<&LaidOut>,
     ) {
-        let lightmaps = self.fields.iter_mut().filter_map(FieldSolver::as_lightmap_mut);
-        for lightmap in lightmaps.filter(|lightmap| lightmap.id() == newcomers.field) {
-            let laid_out = laid_out.unwrap_or(&newcomers.before);
-            lightmap.extend(scene, laid_out, &newcomers.instances);
-            let published = self.light.fields_mut().iter_mut().filter_map(Field::as_lightmap_mut);
-            for published in published.filter(|published| published.id == newcomers.field) {
-                published.clone_from(lightmap.lightmap());
+        let laid_out = laid_out.unwrap_or(&newcomers.before);
+        self.each_lightmap(|lightmap, published| {
+            if lightmap.id() == newcomers.field {
+                lightmap.extend(scene, laid_out, &newcomers.instances, published);
             }
-        }
+        });
     }
 
     /// The scene was edited: light may be another from now on.
@@ -260,14 +255,16 @@ impl Solver {
 
     /// What arrives at lumels, filtered on the surface.
     pub(crate) fn solve_lightmaps(&mut self) {
+        self.each_lightmap(|lightmap, published| lightmap.solve(true, published));
+    }
+
+    /// Calls `with` for each lightmap, with what is published of it.
+    fn each_lightmap(&mut self, mut with: impl FnMut(&mut LightmapSolver, &mut Lightmap)) {
         for lightmap in self.fields.iter_mut().filter_map(FieldSolver::as_lightmap_mut) {
-            if !lightmap.solve(true) {
-                continue;
-            }
             let fields = self.light.fields_mut().iter_mut();
             let mut published = fields.filter_map(Field::as_lightmap_mut);
-            if let Some(published) = published.find(|known| known.id == lightmap.id()) {
-                published.clone_from(lightmap.lightmap());
+            if let Some(published) = published.find(|published| published.id == lightmap.id()) {
+                with(lightmap, published);
             }
         }
     }

@@ -18,6 +18,8 @@ mod scenes;
 #[cfg(feature = "gpu")]
 mod section;
 mod tick;
+#[cfg(feature = "gpu")]
+mod traced;
 
 use anyhow::Result;
 use clap::Subcommand;

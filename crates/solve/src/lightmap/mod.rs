@@ -5,6 +5,7 @@ mod cells;
 mod fill;
 mod filter;
 mod places;
+mod point;
 mod points;
 mod seams;
 mod sums;
@@ -24,6 +25,7 @@ pub use backs::with_backs;
 use cells::{BLOCK, Block, Cells};
 use filter::{Noisy, REACH, filter};
 use places::{LumelPlace, lumel_places};
+use point::Point;
 pub use points::spread;
 use seams::Seams;
 pub use seams::sides_of_seams;
@@ -50,13 +52,14 @@ struct Moved {
 /// What makes light of lumels' sums.
 #[derive(Clone, Debug)]
 pub struct LightmapSolver {
+    id: FieldId,
     settings: BlendSettings,
     texel: f32,
     cells: Cells,
     /// Lumels that lie on surfaces, by their index among those of all pages; one a receiver, cell by
     /// cell.
     lumels: Arc<[u32]>,
-    receivers: Arc<[Receiver]>,
+    points: Arc<[Point]>,
     /// The receivers of the lumels of all pages.
     receiver_of: Arc<[u32]>,
     sums: Vec<Sum>,
@@ -77,7 +80,6 @@ pub struct LightmapSolver {
     without: BTreeSet<InstanceId>,
     /// The version of the scene that was followed last.
     followed: Option<u64>,
-    lightmap: Lightmap,
 }
 
 impl LightmapSolver {
@@ -94,11 +96,12 @@ impl LightmapSolver {
         let still = scene.instances.iter().filter(|instance| instance.still);
         let ids = still.map(|instance| (instance.node.0, instance.copy));
         Self {
+            id,
             settings,
             texel: laid_out.texel,
             cells,
             lumels: places.iter().map(|place| place.lumel).collect(),
-            receivers: places.iter().map(|p| Receiver::point(p.position, p.normal)).collect(),
+            points: places.iter().map(|p| Point::new(p.position, p.normal)).collect(),
             receiver_of: receiver_of.into(),
             sums: vec![Sum::default(); places.len()],
             seams: Arc::new(Seams::new(scene, &layout)),
@@ -109,13 +112,12 @@ impl LightmapSolver {
             moved: BTreeMap::new(),
             newcomers: BTreeMap::new(),
             followed: None,
-            layout: layout.clone(),
-            lightmap: Lightmap::dark(id, layout),
+            layout,
         }
     }
 
     pub(crate) fn id(&self) -> FieldId {
-        self.lightmap.id
+        self.id
     }
 
     /// Number of lumels that lie on surfaces.
@@ -130,20 +132,25 @@ impl LightmapSolver {
 
     /// What to gather: so many samples a lumel.
     pub fn job(&self, scene: Arc<Snapshot>, samples: u32) -> Job {
-        Job::new(scene, self.receivers.clone(), samples)
+        let receivers: Vec<Receiver> = self.points.iter().map(Point::receiver).collect();
+        Job::new(scene, receivers, samples)
     }
 
     /// What to gather next where light is live: about so many samples in all, of those lumels whose turn
-    /// it is.
-    pub fn next_job(&mut self, scene: Arc<Snapshot>, samples: u64) -> Job {
+    /// it is. The job has these alone; the budgets that come with it tell which they are, for
+    /// [`Self::take`].
+    pub fn next_job(&mut self, scene: Arc<Snapshot>, samples: u64) -> (Job, Vec<Budget>) {
         let budgets = self.cells.budgets(samples, scene.version);
-        Job::with_budgets(scene, self.receivers.clone(), budgets)
+        let point = |budget: &Budget| self.points[budget.receiver as usize].receiver();
+        let receivers: Vec<Receiver> = budgets.iter().map(point).collect();
+        let own = (0..).zip(&budgets).map(|(receiver, of)| Budget { receiver, ..*of });
+        (Job::with_budgets(scene, receivers, own.collect()), budgets)
     }
 
     /// Leaves out of the layout what has moved: its lumels are where it was. What is back where it was,
     /// or has rested where it is until its lumels there were gathered at, has them again. Whether that is
     /// another layout.
-    pub fn follow(&mut self, scene: &Snapshot) -> bool {
+    pub fn follow(&mut self, scene: &Snapshot, shown: &mut Lightmap) -> bool {
         let is_same = self.followed.replace(scene.version) == Some(scene.version);
         if is_same && self.moved.is_empty() && self.newcomers.is_empty() {
             return false;
@@ -161,17 +168,17 @@ impl LightmapSolver {
             is_other |= self.follow_instance(id, now.get(&id).copied(), scene);
         }
         if is_other {
-            self.list_surfaces();
+            shown.layout = self.resting();
         }
         is_other
     }
 
-    /// Publishes where the surfaces lie that have not moved.
-    fn list_surfaces(&mut self) {
+    /// Where the surfaces lie that have not moved.
+    fn resting(&self) -> Arc<Layout> {
         let Layout { page_size, pages, .. } = *self.layout;
         let is_there = |surface: &&Surface| !self.moved.contains_key(&instance_of(surface));
         let surfaces = self.layout.surfaces().iter().filter(is_there).cloned().collect();
-        self.lightmap.layout = Arc::new(Layout::new(page_size, pages, surfaces));
+        Arc::new(Layout::new(page_size, pages, surfaces))
     }
 
     /// Remembers since when instances rest that have no lumels yet.
@@ -203,16 +210,21 @@ impl LightmapSolver {
     /// Has lumels of a layout from now on, which keeps the place of surfaces that there are. What is
     /// known of lumels is kept. Instances that are `tried` and have none in the layout get none; those
     /// that have some show them once they were gathered at.
-    pub(crate) fn extend(&mut self, scene: &Snapshot, laid_out: &LaidOut, tried: &[InstanceId]) {
+    pub(crate) fn extend(
+        &mut self,
+        scene: &Snapshot,
+        laid_out: &LaidOut,
+        tried: &[InstanceId],
+        shown: &mut Lightmap,
+    ) {
         let mut new = Self::new(self.id(), scene, laid_out, self.settings);
         for (receiver, lumel) in new.lumels.iter().enumerate() {
             let before = self.receiver_of.get(*lumel as usize).map_or(usize::MAX, |r| *r as usize);
-            if self.receivers.get(before) == Some(&new.receivers[receiver]) {
+            if self.points.get(before) == Some(&new.points[receiver]) {
                 new.sums[receiver] = self.sums[before];
             }
         }
-        let known = self.lightmap.irradiance.len().min(new.lightmap.irradiance.len());
-        new.lightmap.irradiance[..known].copy_from_slice(&self.lightmap.irradiance[..known]);
+        shown.irradiance.resize(laid_out.layout.lumel_count(), Vec3::ZERO);
         new.without = std::mem::take(&mut self.without);
         new.without.extend(tried.iter().filter(|id| !new.placed.contains_key(id)));
         new.newcomers = std::mem::take(&mut self.newcomers);
@@ -226,7 +238,7 @@ impl LightmapSolver {
         for id in new.moved.keys().copied().collect::<Vec<_>>() {
             new.hurry(id);
         }
-        new.list_surfaces();
+        shown.layout = new.resting();
         *self = new;
     }
 
@@ -266,13 +278,13 @@ impl LightmapSolver {
         let own = self.layout.surfaces().iter().filter(|surface| instance_of(surface) == id);
         let Layout { page_size, pages, .. } = *self.layout;
         let places = lumel_places(scene, &Layout::new(page_size, pages, own.cloned().collect()));
-        let mut receivers = self.receivers.to_vec();
+        let mut points = self.points.to_vec();
         for LumelPlace { lumel, position, normal } in places {
             let receiver = self.receiver_of[lumel as usize] as usize;
-            receivers[receiver] = Receiver::point(position, normal);
+            points[receiver] = Point::new(position, normal);
             self.sums[receiver] = Sum::default();
         }
-        self.receivers = receivers.into();
+        self.points = points.into();
         self.hurry(id);
     }
 
@@ -299,7 +311,7 @@ impl LightmapSolver {
         self.cells.expect_change();
     }
 
-    /// Adds what was gathered; `budgets` are those of the job. What is not finite does not count. Where
+    /// Adds what was gathered; `budgets` tell at which lumels. What is not finite does not count. Where
     /// a cell's lumels together tell that light is another, what was known of the cell is forgotten.
     pub fn take(&mut self, gathered: &Gathered, budgets: &[Budget]) {
         let found: Vec<(usize, Sum)> = budgets
@@ -307,7 +319,7 @@ impl LightmapSolver {
             .zip(gathered.sums.iter())
             .filter_map(|(budget, found)| Some((budget.receiver as usize, Sum::of(&found)?)))
             .collect();
-        let page_size = self.lightmap.layout.page_size;
+        let page_size = self.layout.page_size;
         let cell = |(receiver, _): &(usize, Sum)| self.cells.cell_of(*receiver as u32);
         let of_cells: Vec<&[(usize, Sum)]> = found.chunk_by(|a, b| cell(a) == cell(b)).collect();
         for of_cell in of_cells {
@@ -327,39 +339,37 @@ impl LightmapSolver {
     }
 
     /// Makes light of what has been taken in since the last time: filtered on the surface where
-    /// `filtered`, spread to where nothing is known, and the same on both sides of seams. Whether there
-    /// was anything new.
-    pub fn solve(&mut self, filtered: bool) -> bool {
+    /// `filtered`, spread to where nothing is known, and the same on both sides of seams. `shown` is what
+    /// [`Self::dark`] made, with all that has been solved since.
+    pub fn solve(&mut self, filtered: bool, shown: &mut Lightmap) {
         let news: Vec<Block> = std::mem::take(&mut self.news).into_iter().collect();
         let solved: Vec<Vec<Vec3>> =
             news.par_iter().map(|block| self.solved(block, filtered)).collect();
-        let size = self.lightmap.layout.page_size;
+        let size = self.layout.page_size;
         for (block, light) in news.iter().zip(solved) {
             for (row, light) in (block.corner().y..size).zip(light.chunks(BLOCK as usize)) {
                 let columns = (size - block.corner().x).min(BLOCK) as usize;
                 let at = UVec2::new(block.corner().x, row);
-                let first = self.lightmap.layout.index(block.page, at);
-                self.lightmap.irradiance[first..first + columns].copy_from_slice(&light[..columns]);
+                let first = self.layout.index(block.page, at);
+                shown.irradiance[first..first + columns].copy_from_slice(&light[..columns]);
             }
         }
         let seams = self.seams.about(|lumel| news.binary_search(&Block::of(lumel, size)).is_ok());
         let is_known = |lumel: &u32| self.known(*lumel).is_some_and(|l| l.variance < f32::INFINITY);
         let known: Vec<bool> = seams.lumels().iter().map(is_known).collect();
-        seams.apply(&mut self.lightmap.irradiance, &known);
-        !news.is_empty()
+        seams.apply(&mut shown.irradiance, &known);
     }
 
     /// The light of a block, row by row of [`BLOCK`] lumels, with those about it that count for it.
     fn solved(&self, block: &Block, filtered: bool) -> Vec<Vec3> {
-        let size = self.lightmap.layout.page_size as i32;
+        let size = self.layout.page_size as i32;
         let side = BLOCK + 2 * REACH;
         let low = block.corner().as_ivec2() - REACH as i32;
         let mut window: Vec<Option<Noisy>> = (0..side * side)
             .map(|k| {
                 let at = low + UVec2::new(k % side, k / side).as_ivec2();
                 let is_on_page = at.min_element() >= 0 && at.max_element() < size;
-                let index =
-                    is_on_page.then(|| self.lightmap.layout.index(block.page, at.as_uvec2()));
+                let index = is_on_page.then(|| self.layout.index(block.page, at.as_uvec2()));
                 self.known(index? as u32)
             })
             .collect();
@@ -378,13 +388,10 @@ impl LightmapSolver {
 
     /// What is known of a lumel; nothing where no surface covers it, or where it lies within something.
     fn known(&self, lumel: u32) -> Option<Noisy> {
-        let receiver = self.receiver_of[lumel as usize];
-        let Receiver::Lumel { position, normal, .. } = *self.receivers.get(receiver as usize)?
-        else {
-            return None;
-        };
-        let (irradiance, variance) = self.sums[receiver as usize].known()?;
-        Some(Noisy { position, normal, irradiance, variance })
+        let receiver = self.receiver_of[lumel as usize] as usize;
+        let point = self.points.get(receiver)?;
+        let (irradiance, variance) = self.sums[receiver].known()?;
+        Some(Noisy { position: point.position, normal: point.normal(), irradiance, variance })
     }
 
     /// Irradiances that light has at the lumels that surfaces cover.
@@ -395,9 +402,9 @@ impl LightmapSolver {
             .collect()
     }
 
-    /// The light as it was last solved.
-    pub fn lightmap(&self) -> &Lightmap {
-        &self.lightmap
+    /// The lightmap without light, for [`Self::solve`] to fill.
+    pub fn dark(&self) -> Lightmap {
+        Lightmap::dark(self.id, self.layout.clone())
     }
 }
 

@@ -108,32 +108,32 @@ impl BenchLightmap {
         let start = Instant::now();
         self.gather(&mut solver, &snapshot, &mut tracer)?;
         let gather_seconds = start.elapsed().as_secs_f64();
-        let mut unfiltered = solver.clone();
-        unfiltered.solve(false);
-        let gathered = unfiltered.lightmap();
+        let mut gathered = solver.dark();
+        solver.clone().solve(false, &mut gathered);
         let start = Instant::now();
-        solver.solve(true);
+        let mut lightmap = solver.dark();
+        solver.solve(true, &mut lightmap);
         let filter_seconds = start.elapsed().as_secs_f64();
 
-        let sides = sides_of_seams(&snapshot, solver.lightmap());
+        let sides = sides_of_seams(&snapshot, &lightmap);
         let seam = edges::relative(&sides);
 
         let places = spread(&snapshot, &laid_out.layout, POINTS);
         let reference = self.reference(&places, &snapshot, &mut tracer)?;
         let psnr = |lightmap: &Lightmap| reference.psnr(&places, lightmap);
-        let (as_gathered, filtered) = (psnr(gathered), psnr(solver.lightmap()));
+        let (as_gathered, filtered) = (psnr(&gathered), psnr(&lightmap));
 
-        let coded = Coded::all(solver.lightmap())?;
+        let coded = Coded::all(&lightmap)?;
         let coded_psnr: Vec<f64> = coded.iter().map(|coded| psnr(&coded.shown)).collect();
         let coded: Vec<(Coded, f64)> = coded.into_iter().zip(coded_psnr).collect();
         let sent = coded.iter().find(|(coded, _)| coded.is_default()).map(|(coded, _)| coded);
-        let shown = sent.map_or(solver.lightmap(), |coded| &coded.shown);
+        let shown = sent.map_or(&lightmap, |coded| &coded.shown);
         let seam_codes = edges::codes(&sides_of_seams(&snapshot, shown), reference.white);
         let many = spread(&snapshot, &laid_out.layout, POISON_POINTS);
         let poison = edges::poisoned(shown, &many, reference.white);
 
         let live = match self.live {
-            true => Some(self.live(scene, &laid_out, solver.lightmap(), reference.white)?),
+            true => Some(self.live(scene, &laid_out, &lightmap, reference.white)?),
             false => None,
         };
 
@@ -228,8 +228,9 @@ impl BenchLightmap {
                 let snapshot = edited.snapshot();
                 let mut solver = LightmapSolver::new(FieldId(0), &snapshot, laid_out, MEAN);
                 self.gather(&mut solver, &snapshot, &mut tracer)?;
-                solver.solve(true);
-                Some((edit, solver.lightmap().clone()))
+                let mut lightmap = solver.dark();
+                solver.solve(true, &mut lightmap);
+                Some((edit, lightmap))
             }
         };
         let goals = Goals { before: before.clone(), after, white };

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
+use lumencast_gather::reference::Parts;
 use lumencast_light::Light;
 use lumencast_picture::{Picture, ToneMap};
 use lumencast_scene::{Scene, Snapshot, VolumeSpec};
@@ -19,13 +20,14 @@ use lumencast_solve::Effort;
 
 use super::drawing::{cells, draw};
 use super::judge::{Judge, covered};
+use super::traced::{self, SIZE, Traced};
 use crate::arguments::{Reading, ReadingArguments, VolumeArgument};
 use crate::light_source::Computed;
 use crate::{camera, out_file, output, warnings};
 use reference::References;
 use report::{Fault, Field, Report, Table};
+pub(super) use subjects::SUBJECTS;
 use subjects::{PlaceOfFault, Subject};
-pub(super) use subjects::{SIZE, SUBJECTS};
 
 /// Samples a probe: 64 updates of 512.
 const PROBE_SAMPLES: u32 = 64 * 512;
@@ -42,7 +44,8 @@ Grids are the published ones, over the scenes' bounds, unless others are given. 
 light is gathered and, unless --fit is 0, fitted to surfaces. References are pictures by Mitsuba 3 of
 1024 samples a pixel and 4 bounces, of the first camera. Probes have 3 bounces and 64 × 512 samples
 unless told otherwise. PSNR is of codes v^(1/2.2) clamped to 0 to 1 at exposure 1, over pixels that
-show nothing but surfaces; in brackets after a filter of 4×4 pixels. Faults that the published
+show nothing but surfaces; in brackets after a filter of 4×4 pixels. The indirect part is the picture's
+alone, beside the path tracer's; figures of three.js are its best. Faults that the published
 implementation shows are looked for where it shows them: mean and root mean square of what is too
 much there, in codes of 0 to 255 after the filter.")]
 pub(crate) struct BenchPeers {
@@ -66,6 +69,10 @@ pub(crate) struct BenchPeers {
     /// Bounces of the probes.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=64))]
     bounces: u32,
+    /// Samples a pixel of the path tracer's indirect part.
+    #[arg(long, value_name = "N", default_value_t = 512,
+          value_parser = clap::value_parser!(u32).range(2..=1 << 20))]
+    indirect_spp: u32,
     /// Writes the pictures, and how they differ from the reference, into this folder: grey where
     /// they do not, brighter where they are too bright, twice enlarged.
     #[arg(short, long, value_name = "FOLDER")]
@@ -125,6 +132,13 @@ impl BenchPeers {
         let snapshot = scene.snapshot();
         let judge = Judge::new(reference, covered(renderer, &snapshot, view, settings)?, 1.0)?;
         self.write(subject, "reference", judge.reference())?;
+        let mut traced = {
+            let (scene, snapshot) = (&scene, &snapshot);
+            Traced::new(&traced::Subject { scene, snapshot, view, keep: None }, Parts::Indirect)?
+        };
+        traced.to(self.indirect_spp)?;
+        let covered_pixels = covered(renderer, &snapshot, view, settings)?;
+        let indirect = Judge::new(traced.picture()?, covered_pixels, 1.0)?;
         renderer.set_scene(&snapshot);
         let direct = draw(renderer, view, settings, Lighting::DIRECT)?;
 
@@ -147,6 +161,12 @@ impl BenchPeers {
                     order: grid.order,
                     fit: reading.fit.map(|fit| fit.points),
                     psnr: judge.psnr(&picture)?,
+                    indirect: indirect.psnr(&draw(
+                        renderer,
+                        view,
+                        settings,
+                        Lighting::INDIRECT,
+                    )?)?,
                     faults: faults(subject, &judge, &picture),
                 });
             }

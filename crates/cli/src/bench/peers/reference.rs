@@ -7,7 +7,8 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use lumencast_picture::{Loaded, Picture};
 
-use super::subjects::{SIZE, Subject};
+use super::subjects::Subject;
+use crate::bench::traced::SIZE;
 use crate::output::tell;
 
 /// Mitsuba's arguments for samples a pixel and bounces.

@@ -5,7 +5,7 @@ use std::fmt::{self, Write};
 use lumencast_light::Order;
 use serde::Serialize;
 
-use super::subjects::Published;
+use super::subjects::{Published, Rival};
 use crate::bench::judge::{Deviation, Psnr};
 
 #[derive(Serialize)]
@@ -33,6 +33,8 @@ pub(super) struct Field {
     /// Points a probe that it is fitted to, if it is.
     pub(super) fit: Option<u32>,
     pub(super) psnr: Psnr,
+    /// Of its indirect part alone, beside the path tracer's.
+    pub(super) indirect: Psnr,
     pub(super) faults: Vec<Fault>,
 }
 
@@ -57,8 +59,11 @@ impl Report {
 
 impl Table {
     fn write(&self, out: &mut String) -> fmt::Result {
-        let Published { as_it_comes, best_settings } = self.published;
+        let Published { as_it_comes, best_settings, three } = self.published;
         writeln!(out, "{}\n  published: {as_it_comes}, best {best_settings}", self.scene)?;
+        for Rival { name, whole, indirect } in three {
+            writeln!(out, "  three.js r187, {name}: {whole}, indirect part {indirect}")?;
+        }
         writeln!(out, "  without indirect light: {}", self.without_indirect)?;
         for field in &self.fields {
             let above = field.psnr.sharp - best_settings.sharp;
@@ -68,6 +73,7 @@ impl Table {
             };
             let order = u8::from(field.order);
             writeln!(out, "  {} L{order}, {how}: {}, {above:+.1}", field.grid, field.psnr)?;
+            writeln!(out, "    indirect part {}", field.indirect)?;
             for Fault { fault, deviation: Deviation { mean, rms } } in &field.faults {
                 let [r, g, b] = mean.to_array();
                 writeln!(out, "    {fault}: {r:+.1} {g:+.1} {b:+.1}, rms {rms:.1}")?;

@@ -5,9 +5,6 @@ use serde::Serialize;
 
 use crate::bench::judge::Psnr;
 
-/// The pictures' width and height, pixels.
-pub(in crate::bench) const SIZE: UVec2 = UVec2::new(320, 180);
-
 /// A scene of the protocol.
 #[derive(Debug)]
 pub(in crate::bench) struct Subject {
@@ -22,11 +19,21 @@ pub(in crate::bench) struct Subject {
     pub(super) places: &'static [PlaceOfFault],
 }
 
-/// What the published implementation reaches.
+/// What the published implementation reaches, and three.js r187.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct Published {
     pub(super) as_it_comes: Psnr,
     pub(super) best_settings: Psnr,
+    pub(super) three: [Rival; 3],
+}
+
+/// What a way of three.js to compute indirect light reaches, by settings that suit it best.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct Rival {
+    pub(super) name: &'static str,
+    /// The whole picture, and its indirect part alone beside the path tracer's.
+    pub(super) whole: Psnr,
+    pub(super) indirect: Psnr,
 }
 
 /// A part of the picture.
@@ -44,7 +51,15 @@ pub(in crate::bench) const SUBJECTS: [Subject; 3] = [
         name: "cornell",
         file: "cornell/CornellBoxPoint.glb",
         cells: UVec3::splat(8),
-        published: Published { as_it_comes: psnr(33.8, 35.1), best_settings: psnr(33.8, 35.1) },
+        published: Published {
+            as_it_comes: psnr(33.8, 35.1),
+            best_settings: psnr(33.8, 35.1),
+            three: [
+                rival("VXGIVolume", psnr(29.9, 30.4), psnr(27.4, 28.0)),
+                rival("LightProbeGrid", psnr(36.5, 38.9), psnr(34.5, 37.5)),
+                rival("LightMapper", psnr(36.5, 38.9), psnr(34.3, 37.4)),
+            ],
+        },
         places: &[
             place("red on the tall box's front", [126, 80], [162, 150]),
             place("short box dark, for probes within it", [158, 122], [202, 164]),
@@ -56,7 +71,15 @@ pub(in crate::bench) const SUBJECTS: [Subject; 3] = [
         name: "breakfast",
         file: "breakfast_room/BreakfastRoom.glb",
         cells: UVec3::new(8, 4, 8),
-        published: Published { as_it_comes: psnr(16.5, 17.8), best_settings: psnr(20.7, 25.0) },
+        published: Published {
+            as_it_comes: psnr(16.5, 17.8),
+            best_settings: psnr(20.7, 25.0),
+            three: [
+                rival("VXGIVolume", psnr(24.8, 27.3), psnr(22.7, 24.5)),
+                rival("LightProbeGrid", psnr(24.1, 26.2), psnr(22.6, 23.2)),
+                rival("LightMapper", psnr(22.3, 24.3), psnr(18.6, 19.4)),
+            ],
+        },
         places: &[
             place("bright strip along the left joint of walls", [42, 6], [48, 54]),
             place("bright strip along the right joint of walls", [260, 100], [270, 148]),
@@ -71,7 +94,15 @@ pub(in crate::bench) const SUBJECTS: [Subject; 3] = [
         name: "sponza",
         file: "sponza/Sponza.glb",
         cells: UVec3::new(10, 6, 7),
-        published: Published { as_it_comes: psnr(21.5, 23.3), best_settings: psnr(21.8, 23.8) },
+        published: Published {
+            as_it_comes: psnr(21.5, 23.3),
+            best_settings: psnr(21.8, 23.8),
+            three: [
+                rival("VXGIVolume", psnr(26.5, 28.6), psnr(26.7, 28.1)),
+                rival("LightProbeGrid", psnr(24.1, 25.0), psnr(24.4, 24.9)),
+                rival("LightMapper", psnr(22.6, 23.4), psnr(22.2, 22.7)),
+            ],
+        },
         places: &[
             place("red drape darkened", [62, 80], [98, 160]),
             place("green drape darkened", [226, 80], [260, 150]),
@@ -87,6 +118,10 @@ pub(in crate::bench) const SUBJECTS: [Subject; 3] = [
 
 const fn psnr(sharp: f64, filtered: f64) -> Psnr {
     Psnr { sharp, filtered }
+}
+
+const fn rival(name: &'static str, whole: Psnr, indirect: Psnr) -> Rival {
+    Rival { name, whole, indirect }
 }
 
 const fn place(fault: &'static str, from: [u32; 2], to: [u32; 2]) -> PlaceOfFault {

@@ -8,10 +8,10 @@ mod report;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
-use lumencast_gather::reference::{self, Film, Parts, PictureSettings};
+use lumencast_gather::reference::Parts;
 use lumencast_light::{Field, Layout, Light};
 use lumencast_picture::{Picture, ToneMap, exposure};
 use lumencast_scene::{Edit, Environment, Scene, Snapshot, View};
@@ -22,27 +22,23 @@ use lumencast_solve::{Effort, Spent};
 
 use super::drawing::{cells, draw, sum};
 use super::judge::{Judge, covered};
-use super::peers::{SIZE, SUBJECTS};
+use super::peers::SUBJECTS;
 use super::section::Section;
+use super::traced::{self, BOUNCES, FIRST_SPP, SIZE, Traced};
 use crate::arguments::{
     EffortArguments, FieldsArguments, MOST_SAMPLES, Reading, ReadingArguments, Wanted,
 };
-use crate::film_file::{FilmFile, KeptFilm};
 use crate::light_source::Computed;
 use crate::output::{self, tell};
-use crate::{camera, fingerprint, out_file, warnings};
+use crate::{camera, out_file, warnings};
 use report::{Beside, Report, Row};
 
-/// Bounces of the reference; probes have one fewer.
-const BOUNCES: u32 = 4;
 /// The reference's noise lies so far below the error that it tells, dB.
 const BELOW: f64 = 6.0;
 /// The sky that scenes without light stand under, lux.
 const SKY: f32 = 1000.0;
 /// Light counts as converged at so many times the samples of light that is computed once.
 const LIVE_CONVERGED: u32 = 4;
-/// A reference begins with so many samples a pixel.
-const FIRST_SPP: u32 = 64;
 
 /// Measures the indirect light of scenes at default settings, beside the path tracer's.
 #[derive(Debug, Args)]
@@ -157,12 +153,17 @@ impl BenchScenes {
         settings: &Settings,
     ) -> Result<Row> {
         let covered = covered(renderer, &subject.snapshot, subject.view, settings)?;
-        let mut indirect = Tracing::new(self, &subject, Parts::Indirect)?;
+        let traced = |parts| {
+            let Subject { scene, snapshot, view, .. } = &subject;
+            let keep = self.keep.as_deref();
+            Traced::new(&traced::Subject { scene, snapshot, view: *view, keep }, parts)
+        };
+        let mut indirect = traced(Parts::Indirect)?;
         indirect.to(FIRST_SPP)?;
         let exposure = match subject.exposure {
             Some(exposure) => exposure,
             None => {
-                let mut direct = Tracing::new(self, &subject, Parts::Direct)?;
+                let mut direct = traced(Parts::Direct)?;
                 direct.to(FIRST_SPP)?;
                 exposure(&sum(&direct.picture()?, &indirect.picture()?))
             }
@@ -303,46 +304,4 @@ fn subject(path: &Path) -> Result<Subject> {
         exposure: published.then_some(1.0),
         under_sky,
     })
-}
-
-/// A part of a reference, while it is refined.
-struct Tracing {
-    renderer: reference::Renderer,
-    kept: KeptFilm,
-}
-
-impl Tracing {
-    fn new(bench: &BenchScenes, subject: &Subject, parts: Parts) -> Result<Self> {
-        let settings = PictureSettings {
-            size: SIZE,
-            bounces: BOUNCES,
-            parts,
-            materials: MaterialModel::Lambert,
-            ..PictureSettings::default()
-        };
-        let renderer = reference::Renderer::new(&subject.snapshot, subject.view, settings)
-            .context("cannot start the threads that trace")?;
-        let file = match &bench.keep {
-            Some(folder) => {
-                let key = fingerprint::of(&subject.scene, format!("{BOUNCES} {parts:?}"))?;
-                let file = format!("{}-{key:016x}.film", subject.name);
-                Some(FilmFile { path: folder.join(file), key })
-            }
-            None => None,
-        };
-        Ok(Self { renderer, kept: KeptFilm::begun(file, SIZE, FIRST_SPP) })
-    }
-
-    /// Refines it to so many samples a pixel.
-    fn to(&mut self, samples: u32) -> Result<()> {
-        self.kept.refine(&self.renderer, samples, "Tracing the reference").map(drop)
-    }
-
-    fn film(&self) -> &Film {
-        &self.kept.film
-    }
-
-    fn picture(&self) -> Result<Picture> {
-        Ok(Picture::new(SIZE.x, SIZE.y, self.film().picture())?)
-    }
 }
