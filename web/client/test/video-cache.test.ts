@@ -106,7 +106,7 @@ describe('pictures', () => {
     expect(lightOf(cache, 0)).toMatchObject({ scale: 16, tick: 0, sceneVersion: 5 });
   });
 
-  it('begin their passage when they are first looked at', async () => {
+  it('begin their passage at the look before they came', async () => {
     const server = video();
     const cache = joined(server);
     add(cache, server.step(40)[0], 0);
@@ -115,12 +115,22 @@ describe('pictures', () => {
     add(cache, server.step(50)[0], 0.2);
     expect(shown(cache, 0.25)).toEqual([40, 1]);
     await decoders.answer();
-    // 0.2 seconds after the last began.
-    expect([0.3, 0.4, 0.5].map((now) => shown(cache, now))).toEqual([
+    // 0.15 seconds after the last began.
+    expect([0.25, 0.325, 0.4].map((now) => shown(cache, now))).toEqual([
       [50, 0],
       [50, 0.5],
       [50, 1],
     ]);
+  });
+
+  it('are reached also where each look finds another one', async () => {
+    const server = video();
+    const cache = joined(server);
+    for (let frame = 0; frame < 20; frame++) {
+      add(cache, server.step(frame)[0], 0.25 * frame - TICK);
+      await decoders.answer();
+      expect(shown(cache, 0.25 * frame)).toEqual([frame, 1]);
+    }
   });
 
   it('that came unseen pass as long as they were made', async () => {

@@ -52,7 +52,13 @@ describe.skipIf(!link)('a link that is too slow', () => {
     browser = await launchProgram(link!.wrap(chromiumProgram, join(folder, 'chromium')));
     const [scene, ...options] = SCENE;
     const where = { host: SLOW_ADDRESS, inside: link!.inside };
-    server = await Server.start(program, scene, PORT, [...options, '--page', join(folder, 'page')], where);
+    server = await Server.start(
+      program,
+      scene,
+      PORT,
+      [...options, '--fields', 'volume', '--page', join(folder, 'page')],
+      where,
+    );
   });
 
   // A page that stays open takes its share of the link.

@@ -9,7 +9,7 @@ import type { TileCache } from './tile.js';
 
 /**
  * A page that is coded as video. Its pictures come some time after their frames; the passage to one begins
- * when it is first looked at.
+ * at the last look before it came, so that it gets on with every look, however seldom that is.
  */
 export class VideoTile implements TileCache {
   newest: Arrival | undefined;
@@ -23,7 +23,9 @@ export class VideoTile implements TileCache {
   private run = 0;
   /** The newest frame without a picture, and the update of the picture that it confirms. */
   private confirmed: { readonly arrival: Arrival; readonly picture: number } | undefined;
-  /** Seconds in which the light was made that came since it was last looked at. */
+  /** When it was last looked at. */
+  private looked: number | undefined;
+  /** Seconds in which the light was made that came since then. */
   private unseen: number | undefined;
 
   /** `onLate` is called after `onLight`, which is called outside of {@link add}. */
@@ -101,8 +103,9 @@ export class VideoTile implements TileCache {
   }
 
   at(now: number): LumelRegion | undefined {
-    if (this.unseen !== undefined) this.shown.begin(now, this.unseen);
+    if (this.unseen !== undefined) this.shown.begin(this.looked ?? now, this.unseen);
     this.unseen = undefined;
+    this.looked = now;
     return this.shown.at(now);
   }
 
