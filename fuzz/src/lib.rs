@@ -12,7 +12,7 @@ use glam::{UVec2, UVec3};
 use lumencast_cache::Cache;
 use lumencast_codec::{
     Catalog, ClientEdit, Coding, LayoutResource, LightFile, LightTrack, LumelDecoder, LumelHeader,
-    ProbeDecoder, ProbeHeader, StateFrame, Tile, layout_resources, read_charts,
+    ProbeDecoder, ProbeHeader, StateFrame, layout_resources, read_charts,
 };
 use lumencast_light::{Charts, Layout, OnTriangle, Order, Rectangle, Surface, SurfaceId};
 use lumencast_scene::{Edit, Scene, Script};
@@ -48,7 +48,7 @@ pub fn video_frames(data: &[u8]) {
 }
 
 fn decode_lumels(data: &[u8], coding: Coding, size: UVec2) {
-    let mut decoder = LumelDecoder::new(coding, Tile { id: 0, page: 0, min: UVec2::ZERO, size });
+    let mut decoder = LumelDecoder::new(coding, size);
     // As one frame, and cut in two: the second may be a delta against the first.
     drop(decoder.decode(data));
     let (first, second) = data.split_at(data.len() / 2);

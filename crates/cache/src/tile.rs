@@ -17,13 +17,13 @@ pub(crate) struct TileCache {
 
 impl TileCache {
     pub(crate) fn new(coding: Coding, tile: Tile) -> Self {
-        let decoder = LumelDecoder::new(coding, tile);
+        let decoder = LumelDecoder::new(coding, tile.size);
         Self { coding, tile, decoder, passage: Passage::default() }
     }
 
     /// See [`Passage::forget_updates`].
     pub(crate) fn forget_updates(&mut self) {
-        self.decoder = LumelDecoder::new(self.coding, self.tile);
+        self.decoder = LumelDecoder::new(self.coding, self.tile.size);
         self.passage.forget_updates();
     }
 

@@ -11,8 +11,9 @@
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use glam::{Quat, UVec3, Vec3};
-use lumencast_codec::{DecodeError, ProbeDecoder, ProbeEncoder, RegionLight, UpdateInfo};
+use lumencast_codec::{DecodeError, ProbeDecoder, ProbeEncoder, UpdateInfo};
 use lumencast_light::{FieldId, Grid, Order, ProbeVolume};
+use lumencast_testkit::vectors::fnv;
 use serde_json::{Value, json};
 
 use crate::noise::Noise;
@@ -104,21 +105,12 @@ impl Sequence {
                     "time": header.info.time,
                     "scene_version": header.info.scene_version,
                     "scale_log2": header.scale_log2,
-                    "coefficients": hash(&light),
+                    "coefficients": fnv(&light.coefficients),
                     "first": light.coefficients[0],
                 })
             })
             .collect()
     }
-}
-
-fn hash(light: &RegionLight) -> u32 {
-    light
-        .coefficients
-        .iter()
-        .flat_map(|c| c.to_array())
-        .flat_map(f32::to_le_bytes)
-        .fold(0x811C_9DC5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
 }
 
 fn mutations((index, sequence): (usize, &Sequence)) -> Vec<Value> {
@@ -134,7 +126,7 @@ fn mutations((index, sequence): (usize, &Sequence)) -> Vec<Value> {
             for earlier in &sequence.frames[..frame] {
                 decoder.decode(earlier).expect("a frame of the encoder");
             }
-            let result = decoder.decode(&bytes).ok().map(|light| hash(&light));
+            let result = decoder.decode(&bytes).ok().map(|light| fnv(&light.coefficients));
             json!({ "sequence": index, "frame": frame, "offset": offset, "byte": byte, "coefficients": result })
         })
         .collect()

@@ -15,10 +15,10 @@ use std::sync::Arc;
 use base64::{Engine, prelude::BASE64_STANDARD};
 use glam::{UVec2, Vec3};
 use lumencast_codec::{
-    Coding, DecodeError, LightmapShape, LumelCoding, LumelDecoder, LumelEncoder, TileLight,
-    UpdateInfo,
+    Coding, DecodeError, LightmapShape, LumelCoding, LumelDecoder, LumelEncoder, UpdateInfo,
 };
 use lumencast_light::{FieldId, Layout, Lightmap};
+use lumencast_testkit::vectors::fnv;
 use serde_json::{Value, json};
 
 use crate::noise::Noise;
@@ -123,7 +123,7 @@ fn noise(_: UVec2, _: u64, noise: &mut Noise) -> Vec3 {
 
 impl Sequence {
     fn expected(&self) -> Vec<Value> {
-        let mut decoder = LumelDecoder::of_halves(self.size);
+        let mut decoder = LumelDecoder::new(Coding::Halves, self.size);
         let mut before = None;
         let mut frames = Vec::new();
         for frame in &self.frames {
@@ -137,7 +137,7 @@ impl Sequence {
                 "time": header.info.time,
                 "scene_version": header.info.scene_version,
                 "scale_log2": header.scale_log2,
-                "irradiance": hash(&light),
+                "irradiance": fnv(&light.irradiance),
                 "first": light.irradiance[0],
                 "changed": before.as_ref() != Some(&light.irradiance),
             }));
@@ -145,15 +145,6 @@ impl Sequence {
         }
         frames
     }
-}
-
-fn hash(light: &TileLight) -> u32 {
-    light
-        .irradiance
-        .iter()
-        .flat_map(|lumel| lumel.to_array())
-        .flat_map(f32::to_le_bytes)
-        .fold(0x811C_9DC5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
 }
 
 fn mutations((index, sequence): (usize, &Sequence)) -> Vec<Value> {
@@ -165,11 +156,11 @@ fn mutations((index, sequence): (usize, &Sequence)) -> Vec<Value> {
             let byte = noise.next() as u8;
             let mut bytes = sequence.frames[frame].clone();
             bytes[offset] = byte;
-            let mut decoder = LumelDecoder::of_halves(sequence.size);
+            let mut decoder = LumelDecoder::new(Coding::Halves, sequence.size);
             for earlier in &sequence.frames[..frame] {
                 decoder.decode(earlier).expect("a frame of the encoder");
             }
-            let result = decoder.decode(&bytes).ok().map(|light| hash(&light));
+            let result = decoder.decode(&bytes).ok().map(|light| fnv(&light.irradiance));
             json!({ "sequence": index, "frame": frame, "offset": offset, "byte": byte, "irradiance": result })
         })
         .collect()
@@ -214,7 +205,7 @@ fn malformed() -> Vec<Value> {
     ]
     .into_iter()
     .map(|(name, bytes)| {
-        let error = LumelDecoder::of_halves(UVec2::splat(page)).decode(&bytes);
+        let error = LumelDecoder::new(Coding::Halves, UVec2::splat(page)).decode(&bytes);
         let kind = error.as_ref().map_err(DecodeError::kind).expect_err(name);
         json!({ "name": name, "bytes": BASE64_STANDARD.encode(&bytes), "error": kind })
     })

@@ -202,7 +202,7 @@ impl LightFile {
                 }
                 Shape::Lightmap(shape) => {
                     let Some(tile) = shape.tile(frame.region) else { continue };
-                    let light = LumelDecoder::new(shape.coding, tile).decode(&frame.bytes)?;
+                    let light = LumelDecoder::new(shape.coding, tile.size).decode(&frame.bytes)?;
                     let field = entry.or_insert_with(|| info.dark());
                     let Some(lightmap) = field.as_lightmap_mut() else { continue };
                     let rows = light.irradiance.chunks(tile.size.x as usize);

@@ -2,7 +2,8 @@
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use glam::{UVec2, Vec3};
-use lumencast_codec::{LumelDecoder, TileLight};
+use lumencast_codec::{Coding, LumelDecoder};
+use lumencast_testkit::vectors::fnv;
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -58,24 +59,15 @@ fn bytes(base64: &str) -> Vec<u8> {
     BASE64_STANDARD.decode(base64).expect("base64")
 }
 
-fn fnv(light: &TileLight) -> u32 {
-    light
-        .irradiance
-        .iter()
-        .flat_map(|lumel| lumel.to_array())
-        .flat_map(f32::to_le_bytes)
-        .fold(0x811C_9DC5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
-}
-
 #[test]
 fn frames_decode_to_the_recorded_bits() {
     for sequence in vectors().sequences {
-        let mut decoder = LumelDecoder::of_halves(sequence.size);
+        let mut decoder = LumelDecoder::new(Coding::Halves, sequence.size);
         let mut before = None;
         for frame in sequence.frames {
             let light = decoder.decode(&bytes(&frame.bytes)).expect(&sequence.name);
             let header = light.head;
-            assert_eq!(fnv(&light), frame.irradiance, "{}", sequence.name);
+            assert_eq!(fnv(&light.irradiance), frame.irradiance, "{}", sequence.name);
             assert_eq!(light.irradiance[0], frame.first);
             assert_eq!((header.info.update, header.base), (frame.update, frame.base));
             assert_eq!((header.info.tick, header.info.time), (frame.tick, frame.time));
@@ -93,7 +85,7 @@ fn frames_decode_to_the_recorded_bits() {
 #[test]
 fn malformed_frames_are_refused_with_their_kind() {
     for case in vectors().malformed {
-        let error = LumelDecoder::of_halves(UVec2::splat(9)).decode(&bytes(&case.bytes));
+        let error = LumelDecoder::new(Coding::Halves, UVec2::splat(9)).decode(&bytes(&case.bytes));
         assert_eq!(error.map_err(|e| e.kind()), Err(case.error.as_str()), "{}", case.name);
     }
 }
@@ -103,13 +95,13 @@ fn mutated_frames_decode_alike_or_are_refused_alike() {
     let vectors = vectors();
     for (index, case) in vectors.mutations.iter().enumerate() {
         let sequence = &vectors.sequences[case.sequence];
-        let mut decoder = LumelDecoder::of_halves(sequence.size);
+        let mut decoder = LumelDecoder::new(Coding::Halves, sequence.size);
         for frame in &sequence.frames[..case.frame] {
             decoder.decode(&bytes(&frame.bytes)).expect("a good frame");
         }
         let mut frame = bytes(&sequence.frames[case.frame].bytes);
         frame[case.offset] = case.byte;
-        let result = decoder.decode(&frame).ok().map(|light| fnv(&light));
+        let result = decoder.decode(&frame).ok().map(|light| fnv(&light.irradiance));
         assert_eq!(result, case.irradiance, "mutation {index}");
     }
 }

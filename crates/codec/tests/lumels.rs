@@ -92,7 +92,7 @@ fn check(lightmap: &Lightmap, frames: &[EncodedRegion], decoders: &mut [LumelDec
 }
 
 fn decoders(lightmap: &Lightmap) -> Vec<LumelDecoder> {
-    shape(lightmap).tiles().map(|tile| LumelDecoder::new(Coding::Halves, tile)).collect()
+    shape(lightmap).tiles().map(|tile| LumelDecoder::new(Coding::Halves, tile.size)).collect()
 }
 
 #[test]
@@ -254,7 +254,7 @@ fn deltas_need_the_update_before() {
             encoder.encode(&lightmap, update(u), |_| true).unwrap().remove(0).bytes
         })
         .collect();
-    let mut decoder = LumelDecoder::of_halves(UVec2::splat(64));
+    let mut decoder = LumelDecoder::new(Coding::Halves, UVec2::splat(64));
     let missing = |update, base| Err(DecodeError::MissingBase { update, base });
     let mut decode = |at: usize| decoder.decode(&frames[at]).map(|light| light.head.info.update);
     assert_eq!(decode(1), missing(1, 0));
@@ -266,7 +266,7 @@ fn deltas_need_the_update_before() {
     assert_eq!(decode(3), Ok(9), "numbers may be left out");
     assert_eq!(decode(4), Ok(300), "a base of 255 updates ago is none");
     assert_eq!(LumelHeader::read(&frames[4]).unwrap().base, None);
-    let other = LumelDecoder::of_halves(UVec2::new(64, 63)).decode(&frames[0]);
+    let other = LumelDecoder::new(Coding::Halves, UVec2::new(64, 63)).decode(&frames[0]);
     assert_eq!(other, Err(DecodeError::Mismatch("size")));
 }
 
@@ -278,7 +278,10 @@ fn heads_that_contradict_themselves_are_refused() {
     let turned = |at: usize, byte: u8| {
         let mut turned = frame.clone();
         turned[at] = byte;
-        LumelDecoder::of_halves(UVec2::splat(4)).decode(&turned).map(drop).map_err(|e| e.kind())
+        LumelDecoder::new(Coding::Halves, UVec2::splat(4))
+            .decode(&turned)
+            .map(drop)
+            .map_err(|e| e.kind())
     };
     assert_eq!(turned(0, 1), Ok(()));
     for (at, byte, kind) in [
@@ -298,7 +301,10 @@ fn heads_that_contradict_themselves_are_refused() {
     assert_eq!(LumelHeader::read(&wide).map_err(|e| e.kind()), Err("limit"));
     let mut brightest = frame.clone();
     brightest[14] = 127;
-    assert!(LumelDecoder::of_halves(UVec2::splat(4)).decode(&brightest).is_ok(), "2^127 lux or so");
+    assert!(
+        LumelDecoder::new(Coding::Halves, UVec2::splat(4)).decode(&brightest).is_ok(),
+        "2^127 lux or so"
+    );
     let long = vec![1; limits::FRAME_BYTES + 1];
     assert_eq!(LumelHeader::read(&long).map_err(|e| e.kind()), Err("limit"));
 }
@@ -317,7 +323,7 @@ fn no_bytes_make_a_decoder_panic() {
     }
     // Has had all but the last.
     let decoder = || {
-        let mut decoder = LumelDecoder::of_halves(UVec2::splat(37));
+        let mut decoder = LumelDecoder::new(Coding::Halves, UVec2::splat(37));
         frames[..3].iter().for_each(|frame| drop(decoder.decode(frame).unwrap()));
         decoder
     };
@@ -345,7 +351,7 @@ fn no_bytes_make_a_decoder_panic() {
             assert_eq!(light.irradiance.len(), 37 * 37);
             assert!(light.irradiance.iter().all(|value| value.min_element() >= 0.0));
         }
-        drop(LumelDecoder::of_halves(size).decode(&bytes));
+        drop(LumelDecoder::new(Coding::Halves, size).decode(&bytes));
     }
     assert!(accepted > 8, "mutations that leave a frame decodable are tried too: {accepted}");
 }
@@ -356,7 +362,7 @@ fn what_ends_too_early_is_refused() {
     let lightmap = lightmap(256, 1, smooth(256));
     let frame = encoder(&lightmap).encode(&lightmap, update(0), |_| true).unwrap().remove(0).bytes;
     for length in [17, 18, 23, 1000, frame.len() / 2] {
-        let mut decoder = LumelDecoder::of_halves(UVec2::splat(256));
+        let mut decoder = LumelDecoder::new(Coding::Halves, UVec2::splat(256));
         let error = decoder.decode(&frame[..length]).map_err(|error| error.kind());
         assert!(matches!(error, Err("truncated" | "malformed")), "{length}: {error:?}");
     }

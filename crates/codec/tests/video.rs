@@ -33,7 +33,7 @@ fn encoder(lightmap: &Lightmap, coding: LumelCoding) -> LumelEncoder {
 
 fn decoder(lightmap: &Lightmap, coding: Coding, page: u32) -> LumelDecoder {
     let tile = LightmapShape::of(lightmap, coding).tile(page).expect("a page");
-    LumelDecoder::new(coding, tile)
+    LumelDecoder::new(coding, tile.size)
 }
 
 /// An update every 40 ms.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use glam::Vec3;
 use serde::Deserialize;
 
 /// `vectors/ggx_albedo.json`: what single-scatter GGX reflects of light from everywhere, integrated
@@ -28,4 +29,14 @@ impl GgxAlbedo {
         let text = std::fs::read_to_string(path).expect("vectors/ggx_albedo.json");
         serde_json::from_str(&text).expect("a table of albedos")
     }
+}
+
+/// What vectors hold in place of long lists: the FNV-1a hash (32 bits) of little-endian f32 bits, x, y, z
+/// by turns.
+pub fn fnv(values: &[Vec3]) -> u32 {
+    values
+        .iter()
+        .flat_map(|value| value.to_array())
+        .flat_map(f32::to_le_bytes)
+        .fold(0x811C_9DC5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
 }

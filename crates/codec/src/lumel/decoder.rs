@@ -6,7 +6,6 @@ use super::coding::Coding;
 use super::page_decoder::PageDecoder;
 use super::tile_decoder::TileDecoder;
 use super::tile_light::TileLight;
-use super::tiles::Tile;
 use crate::DecodeError;
 
 /// Decodes the frames of one tile of a lightmap. Holds the newest, which deltas refer to: 6 bytes a
@@ -19,17 +18,12 @@ enum Kind {
 }
 
 impl LumelDecoder {
-    /// For a tile of a lightmap that is coded so, as the catalog says.
-    pub fn new(coding: Coding, tile: Tile) -> Self {
+    /// For a tile of `size` lumels of a lightmap that is coded so, as the catalog says.
+    pub fn new(coding: Coding, size: UVec2) -> Self {
         Self(match coding.packing() {
-            None => Kind::Tile(TileDecoder::new(tile.size)),
-            Some(packing) => Kind::Page(Box::new(PageDecoder::new(tile.size.x, packing))),
+            None => Kind::Tile(TileDecoder::new(size)),
+            Some(packing) => Kind::Page(Box::new(PageDecoder::new(size.x, packing))),
         })
-    }
-
-    /// For a tile of `size` lumels that is coded as halves.
-    pub fn of_halves(size: UVec2) -> Self {
-        Self(Kind::Tile(TileDecoder::new(size)))
     }
 
     /// Decodes a frame. Frames may come in any order and may be missing.

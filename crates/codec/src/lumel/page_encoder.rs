@@ -66,19 +66,16 @@ impl PageEncoder {
         let lumels = self.tile.lumel_count();
         let first = self.tile.page as usize * lumels;
         let page = &lightmap.irradiance[first..first + lumels];
-        let table = self.table.take().filter(|(mapping, _)| {
-            mapping.scale_log2 == scale_log2
-                && (mapping.suits(page) || *mapping == Mapping::of(page, scale_log2))
-        });
+        let before = self.table.as_ref().map(|(mapping, _)| *mapping);
+        let suits = |mapping: &Mapping| mapping.scale_log2 == scale_log2 && mapping.suits(page);
+        let mapping = before.filter(suits).unwrap_or_else(|| Mapping::of(page, scale_log2));
         let group = self.group.filter(|group| {
-            table.is_some() && (1..=255).contains(&info.update.wrapping_sub(group.newest))
+            before == Some(mapping) && (1..=255).contains(&info.update.wrapping_sub(group.newest))
         });
-        let (mapping, table) = table.unwrap_or_else(|| {
-            let mapping = Mapping::of(page, scale_log2);
-            (mapping, CodeTable::new(mapping))
-        });
-        let changed = self.planes.follow(page, &table, group.is_none());
-        self.table = Some((mapping, table));
+        let kept = self.table.take().filter(|(known, _)| *known == mapping);
+        let (_, table) =
+            self.table.insert(kept.unwrap_or_else(|| (mapping, CodeTable::new(mapping))));
+        let changed = self.planes.follow(page, table, group.is_none());
         let group = group.filter(|group| {
             let is_long = group.pictures >= GROUP_PICTURES
                 || !(0.0..GROUP_SECONDS).contains(&(info.time - group.began));

@@ -52,7 +52,7 @@ impl Coded {
                 bytes += frame.bytes.len();
                 let tile = shape.tile(frame.region).context("a page that there is not")?;
                 let start = Instant::now();
-                let light = LumelDecoder::new(shape.coding, tile).decode(&frame.bytes)?;
+                let light = LumelDecoder::new(shape.coding, tile.size).decode(&frame.bytes)?;
                 decode_seconds += start.elapsed().as_secs_f64();
                 let rows = light.irradiance.chunks(tile.size.x as usize);
                 for (row, values) in tile.rows(shape.page_size).zip(rows) {
