@@ -54,8 +54,7 @@ impl Handover {
 
     fn turn_to(&mut self, newest: &Arc<Layout>) {
         let Some(before) = self.newest.replace(newest.clone()) else { return };
-        let pages = |layout: &Layout| layout.page_size;
-        if pages(&before) != pages(newest) {
+        if before.page_size != newest.page_size {
             self.passing.clear();
             return;
         }
@@ -70,10 +69,7 @@ impl Handover {
                 Some(_) => {}
             }
         }
-        let is_there = |passing: &Passing| {
-            passing.surface.rectangles.iter().all(|rectangle| rectangle.page < newest.pages)
-        };
-        self.passing.retain(|_, passing| is_there(passing));
+        self.passing.retain(|_, passing| passing.surface.is_on_first(newest.pages));
     }
 
     /// Lets a surface come or leave, from where it is on its way.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use lumencast_codec::{FrameHead, LightTrack, LightmapShape};
-use lumencast_light::{Field, Layout, Light, Lightmap, Surface};
+use lumencast_light::{Field, Layout, Light, Lightmap};
 
 use crate::CacheError;
 use crate::newest::Newest;
@@ -33,11 +33,11 @@ impl LightmapCache {
         };
         let common = lightmap.irradiance.len().min(before.irradiance.len());
         lightmap.irradiance[..common].copy_from_slice(&before.irradiance[..common]);
-        let is_there = |surface: &&Surface| surface.rectangles.iter().all(|r| r.page < pages);
         lightmap.layout = match before.layout.pages == pages {
             true => before.layout.clone(),
             false => {
-                let surfaces = before.layout.surfaces().iter().filter(is_there).cloned();
+                let all = before.layout.surfaces().iter();
+                let surfaces = all.filter(|surface| surface.is_on_first(pages)).cloned();
                 Arc::new(Layout::new(page_size, pages, surfaces.collect()))
             }
         };

@@ -1,7 +1,7 @@
 //! Where the lumels of charts lie on the surface.
 
 use glam::{UVec2, Vec2, Vec3};
-use lumencast_light::Charts;
+use lumencast_light::{Charts, Layout, Rectangle, Surface};
 
 use crate::raster::shares;
 
@@ -40,6 +40,18 @@ pub fn lumels(charts: &Charts) -> Vec<Lumel> {
         }
     }
     best.lumels()
+}
+
+/// The same of a surface on the pages of its layout, each with its index among the lumels of all pages
+/// ([`Layout::index`]).
+pub fn lumels_on_pages<'a>(
+    layout: &'a Layout,
+    surface: &'a Surface,
+) -> impl Iterator<Item = (usize, Lumel)> + 'a {
+    lumels(&surface.charts).into_iter().map(|lumel| {
+        let Rectangle { page, corner } = surface.rectangles[lumel.rectangle as usize];
+        (layout.index(page, corner + lumel.at), lumel)
+    })
 }
 
 /// The number of lumels whose middles lie well within two triangles that share no edge: 0 unless charts

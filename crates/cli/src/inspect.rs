@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::Vec3;
-use lumencast_charts::lumels;
+use lumencast_charts::lumels_on_pages;
 use lumencast_codec::{Catalog, FieldInfo, LightFile, SavedFile, Shape, UnknownField};
 use lumencast_light::{Field, Lightmap, ProbeVolume, luminance};
 use lumencast_picture::{Picture, ToneMap, exposure};
@@ -214,11 +214,9 @@ fn lightmap_statistics(lightmap: &Lightmap) -> Value {
     let layout = &lightmap.layout;
     let mut illuminances = Vec::new();
     for surface in layout.surfaces() {
-        illuminances.extend(lumels(&surface.charts).into_iter().map(|lumel| {
-            let rectangle = surface.rectangles[lumel.rectangle as usize];
-            let index = layout.index(rectangle.page, rectangle.corner + lumel.at);
-            f64::from(luminance(lightmap.irradiance[index]))
-        }));
+        let covered = lumels_on_pages(layout, surface);
+        illuminances
+            .extend(covered.map(|(index, _)| f64::from(luminance(lightmap.irradiance[index]))));
     }
     let sum: f64 = illuminances.iter().sum();
     json!({

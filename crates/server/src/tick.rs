@@ -338,17 +338,20 @@ impl Tick {
     /// Lets lumels of what has moved go.
     fn follow(&mut self, scene: &Snapshot, outlet: &mut dyn Outlet) {
         let others = self.solver.follow(scene);
-        for id in &others {
-            let field = self.solver.light().field(*id);
-            let published = self.published.iter_mut().find(|published| published.id == *id);
-            if let (Some(published), Some(field)) = (published, field) {
+        if !others.is_empty() {
+            self.lay_out(&others, outlet);
+        }
+    }
+
+    /// The surfaces of these fields lie elsewhere, of which clients are told.
+    fn lay_out(&mut self, fields: &[FieldId], outlet: &mut dyn Outlet) {
+        for published in self.published.iter_mut().filter(|known| fields.contains(&known.id)) {
+            if let Some(field) = self.solver.light().field(published.id) {
                 published.lay_out(field);
             }
         }
-        if !others.is_empty() {
-            outlet.resources(self.resources());
-            self.fields_are_news = true;
-        }
+        outlet.resources(self.resources());
+        self.fields_are_news = true;
     }
 
     /// Gives lumels to what came later, once its surfaces are cut into charts.
@@ -359,19 +362,12 @@ impl Tick {
             self.unwrapping.start(newcomers);
         }
         let Some((newcomers, extended)) = self.unwrapping.poll(waits) else { return };
+        let Some(extended) = extended else { return self.solver.leave_without_lumels(&newcomers) };
         let id = newcomers.field();
         // Their lumels are numbered anew.
         self.gathering.keep(|field| field != id);
-        let laid_out = extended.as_ref().map(|extended| &extended.laid_out);
-        self.solver.extend_lightmap(scene, &newcomers, laid_out);
-        if let (Some(published), Some(field)) = (
-            self.published.iter_mut().find(|published| published.id == id),
-            self.solver.light().field(id),
-        ) {
-            published.lay_out(field);
-        }
-        outlet.resources(self.resources());
-        self.fields_are_news = true;
+        self.solver.extend_lightmap(scene, &newcomers, &extended.laid_out);
+        self.lay_out(&[id], outlet);
     }
 
     /// Applies the script's edits that are due and then the clients', each whole or not at all.

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumencast_charts::{LaidOut, laid_out, sheets};
+use lumencast_charts::{LaidOut, laid_out, lumels_on_pages, sheets};
 use lumencast_codec::{
     Catalog, EncodedRegion, Epoch, FrameHead, LayoutResource, LightmapShape, LumelCoding,
     LumelDecoder, Qp, Resource, ResourceHash, read_charts,
@@ -90,6 +90,18 @@ impl Stepped {
         (0..n).for_each(|_| self.step(Mail::default()));
     }
 
+    /// Steps until something is so, which takes two seconds of rest and not many ticks more.
+    fn rest_until(&mut self, is_so: impl Fn(&Self) -> bool) {
+        self.steps((2.0 / PERIOD) as usize - 2);
+        assert!(!is_so(self), "not yet");
+        let mut waited = 0;
+        while !is_so(self) {
+            self.step(Mail::default());
+            waited += 1;
+            assert!(waited < 60, "it has rested for long");
+        }
+    }
+
     fn edit(&mut self, seq: u64, edit: Edit) {
         let received = Received { client: "a".into(), seq, edit, temporary: false };
         let acks = BTreeMap::from([("a".into(), seq)]);
@@ -132,9 +144,7 @@ fn converged(scene: &Arc<Snapshot>) -> Lightmap {
 fn difference(lightmap: &Lightmap, right: &Lightmap) -> f32 {
     let (mut squares, mut sum, mut count) = (0.0, 0.0, 0.0);
     for surface in right.layout.surfaces() {
-        for lumel in lumencast_charts::lumels(&surface.charts) {
-            let rectangle = surface.rectangles[lumel.rectangle as usize];
-            let index = right.layout.index(rectangle.page, rectangle.corner + lumel.at);
+        for (index, _) in lumels_on_pages(&right.layout, surface) {
             let of = |lightmap: &Lightmap| luminance(lightmap.irradiance[index]);
             squares += (of(lightmap) - of(right)).powi(2);
             sum += of(right);
@@ -203,7 +213,7 @@ fn shown(stepped: &Stepped) -> Lightmap {
     let mut shown = stepped.lightmap().clone();
     shown.irradiance.fill(Vec3::ZERO);
     for tile in shape.tiles() {
-        let mut decoder = LumelDecoder::new(shape.coding, tile);
+        let mut decoder = LumelDecoder::new(shape.coding, tile.size);
         let of_tile =
             stepped.kept.frames.iter().filter(|(f, frame)| (*f, frame.region) == (id, tile.id));
         for (_, frame) in of_tile {
@@ -276,15 +286,7 @@ fn what_rests_has_lumels_again() {
     let has = |stepped: &Stepped| stepped.lightmap().layout.surface(id).is_some();
     let home = stepped.shape();
     stepped.edit(2, moved(node, 0.3));
-    let rest = (2.0 / PERIOD) as usize;
-    stepped.steps(rest - 2);
-    assert!(!has(&stepped), "not yet");
-    let mut waited = 0;
-    while !has(&stepped) {
-        stepped.step(Mail::default());
-        waited += 1;
-        assert!(waited < 60, "it has rested for long");
-    }
+    stepped.rest_until(has);
     assert_eq!(stepped.shape(), home, "its lumels lie where they lay on the page");
     stepped.steps(LONG);
 
@@ -330,15 +332,7 @@ fn what_is_added_gets_lumels() {
     stepped.edit(2, add.clone());
     let id = SurfaceId { node: stepped.node("another").0, ..SurfaceId::default() };
     let has = |stepped: &Stepped| stepped.lightmap().layout.surface(id).is_some();
-    let rest = (2.0 / PERIOD) as usize;
-    stepped.steps(rest - 2);
-    assert!(!has(&stepped), "not yet");
-    let mut waited = 0;
-    while !has(&stepped) {
-        stepped.step(Mail::default());
-        waited += 1;
-        assert!(waited < 60, "it has rested for long");
-    }
+    stepped.rest_until(has);
     let layout = stepped.lightmap().layout.clone();
     for surface in before.surfaces() {
         assert_eq!(layout.surface(surface.id), Some(surface));

@@ -191,23 +191,25 @@ impl Solver {
         self.fields.iter().find_map(|field| {
             let lightmap = field.as_lightmap()?;
             let instances = lightmap.newcomers(scene.time);
-            let new = || {
-                let laid_out = lightmap.laid_out();
-                Newcomers::new(lightmap.id(), laid_out, instances.clone(), scene.clone())
-            };
-            (!instances.is_empty()).then(new)
+            if instances.is_empty() {
+                return None;
+            }
+            Some(Newcomers::new(lightmap.id(), lightmap.laid_out(), instances, scene.clone()))
         })
     }
 
-    /// Gives instances that came later the lumels of a layout, or none where there was none for them.
-    /// What was asked for at the field's lumels before must not be taken in any more.
-    pub fn extend_lightmap(
-        &mut self,
-        scene: &Snapshot,
-        newcomers: &Newcomers,
-        laid_out: Option<&LaidOut>,
-    ) {
-        let laid_out = laid_out.unwrap_or(&newcomers.before);
+    /// Leaves instances that came later without lumels.
+    pub fn leave_without_lumels(&mut self, newcomers: &Newcomers) {
+        self.each_lightmap(|lightmap, _| {
+            if lightmap.id() == newcomers.field {
+                lightmap.go_without(&newcomers.instances);
+            }
+        });
+    }
+
+    /// Gives instances that came later the lumels of a layout, as far as it has some for them. What was
+    /// asked for at the field's lumels before must not be taken in any more.
+    pub fn extend_lightmap(&mut self, scene: &Snapshot, newcomers: &Newcomers, laid_out: &LaidOut) {
         self.each_lightmap(|lightmap, published| {
             if lightmap.id() == newcomers.field {
                 lightmap.extend(scene, laid_out, &newcomers.instances, published);

@@ -114,6 +114,11 @@ impl Layout {
 }
 
 impl Surface {
+    /// Whether all of it lies on the first so many pages.
+    pub fn is_on_first(&self, pages: u32) -> bool {
+        self.rectangles.iter().all(|rectangle| rectangle.page < pages)
+    }
+
     /// Where a point of a triangle lies: the page, and lumels from its corner; nothing where it has no
     /// lumels. `weights` are barycentric.
     pub fn at(&self, triangle: u32, weights: Vec3) -> Option<(u32, Vec2)> {

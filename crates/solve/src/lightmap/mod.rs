@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 use glam::{Affine3A, UVec2, Vec3};
-use lumencast_charts::{LaidOut, lumels};
+use lumencast_charts::{LaidOut, lumels_on_pages};
 use lumencast_gather::{Budget, Gathered, Job, Receiver};
 use lumencast_light::{Field, FieldId, Layout, Light, Lightmap, Surface};
 use lumencast_scene::Snapshot;
@@ -207,6 +207,12 @@ impl LightmapSolver {
         LaidOut { layout: Layout::clone(&self.layout), texel: self.texel, coarser: false }
     }
 
+    /// Instances that get no lumels.
+    pub(crate) fn go_without(&mut self, instances: &[InstanceId]) {
+        self.without.extend(instances);
+        self.newcomers.retain(|id, _| !instances.contains(id));
+    }
+
     /// Has lumels of a layout from now on, which keeps the place of surfaces that there are. What is
     /// known of lumels is kept. Instances that are `tried` and have none in the layout get none; those
     /// that have some show them once they were gathered at.
@@ -225,15 +231,17 @@ impl LightmapSolver {
             }
         }
         shown.irradiance.resize(laid_out.layout.lumel_count(), Vec3::ZERO);
+        let (with, without): (Vec<InstanceId>, Vec<InstanceId>) =
+            tried.iter().partition(|id| new.placed.contains_key(id));
         new.without = std::mem::take(&mut self.without);
-        new.without.extend(tried.iter().filter(|id| !new.placed.contains_key(id)));
         new.newcomers = std::mem::take(&mut self.newcomers);
-        new.newcomers.retain(|id, _| !new.placed.contains_key(id) && !new.without.contains(id));
+        new.newcomers.retain(|id, _| !new.placed.contains_key(id));
+        new.go_without(&without);
         new.moved = std::mem::take(&mut self.moved);
         new.moved.retain(|id, _| new.placed.contains_key(id));
-        for id in tried.iter().filter(|id| new.placed.contains_key(id)) {
-            let at = new.placed.get(id).copied();
-            new.moved.insert(*id, Moved { at, since: scene.time });
+        for id in with {
+            let at = new.placed.get(&id).copied();
+            new.moved.insert(id, Moved { at, since: scene.time });
         }
         for id in new.moved.keys().copied().collect::<Vec<_>>() {
             new.hurry(id);
@@ -297,13 +305,8 @@ impl LightmapSolver {
     /// The receivers of an instance's lumels.
     fn receivers_of(&self, id: InstanceId) -> impl Iterator<Item = u32> + '_ {
         let own = self.layout.surfaces().iter().filter(move |surface| instance_of(surface) == id);
-        own.flat_map(|surface| {
-            lumels(&surface.charts).into_iter().map(|lumel| {
-                let rectangle = surface.rectangles[lumel.rectangle as usize];
-                let index = self.layout.index(rectangle.page, rectangle.corner + lumel.at);
-                self.receiver_of[index]
-            })
-        })
+        let lumels = own.flat_map(|surface| lumels_on_pages(&self.layout, surface));
+        lumels.map(|(index, _)| self.receiver_of[index])
     }
 
     /// The scene was edited: light may be another from now on.

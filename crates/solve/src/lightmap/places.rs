@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use glam::{Mat3, Vec3};
+use lumencast_charts::lumels_on_pages;
 use lumencast_light::{Layout, Surface, SurfaceId};
 use lumencast_scene::{Instance, Snapshot, Vertices};
 
@@ -83,10 +84,8 @@ pub(crate) fn surfaces<'a>(
 pub(crate) fn lumel_places(scene: &Snapshot, layout: &Layout) -> Vec<LumelPlace> {
     let mut places = Vec::new();
     for (surface, placed) in surfaces(scene, layout) {
-        places.extend(lumencast_charts::lumels(&surface.charts).into_iter().map(|lumel| {
-            let rectangle = surface.rectangles[lumel.rectangle as usize];
+        places.extend(lumels_on_pages(layout, surface).map(|(index, lumel)| {
             let (position, normal) = placed.at(lumel.triangle, lumel.weights);
-            let index = layout.index(rectangle.page, rectangle.corner + lumel.at);
             LumelPlace { lumel: index as u32, position, normal }
         }));
     }
