@@ -4,10 +4,8 @@ use glam::{IVec2, UVec2, Vec3};
 use lumencast_charts::lumels;
 use lumencast_light::{Lightmap, Place, luminance};
 
-use super::super::quantile;
+use super::display::{code, most};
 
-/// The quantile of a seam's differences that is told.
-const MOST: f64 = 0.99;
 /// Lux over white of lumels that must not be read.
 const POISON: f32 = 1e4;
 
@@ -15,20 +13,15 @@ const POISON: f32 = 1e4;
 pub(super) fn relative(sides: &[[Vec3; 2]]) -> Option<f64> {
     let difference = |sides: &[Vec3; 2]| {
         let [a, b] = sides.map(luminance);
-        let most = a.max(b);
-        (most > 0.0).then(|| f64::from((a - b).abs() / most))
+        let larger = a.max(b);
+        (larger > 0.0).then(|| f64::from((a - b).abs() / larger))
     };
-    of(sides.iter().filter_map(difference).collect())
+    most(sides.iter().filter_map(difference).collect())
 }
 
 /// By how many codes of a display both sides of seams differ.
 pub(super) fn codes(sides: &[[Vec3; 2]], white: f32) -> Option<f64> {
-    of(sides.iter().map(|[a, b]| code_difference(*a, *b, white)).collect())
-}
-
-fn of(mut differences: Vec<f64>) -> Option<f64> {
-    differences.sort_unstable_by(f64::total_cmp);
-    (!differences.is_empty()).then(|| quantile(&differences, MOST))
+    most(sides.iter().map(|[a, b]| code_difference(*a, *b, white)).collect())
 }
 
 /// By how many codes, at most, light at places changes where all lumels glow that are neither covered by
@@ -58,6 +51,6 @@ pub(super) fn poisoned(lightmap: &Lightmap, places: &[Place], white: f32) -> f64
 }
 
 fn code_difference(a: Vec3, b: Vec3, white: f32) -> f64 {
-    let code = |e: Vec3| 255.0 * (e / white).clamp(Vec3::ZERO, Vec3::ONE).powf(1.0 / 2.2);
-    f64::from((code(a) - code(b)).abs().max_element())
+    let codes = |e: Vec3| e.map(|channel| code(channel, white));
+    f64::from((codes(a) - codes(b)).abs().max_element())
 }

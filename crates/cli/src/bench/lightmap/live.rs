@@ -3,15 +3,16 @@
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use lumencast_charts::{Lumel, lumels};
-use lumencast_codec::{Catalog, EncodedRegion, Epoch};
+use lumencast_charts::lumels_on_pages;
+use lumencast_codec::Epoch;
 use lumencast_gather::Gather;
-use lumencast_light::{Layout, Lightmap, Surface, luminance};
+use lumencast_light::{Layout, Lightmap, luminance};
 use lumencast_scene::{Edit, LightSpec, Scene};
-use lumencast_server::{Beat, Mail, Outlet, Received, Tick, TickOptions};
+use lumencast_server::{Beat, Mail, Received, Tick, TickOptions};
 use serde_json::{Value, json};
 
-use super::super::quantile;
+use super::display::{code, most};
+use crate::bench::Nobody;
 use crate::output::{self, say};
 
 /// Seconds of each part.
@@ -126,22 +127,27 @@ impl Cast {
                 break;
             }
             self.beat.start(now);
-            self.tick.step_within(0.0, std::mem::take(&mut mail), &mut Nobody, PATIENCE);
+            self.tick.step_within(
+                0.0,
+                std::mem::take(&mut mail),
+                &mut Nobody { watches: true },
+                PATIENCE,
+            );
             let seconds = self.start.elapsed().as_secs_f64() - began;
             let shown = self.tick.light().lightmaps().next().map_or_else(Vec::new, seen);
             shares.push((seconds, share(&from, &to, &shown)));
             if seconds > SECONDS - CALM {
                 let both = last.iter().zip(&shown);
-                changes.extend(both.map(|(a, b)| (code(*a, white) - code(*b, white)).abs()));
+                changes
+                    .extend(both.map(|(a, b)| f64::from(code(*a, white) - code(*b, white)).abs()));
             }
             last = shown;
             let wait = self.beat.wait(self.start.elapsed().as_secs_f64());
             std::thread::sleep(Duration::from_secs_f64(wait));
         }
-        changes.sort_unstable_by(f64::total_cmp);
-        let flicker = if changes.is_empty() { 0.0 } else { quantile(&changes, 0.99) };
+        let flicker = most(changes).unwrap_or(0.0);
         let squares =
-            last.iter().zip(&to).map(|(a, b)| (code(*a, white) - code(*b, white)).powi(2));
+            last.iter().zip(&to).map(|(a, b)| f64::from(code(*a, white) - code(*b, white)).powi(2));
         let settled =
             20.0 * 255.0f64.log10() - 10.0 * (squares.sum::<f64>() / to.len() as f64).log10();
         Part { shares, settled, flicker }
@@ -158,13 +164,7 @@ impl Part {
 
 /// Some of the lumels that surfaces cover.
 fn covered(layout: &Layout) -> Vec<usize> {
-    let of_surface = |surface: &Surface| -> Vec<usize> {
-        let index = |lumel: Lumel| {
-            let rectangle = surface.rectangles[lumel.rectangle as usize];
-            layout.index(rectangle.page, rectangle.corner + lumel.at)
-        };
-        lumels(&surface.charts).into_iter().map(index).collect()
-    };
+    let of_surface = |surface| lumels_on_pages(layout, surface).map(|(index, _)| index);
     layout.surfaces().iter().flat_map(of_surface).step_by(STRIDE).collect()
 }
 
@@ -176,10 +176,6 @@ fn share(from: &[f32], to: &[f32], shown: &[f32]) -> f64 {
         all += f64::from((to - from) * (to - from));
     }
     if all > 0.0 { along / all } else { 1.0 }
-}
-
-fn code(luminance: f32, white: f32) -> f64 {
-    255.0 * f64::from((luminance / white).clamp(0.0, 1.0).powf(1.0 / 2.2))
 }
 
 impl Live {
@@ -215,19 +211,4 @@ impl Live {
             );
         }
     }
-}
-
-/// An outlet that takes all, and keeps nothing.
-struct Nobody;
-
-impl Outlet for Nobody {
-    fn is_watched(&self, _: u32, _: u32) -> bool {
-        true
-    }
-
-    fn catalog(&mut self, _: &Catalog) {}
-
-    fn state(&mut self, _: Vec<u8>, _: bool) {}
-
-    fn light(&mut self, _: u32, _: EncodedRegion) {}
 }

@@ -1,6 +1,7 @@
 //! `lumencast bench lightmap`: how right the light of lumels is.
 
 mod coded;
+mod display;
 mod edges;
 mod live;
 
@@ -22,8 +23,8 @@ use lumencast_solve::{GatherOptions, LightmapSolver, sides_of_seams, spread};
 use serde_json::json;
 
 use self::coded::Coded;
+use self::display::{code, most};
 use self::live::{Goals, Live};
-use super::quantile;
 use crate::arguments::{LightmapArguments, Materials, SceneSource};
 use crate::charting;
 use crate::output::{self, say};
@@ -333,14 +334,12 @@ impl Reference {
 
 /// The 99th percentile of the largest channels.
 fn white<'a>(irradiances: impl Iterator<Item = &'a Vec3>) -> f32 {
-    let mut values: Vec<f64> = irradiances.map(|e| f64::from(e.max_element())).collect();
-    values.sort_unstable_by(f64::total_cmp);
-    if values.is_empty() { 0.0 } else { quantile(&values, 0.99) as f32 }
+    most(irradiances.map(|e| f64::from(e.max_element())).collect()).unwrap_or(0.0) as f32
 }
 
 /// PSNR of displayed values: gamma 2.2, clamped.
 fn psnr(pairs: impl Iterator<Item = (Vec3, Vec3)>, white: f32) -> f64 {
-    let shown = |e: Vec3| (e / white).clamp(Vec3::ZERO, Vec3::ONE).powf(1.0 / 2.2);
+    let shown = |e: Vec3| e.map(|channel| code(channel, white) / 255.0);
     let (mut squares, mut count) = (0.0, 0);
     for (a, b) in pairs {
         squares += f64::from((shown(a) - shown(b)).length_squared());

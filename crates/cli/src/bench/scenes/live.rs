@@ -1,12 +1,13 @@
 //! A scene's light as a server casts it, some seconds after the server began.
 
 use anyhow::Result;
-use lumencast_codec::{Catalog, EncodedRegion, Epoch};
+use lumencast_codec::Epoch;
 use lumencast_gather::Gather;
 use lumencast_light::Field;
 use lumencast_scene::Scene;
-use lumencast_server::{Mail, Outlet, Tick, TickOptions};
+use lumencast_server::{Mail, Tick, TickOptions};
 
+use crate::bench::Nobody;
 use crate::output;
 
 /// The light of a server's ticks after so many seconds. The scene's time stands still.
@@ -20,24 +21,9 @@ pub(super) fn light(
     let mut tick = Tick::new(scene, gatherer, options, Epoch(0))?;
     let bar = output::bar(ticks, "Ticks");
     for _ in 0..ticks {
-        tick.step(0.0, Mail::default(), &mut Nobody);
+        tick.step(0.0, Mail::default(), &mut Nobody { watches: false });
         bar.inc(1);
     }
     bar.finish_and_clear();
     Ok(tick.light().fields().to_vec())
-}
-
-/// An outlet that takes nothing.
-struct Nobody;
-
-impl Outlet for Nobody {
-    fn is_watched(&self, _: u32, _: u32) -> bool {
-        false
-    }
-
-    fn catalog(&mut self, _: &Catalog) {}
-
-    fn state(&mut self, _: Vec<u8>, _: bool) {}
-
-    fn light(&mut self, _: u32, _: EncodedRegion) {}
 }
