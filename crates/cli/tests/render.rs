@@ -420,7 +420,7 @@ fn light_of_a_server_is_drawn() {
     let script = folder.0.join("lamps.jsonl");
     std::fs::write(&script, lines.concat()).expect("written");
     let how = ["--samples", "256", "--edits", text(&script)];
-    let server = Serving::start("cornell", &[&volume[..], &how].concat());
+    let server = Serving::start("cornell", &[&volume[..], &PROBES_ALONE, &how].concat());
     let url = server.url();
     let nearness = |picture| compare(&baked, &picture, None, 67.0).expect("of one size").psnr;
     // The lamps go on at four seconds, and their light settles.
