@@ -1,11 +1,13 @@
 //! Surfaces of instances that came later, cut into charts beside the ticks.
 
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-use lumencast_charts::{ChartError, Extended, Store};
-use lumencast_solve::Newcomers;
+use lumencast_charts::{Extended, Store};
+use lumencast_gather::path_trace::{CpuPathTracer, Options};
+use lumencast_solve::{Newcomers, SolveError};
 
 /// One cutting at a time, on a thread of its own. It ends when this is dropped.
 #[derive(Default)]
@@ -17,7 +19,7 @@ pub(crate) struct Unwrapping {
 struct UnderWay {
     newcomers: Newcomers,
     goes_on: Arc<AtomicBool>,
-    thread: JoinHandle<Result<Extended, ChartError>>,
+    thread: JoinHandle<Result<Extended, SolveError>>,
 }
 
 impl Unwrapping {
@@ -32,7 +34,11 @@ impl Unwrapping {
     pub(crate) fn start(&mut self, newcomers: Newcomers) {
         let goes_on = Arc::new(AtomicBool::new(true));
         let (store, own, flag) = (self.store.clone(), newcomers.clone(), goes_on.clone());
-        let work = move || own.lay_out(store.as_ref(), &|| flag.load(Ordering::Relaxed));
+        let work = move || {
+            let options = Options { threads: NonZeroUsize::new(1), ..Options::default() };
+            let mut looks = CpuPathTracer::new(options).map_err(|_| SolveError::Gather)?;
+            own.lay_out(store.as_ref(), &mut looks, &|| flag.load(Ordering::Relaxed))
+        };
         match std::thread::Builder::new().name("unwrap".into()).spawn(work) {
             Ok(thread) => self.under_way = Some(UnderWay { newcomers, goes_on, thread }),
             Err(error) => tracing::warn!(%error, "no thread to cut new surfaces into charts"),

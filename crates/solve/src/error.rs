@@ -14,6 +14,9 @@ pub enum SolveError {
         /// What is wrong with it, and what to do.
         reason: String,
     },
+    /// Surfaces that are not cut into charts.
+    #[error(transparent)]
+    Charts(#[from] lumencast_charts::ChartError),
     /// Light that was being computed is not coming.
     #[error("the gatherer gave up a job; its log says why")]
     Gather,

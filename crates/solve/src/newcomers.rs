@@ -2,9 +2,13 @@
 
 use std::sync::Arc;
 
-use lumencast_charts::{ChartError, Extended, LaidOut, Store, extended, sheets};
+use lumencast_charts::{Extended, LaidOut, Store, extended, sheets};
+use lumencast_gather::Gather;
 use lumencast_light::FieldId;
 use lumencast_scene::Snapshot;
+
+use crate::error::SolveError;
+use crate::lightmap::with_backs;
 
 /// Still instances that rest and have no lumels yet. Cutting them into charts takes its time, and needs
 /// nothing but what is here: [`Newcomers::lay_out`] may run on any thread.
@@ -32,22 +36,28 @@ impl Newcomers {
         self.field
     }
 
-    /// The layout with their surfaces too, the fronts alone, and without those of instances that are
-    /// gone. `goes_on` is asked now and then.
+    /// The layout with their surfaces too, and without those of instances that are gone. `gatherer` looks
+    /// which backs light can reach; `goes_on` is asked now and then.
     ///
     /// # Errors
-    /// [`ChartError::Interrupted`] where `goes_on` answers no, and whatever the unwrapper finds wrong.
+    /// [`lumencast_charts::ChartError::Interrupted`] where `goes_on` answers no, whatever the unwrapper finds wrong, and a
+    /// gatherer that gave up.
     pub fn lay_out(
         &self,
         store: Option<&Store>,
+        gatherer: &mut dyn Gather,
         goes_on: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Extended, ChartError> {
+    ) -> Result<Extended, SolveError> {
         let all = &self.scene.instances;
         let mut scene = Snapshot::clone(&self.scene);
-        scene.instances.retain(|i| self.instances.contains(&(i.node.0, i.copy)));
-        let sheets = sheets(&scene, store, &|_| goes_on())?.sheets;
+        // Surfaces of others are cut already.
+        for instance in &mut scene.instances {
+            instance.still &= self.instances.contains(&(instance.node.0, instance.copy));
+        }
+        let fronts = sheets(&scene, store, &|_| goes_on())?.sheets;
+        let sheets = with_backs(fronts, &self.scene, gatherer)?;
         let is_there =
             |node: u32, copy: u32| all.iter().any(|i| (i.node.0, i.copy) == (node, copy));
-        extended(&self.before, |surface| is_there(surface.node, surface.copy), &sheets)
+        Ok(extended(&self.before, |surface| is_there(surface.node, surface.copy), &sheets)?)
     }
 }

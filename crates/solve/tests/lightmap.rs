@@ -9,7 +9,7 @@ use lumencast_gather::{Gather, Job};
 use lumencast_light::{FieldId, Lightmap};
 use lumencast_scene::{Environment, LightmapSpec, Material, Snapshot};
 use lumencast_solve::blend::BlendSettings;
-use lumencast_solve::{LightmapSolver, spread, with_backs};
+use lumencast_solve::{GatherOptions, LightmapSolver, Solver, spread, with_backs};
 use lumencast_testkit::scenes::{Stage, lambert};
 use std::sync::Arc;
 
@@ -193,4 +193,94 @@ fn points_are_spread_by_area() {
     let mean = mean / first as f32;
     assert!((mean - Vec3::new(0.5, 0.5, 0.0)).abs().max_element() < 0.02, "{mean}");
     assert!(places.iter().all(|place| place.normal == Vec3::Z));
+}
+
+/// The floor of a lit room as one quad, or as so many tiles a side, each with charts of its own.
+fn tiled(tiles: u32) -> Arc<Snapshot> {
+    let mut stage = Stage::default();
+    let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
+    let lamp = stage.material(lambert(Vec3::ZERO, Vec3::splat(10.0)));
+    let tile = 4.0 / tiles as f32;
+    for k in 0..tiles * tiles {
+        let corner = tile * Vec3::new((k % tiles) as f32, 0.0, (k / tiles) as f32);
+        stage.quad(corner, Vec3::Z * tile, Vec3::X * tile, grey);
+    }
+    stage.quad(Vec3::new(1.0, 3.0, 1.0), Vec3::X * 2.0, Vec3::Z * 2.0, lamp);
+    stage.snapshot()
+}
+
+/// Noise is filtered across charts: a floor of tiles has no more of it than one that is whole.
+#[test]
+fn noise_is_filtered_across_charts() {
+    let error = |tiles: u32| {
+        let scene = tiled(tiles);
+        let all = sheets(&scene, None, &|_| true).expect("charts").sheets;
+        let laid_out = laid_out(&all, LightmapSpec::Texel(0.1)).expect("a layout");
+        let light = |samples: u32| {
+            let mut solver = LightmapSolver::new(FieldId(0), &scene, &laid_out, MEAN);
+            let mut tracer = tracer();
+            let job = Job { bounces: 1, ..solver.job(scene.clone(), samples) };
+            let budgets = job.budgets.clone();
+            let ticket = tracer.submit(job);
+            solver.take(&tracer.wait(ticket).expect("light"), &budgets);
+            let mut lightmap = solver.dark();
+            solver.solve(true, &mut lightmap);
+            lightmap
+        };
+        let [noisy, right] = [8, 2048].map(light);
+        let places = spread(&scene, &laid_out.layout, 2000);
+        let squares: f32 = places
+            .iter()
+            .filter(|place| place.position.y < 1.0)
+            .map(|place| {
+                let on = place.on.as_ref().expect("a surface");
+                let [noisy, right] =
+                    [&noisy, &right].map(|light| light.irradiance_at(on).expect("lumels").y);
+                (noisy / right - 1.0).powi(2)
+            })
+            .sum();
+        squares.sqrt()
+    };
+    let [whole, tiles] = [1, 16].map(error);
+    assert!(tiles < 1.25 * whole, "{tiles} beside {whole}");
+}
+
+/// A plate that comes later and can be seen from both sides gets lumels on both; a closed box of the same
+/// material on its outside alone.
+#[test]
+fn backs_of_what_comes_later_have_lumels() {
+    let room = |is_furnished: bool, time: f64| {
+        let mut stage = Stage::default();
+        let grey = lambert(Vec3::splat(0.5), Vec3::ONE);
+        let both = stage.material(Material { double_sided: true, ..grey.clone() });
+        let wall = stage.material(grey);
+        stage.room(Vec3::ZERO, Vec3::splat(4.0), wall);
+        if is_furnished {
+            stage.quad(Vec3::ZERO, Vec3::X, Vec3::Y, both);
+            stage.room(Vec3::new(-1.0, 0.0, 0.0), Vec3::splat(-1.0), both);
+        }
+        Arc::new(Snapshot {
+            time,
+            version: u64::from(is_furnished),
+            ..Snapshot::clone(&stage.snapshot())
+        })
+    };
+    let empty = room(false, 0.0);
+    let mut solver = Solver::new(&[], GatherOptions::default()).expect("no volumes");
+    solver.set_lightmap(&empty, Some(&laid(&empty)));
+    solver.follow(&empty);
+    assert!(solver.newcomers(&empty).is_none());
+    solver.follow(&room(true, 1.0));
+    let rested = room(true, 4.0);
+    let newcomers = solver.newcomers(&rested).expect("what has come");
+    let extended = newcomers.lay_out(None, &mut tracer(), &|| true).expect("a layout");
+    assert!(extended.left_out.is_empty());
+    let surfaces = extended.laid_out.layout.surfaces();
+    let sides = |node: u32| -> Vec<bool> {
+        surfaces.iter().filter(|s| s.id.node == node).map(|s| s.id.back).collect()
+    };
+    let later = empty.instances.len();
+    let nodes: Vec<u32> = rested.instances.iter().skip(later).map(|i| i.node.0).collect();
+    assert_eq!(sides(nodes[0]), [false, true]);
+    assert!(nodes[1..].iter().all(|node| sides(*node) == [false]));
 }
