@@ -2,9 +2,9 @@
 //!
 //! Lumels lie in *cells* of 16 × 16 of a page, and cells in *blocks*, which are solved together. A
 //! *glance* gathers at about every sixteenth lumel of a cell. Whenever the scene is another one, all
-//! cells get a glance first: a coarse picture of every page. Then cells take turns, all lumels of each.
-//! Both go block by block, so that little has to be solved anew, and blocks far from each other follow
-//! one another.
+//! cells get a glance first: a coarse picture of every page. Then blocks take turns, all lumels of each,
+//! so that little has to be solved anew. Blocks whose light has changed come first; noisy ones come more
+//! often (stride scheduling, Waldspurger and Weihl 1995).
 
 use std::collections::{BTreeSet, HashSet, VecDeque};
 use std::ops::Range;
@@ -27,6 +27,10 @@ const GLANCE_SAMPLES: u32 = 16;
 const TURN_SAMPLES: u32 = 8;
 /// The same in a turn that was hurried.
 const HURRIED_SAMPLES: u32 = 32;
+/// Updates of a cell for which a change is expected.
+const EXPECTING: u8 = 3;
+/// Share of turns that all blocks have alike, however noisy they are.
+const EVEN: f32 = 0.5;
 
 /// A square of lumels that are gathered at together.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +40,20 @@ struct Cell {
     glance: u32,
     /// The version of the scene at which it had its last glance.
     seen: Option<u64>,
+    /// For so many updates its light may be another, since the scene was edited.
+    expecting: u8,
+}
+
+/// The turns of a block.
+#[derive(Clone, Debug, Default)]
+struct Turns {
+    cells: Range<usize>,
+    /// The block with the least has the next turn.
+    due: f64,
+    /// The number of its last turn.
+    last: u64,
+    /// How noisy a sample is there: the standard deviation of its luminance, by the square root of that.
+    noise: f32,
 }
 
 /// A square of lumels that are solved together.
@@ -78,7 +96,11 @@ pub(crate) struct Cells {
     /// Block by block.
     cells: Vec<Cell>,
     next_glance: usize,
-    next_turn: usize,
+    blocks: Vec<Turns>,
+    /// Cells that have not been gathered at in the turn that is under way.
+    turn: Range<usize>,
+    /// Number of turns until now.
+    turns: u64,
     /// Cells whose turn comes before all others.
     hurried: VecDeque<usize>,
     /// Glances that come before all turns.
@@ -97,20 +119,77 @@ impl Cells {
         };
         places.sort_by_cached_key(|place| (key(place), place.lumel));
         let mut cells: Vec<Cell> = Vec::new();
+        let mut blocks: Vec<Turns> = Vec::new();
         let mut first = 0;
-        for cell in places.chunk_by_mut(|a, b| key(a) == key(b)) {
-            let glance = glanced(cell, page_size);
-            let receivers = first..first + cell.len() as u32;
-            first = receivers.end;
-            cells.push(Cell { receivers, glance, seen: None });
+        for block in places.chunk_by_mut(|a, b| key(a).0 == key(b).0) {
+            let start = cells.len();
+            for cell in block.chunk_by_mut(|a, b| key(a) == key(b)) {
+                let glance = glanced(cell, page_size);
+                let receivers = first..first + cell.len() as u32;
+                first = receivers.end;
+                cells.push(Cell { receivers, glance, seen: None, expecting: 0 });
+            }
+            blocks.push(Turns { cells: start..cells.len(), ..Turns::default() });
         }
-        Self { first: cells.len(), cells, ..Self::default() }
+        Self { first: cells.len(), cells, blocks, ..Self::default() }
     }
 
     /// Light may be another: all cells get a glance before any has its turn. Those that wait for
     /// one already are not put off.
     pub(crate) fn expect_change(&mut self) {
         self.first = self.cells.len();
+        self.cells.iter_mut().for_each(|cell| cell.expecting = EXPECTING);
+    }
+
+    /// Counts an update of a cell; whether its light may be another since the scene was edited.
+    pub(crate) fn count_update(&mut self, cell: usize) -> bool {
+        let expecting = &mut self.cells[cell].expecting;
+        let is_expected = *expecting > 0;
+        *expecting = expecting.saturating_sub(1);
+        is_expected
+    }
+
+    /// Lets the block of a cell, whose light is another now, have its turn before those where nothing
+    /// has changed.
+    pub(crate) fn hasten(&mut self, cell: usize) {
+        let least = self.blocks.iter().map(|block| block.due).fold(f64::INFINITY, f64::min);
+        let block = self.block_of(cell);
+        self.blocks[block].due = least;
+    }
+
+    /// Sets how noisy a sample is in the block of a cell: the standard deviation of its luminance, by the
+    /// square root of that.
+    pub(crate) fn set_noise(&mut self, cell: usize, noise: f32) {
+        let block = self.block_of(cell);
+        self.blocks[block].noise = noise;
+    }
+
+    fn block_of(&self, cell: usize) -> usize {
+        self.blocks.partition_point(|block| block.cells.end <= cell)
+    }
+
+    /// The receivers of the block of a cell.
+    pub(crate) fn receivers_about(&self, cell: usize) -> Range<usize> {
+        let Range { start, end } = self.blocks[self.block_of(cell)].cells;
+        self.receivers_of(start).start..self.receivers_of(end - 1).end
+    }
+
+    /// The next cell in turn.
+    fn next_turn(&mut self) -> Option<usize> {
+        if self.turn.is_empty() {
+            let all: f32 = self.blocks.iter().map(|block| block.noise).sum();
+            let mean = all / self.blocks.len() as f32;
+            let next = self
+                .blocks
+                .iter_mut()
+                .min_by(|a, b| a.due.total_cmp(&b.due).then_with(|| a.last.cmp(&b.last)))?;
+            self.turns += 1;
+            self.turn = next.cells.clone();
+            next.last = self.turns;
+            let share = if mean > 0.0 { next.noise / mean } else { 1.0 };
+            next.due += 1.0 / f64::from(EVEN + (1.0 - EVEN) * share);
+        }
+        self.turn.next()
     }
 
     /// Lets the cells of these receivers have their turn next.
@@ -143,8 +222,7 @@ impl Cells {
                     continue;
                 }
                 None => {
-                    let cell = self.next_turn;
-                    self.next_turn = (cell + 1) % self.cells.len();
+                    let Some(cell) = self.next_turn() else { break };
                     (cell, self.cells[cell].receivers.len() as u32, TURN_SAMPLES)
                 }
             };
@@ -157,7 +235,7 @@ impl Cells {
             } else {
                 turns += spent
             }
-            // However few samples there are, no cell comes twice.
+            // However many samples there are, a job asks for no more than all lumels.
             if budgets.len() >= self.receivers() {
                 break;
             }

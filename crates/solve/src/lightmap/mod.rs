@@ -1,6 +1,7 @@
 //! Lumels while their light is computed.
 
 mod backs;
+mod beyond;
 mod cells;
 mod fill;
 mod filter;
@@ -29,13 +30,19 @@ use point::Point;
 pub use points::spread;
 use seams::Seams;
 pub use seams::sides_of_seams;
-use sums::{Sum, have_changed};
+use sums::{Sum, have_changed, noise};
 
 /// What a lumel has in place of a receiver where no surface covers it.
 const NO_RECEIVER: u32 = u32::MAX;
 
+/// Standard deviations by which light must differ to be another where a change is expected.
+const EXPECTED: f32 = 2.0;
+
 /// What has moved gets lumels again once it has rested for so many seconds of scene time.
 const REST: f64 = 2.0;
+
+/// Blocks that are solved at a time since what they had read of others is another now.
+const STALE_AT_ONCE: usize = 8;
 
 /// An instance, by its node and its number there.
 type InstanceId = (u32, u32);
@@ -60,7 +67,7 @@ pub struct LightmapSolver {
     /// cell.
     lumels: Arc<[u32]>,
     points: Arc<[Point]>,
-    /// The receivers of the lumels of all pages.
+    /// The receivers of the lumels of all pages; about charts, those that lie there ([`beyond`]).
     receiver_of: Arc<[u32]>,
     sums: Vec<Sum>,
     seams: Arc<Seams>,
@@ -68,6 +75,10 @@ pub struct LightmapSolver {
     news: BTreeSet<Block>,
     /// Blocks without surfaces beside those that have some: they are solved with these.
     beside: Arc<BTreeMap<Block, Vec<Block>>>,
+    /// Blocks that read light of a block when they are filtered.
+    readers: Arc<BTreeMap<Block, Vec<Block>>>,
+    /// Blocks that have read light that is another now.
+    stale: BTreeSet<Block>,
     /// Where all surfaces lie, those of instances that have moved too.
     layout: Arc<Layout>,
     /// The instances, and where they were when their lumels were placed.
@@ -92,6 +103,11 @@ impl LightmapSolver {
         for (place, receiver) in places.iter().zip(0..) {
             receiver_of[place.lumel as usize] = receiver;
         }
+        let points: Arc<[Point]> =
+            places.iter().map(|place| Point::new(place.position, place.normal)).collect();
+        let lumels: Arc<[u32]> = places.iter().map(|place| place.lumel).collect();
+        beyond::go_on(&mut receiver_of, &points, scene, &layout, laid_out.texel);
+        let readers = beyond::readers(&receiver_of, &lumels, layout.page_size);
         let placed = placed(scene, &layout);
         let still = scene.instances.iter().filter(|instance| instance.still);
         let ids = still.map(|instance| (instance.node.0, instance.copy));
@@ -100,12 +116,14 @@ impl LightmapSolver {
             settings,
             texel: laid_out.texel,
             cells,
-            lumels: places.iter().map(|place| place.lumel).collect(),
-            points: places.iter().map(|p| Point::new(p.position, p.normal)).collect(),
+            lumels,
+            points,
             receiver_of: receiver_of.into(),
             sums: vec![Sum::default(); places.len()],
             seams: Arc::new(Seams::new(scene, &layout)),
             news: BTreeSet::new(),
+            readers: Arc::new(readers),
+            stale: BTreeSet::new(),
             beside: Arc::new(empty_beside(&places, layout.page_size)),
             without: ids.filter(|id| !placed.contains_key(id)).collect(),
             placed,
@@ -225,9 +243,10 @@ impl LightmapSolver {
     ) {
         let mut new = Self::new(self.id(), scene, laid_out, self.settings);
         for (receiver, lumel) in new.lumels.iter().enumerate() {
-            let before = self.receiver_of.get(*lumel as usize).map_or(usize::MAX, |r| *r as usize);
-            if self.points.get(before) == Some(&new.points[receiver]) {
-                new.sums[receiver] = self.sums[before];
+            let entry = self.receiver_of.get(*lumel as usize);
+            let Some(before) = entry.and_then(|entry| beyond::own(*entry)) else { continue };
+            if self.points[before as usize] == new.points[receiver] {
+                new.sums[receiver] = self.sums[before as usize];
             }
         }
         shown.irradiance.resize(laid_out.layout.lumel_count(), Vec3::ZERO);
@@ -327,15 +346,22 @@ impl LightmapSolver {
         let of_cells: Vec<&[(usize, Sum)]> = found.chunk_by(|a, b| cell(a) == cell(b)).collect();
         for of_cell in of_cells {
             let (first, _) = of_cell[0];
+            let cell = self.cells.cell_of(first as u32);
             let known = of_cell.iter().map(|(receiver, new)| (&self.sums[*receiver], new));
-            if have_changed(known, self.settings.significance) {
-                let cell = self.cells.receivers_of(self.cells.cell_of(first as u32));
-                self.sums[cell].fill(Sum::default());
+            let significance = self.settings.significance;
+            let is_expected = self.cells.count_update(cell) && significance.is_finite();
+            let significance = if is_expected { EXPECTED.min(significance) } else { significance };
+            let block = Block::of(self.lumels[first], page_size);
+            if have_changed(known, significance) {
+                self.sums[self.cells.receivers_of(cell)].fill(Sum::default());
+                self.cells.hasten(cell);
+                self.stale.extend(self.readers.get(&block).into_iter().flatten());
             }
             for (receiver, new) in of_cell {
                 self.sums[*receiver].add(new, self.settings.ratio);
             }
-            let block = Block::of(self.lumels[first], page_size);
+            let noise = noise(&self.sums[self.cells.receivers_about(cell)]);
+            self.cells.set_noise(cell, noise);
             self.news.extend(self.beside.get(&block).into_iter().flatten());
             self.news.insert(block);
         }
@@ -345,6 +371,10 @@ impl LightmapSolver {
     /// `filtered`, spread to where nothing is known, and the same on both sides of seams. `shown` is what
     /// [`Self::dark`] made, with all that has been solved since.
     pub fn solve(&mut self, filtered: bool, shown: &mut Lightmap) {
+        self.stale.retain(|block| !self.news.contains(block));
+        for _ in 0..STALE_AT_ONCE {
+            self.news.extend(self.stale.pop_first());
+        }
         let news: Vec<Block> = std::mem::take(&mut self.news).into_iter().collect();
         let solved: Vec<Vec<Vec3>> =
             news.par_iter().map(|block| self.solved(block, filtered)).collect();
@@ -358,7 +388,8 @@ impl LightmapSolver {
             }
         }
         let seams = self.seams.about(|lumel| news.binary_search(&Block::of(lumel, size)).is_ok());
-        let is_known = |lumel: &u32| self.known(*lumel).is_some_and(|l| l.variance < f32::INFINITY);
+        let of = |lumel: &u32| self.known(beyond::own(self.receiver_of[*lumel as usize])?);
+        let is_known = |lumel: &u32| of(lumel).is_some_and(|l| l.variance < f32::INFINITY);
         let known: Vec<bool> = seams.lumels().iter().map(is_known).collect();
         seams.apply(&mut shown.irradiance, &known);
     }
@@ -368,32 +399,37 @@ impl LightmapSolver {
         let size = self.layout.page_size as i32;
         let side = BLOCK + 2 * REACH;
         let low = block.corner().as_ivec2() - REACH as i32;
-        let mut window: Vec<Option<Noisy>> = (0..side * side)
+        let entries: Vec<u32> = (0..side * side)
             .map(|k| {
                 let at = low + UVec2::new(k % side, k / side).as_ivec2();
                 let is_on_page = at.min_element() >= 0 && at.max_element() < size;
                 let index = is_on_page.then(|| self.layout.index(block.page, at.as_uvec2()));
-                self.known(index? as u32)
+                index.map_or(NO_RECEIVER, |index| self.receiver_of[index])
             })
             .collect();
+        let noisy = |entry: &u32| self.known(beyond::receiver(*entry)?);
+        let mut window: Vec<Option<Noisy>> = entries.iter().map(noisy).collect();
         if filtered {
             filter(&mut window, side, self.texel);
         }
-        let known = |lumel: &Option<Noisy>| lumel.filter(|lumel| lumel.variance < f32::INFINITY);
-        let mut light: Vec<Vec3> = window
+        let known: Vec<Option<Vec3>> = entries
             .iter()
-            .map(|lumel| known(lumel).map_or(Vec3::ZERO, |lumel| lumel.irradiance))
+            .zip(window)
+            .map(|(entry, lumel)| {
+                let lumel = beyond::own(*entry).and(lumel)?;
+                (lumel.variance < f32::INFINITY).then_some(lumel.irradiance)
+            })
             .collect();
-        fill::fill(&mut light, side, |number| known(&window[number]).is_some());
+        let mut light: Vec<Vec3> = known.iter().map(|light| light.unwrap_or_default()).collect();
+        fill::fill(&mut light, side, |number| known[number].is_some());
         let rows = light.chunks(side as usize).skip(REACH as usize).take(BLOCK as usize);
         rows.flat_map(|row| &row[REACH as usize..(REACH + BLOCK) as usize]).copied().collect()
     }
 
-    /// What is known of a lumel; nothing where no surface covers it, or where it lies within something.
-    fn known(&self, lumel: u32) -> Option<Noisy> {
-        let receiver = self.receiver_of[lumel as usize] as usize;
-        let point = self.points.get(receiver)?;
-        let (irradiance, variance) = self.sums[receiver].known()?;
+    /// What is known at a receiver; nothing where it lies within something.
+    fn known(&self, receiver: u32) -> Option<Noisy> {
+        let point = self.points[receiver as usize];
+        let (irradiance, variance) = self.sums[receiver as usize].known()?;
         Some(Noisy { position: point.position, normal: point.normal(), irradiance, variance })
     }
 

@@ -11,6 +11,9 @@ const BURIED_ABOVE: f32 = 0.5;
 const SETTLED: f32 = 24.0;
 /// By how much the squares of noise scatter more than those of a normal distribution do.
 const TAILS: f32 = 1.5;
+/// Share of the light by which lumels may differ together without counting as another light: their paths
+/// end in the same light of the tick before, whose noise they share.
+const SHARED: f32 = 0.02;
 
 /// What has arrived at a lumel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -76,14 +79,16 @@ impl Sum {
     }
 }
 
-/// Whether what is new at some lumels differs from what is known there by more than chance explains: the
-/// squares of differences add up to what noise makes of them, but for so many of their own standard
-/// deviations.
+/// Whether what is new at some lumels differs from what is known there by more than chance explains. Two
+/// sums tell: that of squared differences finds light that has changed here and there; that of
+/// differences finds light that has changed a little everywhere. Each may lie so many of its own standard
+/// deviations from what noise makes of it.
 pub(crate) fn have_changed<'a>(
     known_and_new: impl Iterator<Item = (&'a Sum, &'a Sum)>,
     significance: f32,
 ) -> bool {
     let (mut squares, mut expected, mut count) = (0.0, 0.0, 0.0);
+    let (mut drift, mut level) = (0.0f32, 0.0);
     for (known, new) in known_and_new.filter(|(known, _)| known.samples > 0.0) {
         let [before, now] = [known, new].map(|sum| luminance(sum.sum / sum.samples));
         // Few samples tell little of how they scatter: those of both together tell more.
@@ -91,10 +96,24 @@ pub(crate) fn have_changed<'a>(
         let scatter = (n * known.scatter() + m * new.scatter()) / (n + m);
         expected += scatter * (1.0 / n + 1.0 / m);
         squares += (now - before).powi(2);
+        drift += now - before;
+        level += before;
         count += 1.0;
     }
     let chance = 1.0 + significance * TAILS * (2.0 / count as f32).sqrt();
-    squares > chance * expected
+    squares > chance * expected || drift.abs() > significance * expected.sqrt() + SHARED * level
+}
+
+/// How noisy a sample is at some lumels, as it is displayed: the standard deviation of its luminance, by
+/// the square root of that.
+pub(crate) fn noise(sums: &[Sum]) -> f32 {
+    let (mut squares, mut known) = (0.0, 0.0);
+    for sum in sums.iter().filter(|sum| sum.samples > 0.0 && !sum.is_buried()) {
+        let mean = luminance(sum.sum / sum.samples);
+        squares += if mean > 0.0 { sum.scatter() / mean } else { 0.0 };
+        known += 1.0;
+    }
+    if known > 0.0 { (squares / known as f32).sqrt() } else { 0.0 }
 }
 
 #[cfg(test)]
