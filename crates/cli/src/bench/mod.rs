@@ -2,6 +2,7 @@
 
 #[cfg(feature = "gpu")]
 mod bmfr;
+mod cast;
 #[cfg(feature = "gpu")]
 mod drawing;
 #[cfg(feature = "gpu")]

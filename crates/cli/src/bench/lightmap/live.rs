@@ -1,18 +1,15 @@
-//! How lumels follow a scene that is live: from cold, and after a lamp has become brighter.
-
-use std::time::{Duration, Instant};
+//! How lumels follow a scene that is live: from cold, and after a light has moved.
 
 use anyhow::Result;
 use lumencast_charts::lumels_on_pages;
-use lumencast_codec::Epoch;
 use lumencast_gather::Gather;
-use lumencast_light::{Layout, Lightmap, luminance};
-use lumencast_scene::{Edit, LightSpec, Scene};
-use lumencast_server::{Beat, Mail, Received, Tick, TickOptions};
+use lumencast_light::{Layout, Light, Lightmap, luminance};
+use lumencast_scene::{Edit, Scene};
+use lumencast_server::TickOptions;
 use serde_json::{Value, json};
 
 use super::display::{code, most};
-use crate::bench::Nobody;
+use crate::bench::cast::Cast;
 use crate::output::{self, say};
 
 /// Seconds of each part.
@@ -21,8 +18,6 @@ const SECONDS: f64 = 10.0;
 const CALM: f64 = 2.0;
 /// A picture is coarse once so much of its light is there.
 const COARSE: f64 = 0.5;
-/// A server's tick waits for light as long.
-const PATIENCE: Duration = Duration::from_millis(200);
 /// One lumel of so many is looked at.
 const STRIDE: usize = 5;
 
@@ -56,14 +51,6 @@ struct Followed {
     settled: f64,
 }
 
-/// The edit that makes the first lamp of a scene twice as bright.
-pub(super) fn brighter(scene: &Scene) -> Option<Edit> {
-    let node = scene.nodes().find(|node| node.light.is_some())?;
-    let intensity = 2.0 * node.light?.intensity;
-    let light = LightSpec { intensity: Some(intensity), ..LightSpec::default() };
-    Some(Edit::SetLight { node: node.id, light })
-}
-
 /// Casts a scene at the pace of a server. The scene's time stands still.
 pub(super) fn measure(
     scene: Scene,
@@ -71,31 +58,18 @@ pub(super) fn measure(
     options: TickOptions,
     goals: &Goals,
 ) -> Result<Live> {
-    let period = options.period;
-    let tick = Tick::new(scene, gatherer, options, Epoch(0))?;
-    let covered = covered(&goals.before.layout);
-    let start = Instant::now();
-    let mut cast = Cast { tick, covered, start, beat: Beat::new(period, 0.0), seq: 0 };
     let bar = output::spinner("Casting lumels".to_owned());
+    let mut cast = Cast::new(scene, gatherer, options)?;
     let cold = Lightmap::dark(goals.before.id, goals.before.layout.clone());
-    let first = cast.part(Vec::new(), &cold, &goals.before, goals.white);
+    let first = Part::of(&mut cast, &[], [&cold, &goals.before], goals.white);
     let followed = goals.after.as_ref().map(|(edit, after)| {
-        let part = cast.part(vec![edit.clone()], &goals.before, after, goals.white);
+        let edits = std::slice::from_ref(edit);
+        let part = Part::of(&mut cast, edits, [&goals.before, after], goals.white);
         Followed { half: part.reached(0.5), most: part.reached(0.95), settled: part.settled }
     });
     bar.finish_and_clear();
     let coarse = first.reached(COARSE);
     Ok(Live { coarse, settled: first.settled, flicker: first.flicker, followed })
-}
-
-/// A server without network.
-struct Cast {
-    tick: Tick,
-    /// The lumels that are looked at.
-    covered: Vec<usize>,
-    start: Instant,
-    beat: Beat,
-    seq: u64,
 }
 
 /// What was seen in a part.
@@ -106,35 +80,17 @@ struct Part {
     flicker: f64,
 }
 
-impl Cast {
+impl Part {
     /// Ten seconds that begin with edits, on the way from one light to another.
-    fn part(&mut self, edits: Vec<Edit>, from: &Lightmap, to: &Lightmap, white: f32) -> Part {
-        let began = self.start.elapsed().as_secs_f64();
-        let mut mail = Mail::default();
-        for edit in edits {
-            self.seq += 1;
-            let client = "bench".into();
-            mail.edits.push(Received { client, seq: self.seq, edit, temporary: false });
-        }
+    fn of(cast: &mut Cast, edits: &[Edit], [from, to]: [&Lightmap; 2], white: f32) -> Self {
+        let covered = covered(&to.layout);
         let seen = |lightmap: &Lightmap| -> Vec<f32> {
-            self.covered.iter().map(|lumel| luminance(lightmap.irradiance[*lumel])).collect()
+            covered.iter().map(|lumel| luminance(lightmap.irradiance[*lumel])).collect()
         };
         let [from, to] = [from, to].map(seen);
         let (mut shares, mut changes, mut last) = (Vec::new(), Vec::new(), from.clone());
-        loop {
-            let now = self.start.elapsed().as_secs_f64();
-            if now - began > SECONDS {
-                break;
-            }
-            self.beat.start(now);
-            self.tick.step_within(
-                0.0,
-                std::mem::take(&mut mail),
-                &mut Nobody { watches: true },
-                PATIENCE,
-            );
-            let seconds = self.start.elapsed().as_secs_f64() - began;
-            let shown = self.tick.light().lightmaps().next().map_or_else(Vec::new, seen);
+        cast.go_on(edits, SECONDS, |light: &Light, seconds| {
+            let shown = light.lightmaps().next().map_or_else(Vec::new, seen);
             shares.push((seconds, share(&from, &to, &shown)));
             if seconds > SECONDS - CALM {
                 let both = last.iter().zip(&shown);
@@ -142,19 +98,15 @@ impl Cast {
                     .extend(both.map(|(a, b)| f64::from(code(*a, white) - code(*b, white)).abs()));
             }
             last = shown;
-            let wait = self.beat.wait(self.start.elapsed().as_secs_f64());
-            std::thread::sleep(Duration::from_secs_f64(wait));
-        }
+        });
         let flicker = most(changes).unwrap_or(0.0);
         let squares =
             last.iter().zip(&to).map(|(a, b)| f64::from(code(*a, white) - code(*b, white)).powi(2));
         let settled =
             20.0 * 255.0f64.log10() - 10.0 * (squares.sum::<f64>() / to.len() as f64).log10();
-        Part { shares, settled, flicker }
+        Self { shares, settled, flicker }
     }
-}
 
-impl Part {
     /// Seconds from which on so much of the change was there.
     fn reached(&self, share: f64) -> Option<f64> {
         let missing = self.shares.iter().rposition(|(_, reached)| *reached < share);
@@ -204,7 +156,7 @@ impl Live {
         );
         if let Some(followed) = &self.followed {
             say!(
-                "a brighter lamp: half after {}, 95 % after {}, {:.1} dB after 10 s",
+                "a moved light: half after {}, 95 % after {}, {:.1} dB after 10 s",
                 seconds(followed.half),
                 seconds(followed.most),
                 followed.settled

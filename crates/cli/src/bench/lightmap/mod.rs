@@ -26,6 +26,7 @@ use self::coded::Coded;
 use self::display::{code, most};
 use self::live::{Goals, Live};
 use crate::arguments::{LightmapArguments, Materials, SceneSource};
+use crate::bench::cast::moved_light;
 use crate::charting;
 use crate::output::{self, say};
 
@@ -71,7 +72,7 @@ pub(crate) struct BenchLightmap {
     /// Samples of a point of the reference, at most.
     #[arg(long, default_value_t = 65_536, value_parser = clap::value_parser!(u32).range(512..=1 << 24))]
     reference_samples: u32,
-    /// Also casts the scene for 20 seconds as `serve` does, and makes a lamp twice as bright half-way.
+    /// Also casts the scene for 20 seconds as `serve` does, and moves a light half-way.
     #[arg(long)]
     live: bool,
     /// Prints JSON only.
@@ -221,7 +222,7 @@ impl BenchLightmap {
         let options = Options { levels: Levels::Two, ..self.options() };
         let mut tracer =
             CpuPathTracer::new(options).context("cannot start the threads that trace")?;
-        let after = match live::brighter(&scene) {
+        let after = match moved_light(&scene) {
             None => None,
             Some(edit) => {
                 let mut edited = self.scene.open()?;

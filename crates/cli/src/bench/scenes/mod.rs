@@ -15,9 +15,7 @@ use lumencast_gather::reference::Parts;
 use lumencast_light::{Field, Layout, Light};
 use lumencast_picture::{Picture, ToneMap, exposure};
 use lumencast_scene::{Edit, Environment, Scene, Snapshot, View};
-use lumencast_server::{SampleRange, TickOptions};
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading, Shadows};
-use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{Effort, Spent};
 
 use super::drawing::{cells, draw, sum};
@@ -31,14 +29,13 @@ use crate::arguments::{
 use crate::light_source::Computed;
 use crate::output::{self, tell};
 use crate::{camera, out_file, warnings};
+use live::Live;
 use report::{Beside, Report, Row};
 
 /// The reference's noise lies so far below the error that it tells, dB.
 const BELOW: f64 = 6.0;
 /// The sky that scenes without light stand under, lux.
 const SKY: f32 = 1000.0;
-/// Light counts as converged at so many times the samples of light that is computed once.
-const LIVE_CONVERGED: u32 = 4;
 
 /// Measures the indirect light of scenes at default settings, beside the path tracer's.
 #[derive(Debug, Args)]
@@ -72,14 +69,10 @@ pub(crate) struct BenchScenes {
     /// Also computes each field with so many times the samples, to see what noise costs.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=256))]
     times: Option<u32>,
-    /// Also casts each scene's light for so many seconds of 25 ticks, as `serve` does with these samples
-    /// a probe and tick, and compares what then is there with the same light converged.
+    /// Also casts each scene's light for so many seconds as `serve` does, and for as many after its first
+    /// light has moved, and compares what then is there with the same light converged.
     #[arg(long, value_name = "SECONDS", value_parser = crate::values::parse_positive)]
     live: Option<f32>,
-    /// Samples a probe and tick of --live.
-    #[arg(long, value_name = "N", default_value_t = 64, requires = "live",
-          value_parser = clap::value_parser!(u32).range(1..=65_536))]
-    live_samples: u32,
     /// Samples a pixel of a reference, at most.
     #[arg(long, value_name = "N", default_value_t = 4096,
           value_parser = clap::value_parser!(u32).range(2..=1 << 20))]
@@ -101,6 +94,7 @@ pub(crate) struct BenchScenes {
 
 /// A scene that is measured.
 struct Subject {
+    path: PathBuf,
     name: String,
     scene: Scene,
     snapshot: Arc<Snapshot>,
@@ -108,6 +102,15 @@ struct Subject {
     /// The exposure to judge at; nothing where the reference tells it.
     exposure: Option<f32>,
     under_sky: bool,
+}
+
+/// A reference that is fine enough.
+struct Judged {
+    judge: Judge,
+    /// As a PSNR after the filter, dB.
+    noise: f64,
+    /// Samples a pixel.
+    samples: u32,
 }
 
 impl BenchScenes {
@@ -131,6 +134,7 @@ impl BenchScenes {
         for scene in find::scenes(&self.scenes)? {
             let subject = subject(&scene)?;
             tell!("{}", subject.name);
+            warnings::left_out(&subject.scene);
             let row = self.row(subject, &mut renderer, &settings)?;
             tell!("{}", row.line());
             rows.push(row);
@@ -152,20 +156,15 @@ impl BenchScenes {
         renderer: &mut Renderer,
         settings: &Settings,
     ) -> Result<Row> {
-        let covered = covered(renderer, &subject.snapshot, subject.view, settings)?;
-        let traced = |parts| {
-            let Subject { scene, snapshot, view, .. } = &subject;
-            let keep = self.keep.as_deref();
-            Traced::new(&traced::Subject { scene, snapshot, view: *view, keep }, parts)
-        };
-        let mut indirect = traced(Parts::Indirect)?;
-        indirect.to(FIRST_SPP)?;
         let exposure = match subject.exposure {
             Some(exposure) => exposure,
             None => {
-                let mut direct = traced(Parts::Direct)?;
-                direct.to(FIRST_SPP)?;
-                exposure(&sum(&direct.picture()?, &indirect.picture()?))
+                let [direct, indirect] = [Parts::Direct, Parts::Indirect].map(|parts| {
+                    let mut traced = self.traced(&subject, parts)?;
+                    traced.to(FIRST_SPP)?;
+                    traced.picture()
+                });
+                exposure(&sum(&direct?, &indirect?))
             }
         };
         let settings = Settings { pre_exposure: exposure, ..*settings };
@@ -185,15 +184,21 @@ impl BenchScenes {
         let mut picture_of =
             |fields: Vec<Field>| draw_light(renderer, fields, subject.view, &settings);
         let picture = picture_of(baked.fields)?;
-        let mut judge;
-        loop {
-            judge = Judge::new(indirect.picture()?, covered.clone(), exposure)?;
-            let error = judge.psnr(&picture)?.filtered;
-            let enough = judge.noise(indirect.film())? >= error + BELOW;
-            if enough || indirect.film().samples() >= self.reference_spp {
-                break;
-            }
-            indirect.to(2 * indirect.film().samples())?;
+        let mut beside = Vec::new();
+        let mut more = None;
+        if let Some(times) = self.times {
+            let more_of = |spent: Spent| spent.samples.saturating_mul(times);
+            let effort = Effort {
+                lumel_samples: baked.lumels.map_or(1, more_of),
+                ..Effort::of_samples(more_of(baked.probes))
+            };
+            let light = bake(computed(drawn, effort))?;
+            more = Some((format!("{times} times the samples"), picture_of(light.fields)?));
+        }
+        let judged = self.judged(&subject, renderer, &settings, &picture)?;
+        let judge = &judged.judge;
+        if let Some((what, picture)) = more {
+            beside.push(Beside { what, psnr: judge.psnr(&picture)? });
         }
         if let Some(folder) = &self.output {
             let write = |what: &str, picture: &Picture, exposure: f32| {
@@ -204,40 +209,9 @@ impl BenchScenes {
             write("field", &picture, exposure)?;
             write("difference", &judge.difference(&picture), 1.0)?;
         }
-        let mut beside = Vec::new();
-        if let Some(times) = self.times {
-            let more = |spent: Spent| spent.samples.saturating_mul(times);
-            let effort = Effort {
-                lumel_samples: baked.lumels.map_or(1, more),
-                ..Effort::of_samples(more(baked.probes))
-            };
-            let more = bake(computed(drawn, effort))?;
-            beside.push(Beside {
-                what: format!("{times} times the samples"),
-                psnr: judge.psnr(&picture_of(more.fields)?)?,
-            });
-        }
         if let Some(seconds) = self.live {
-            let served = self.reading.served();
-            let effort = Effort::of_samples(self.probe_samples.saturating_mul(LIVE_CONVERGED));
-            let converged = bake(computed(served, effort))?;
-            beside.push(Beside {
-                what: "as served, converged".to_owned(),
-                psnr: judge.psnr(&picture_of(converged.fields)?)?,
-            });
-            let samples = self.live_samples;
-            let options = TickOptions {
-                samples: SampleRange::fixed(samples),
-                gather: served.gathered(BOUNCES - 1, f32::INFINITY, BlendSettings::default()),
-                volumes: wanted.volumes.clone(),
-                lightmap: wanted.lightmap.clone(),
-                ..TickOptions::default()
-            };
-            let live = live::light(subject.scene, gatherer, options, seconds.into())?;
-            beside.push(Beside {
-                what: format!("live, {samples} samples a tick, after {seconds} s"),
-                psnr: judge.psnr(&picture_of(live)?)?,
-            });
+            let live = Live { bench: self, subject: &subject, wanted: &wanted, settings };
+            beside.extend(live.beside(renderer, gatherer, judge, seconds.into())?);
         }
         let pages = wanted.lightmap.iter().map(|laid_out| {
             let Layout { pages, page_size, .. } = laid_out.layout;
@@ -245,8 +219,8 @@ impl BenchScenes {
         });
         Ok(Row {
             psnr: judge.psnr(&picture)?,
-            reference_noise: judge.noise(indirect.film())?,
-            reference_samples: indirect.film().samples(),
+            reference_noise: judged.noise,
+            reference_samples: judged.samples,
             scene: subject.name,
             under_sky: subject.under_sky,
             grids: wanted.volumes.iter().map(cells).chain(pages).collect(),
@@ -258,6 +232,37 @@ impl BenchScenes {
             exposure,
             beside,
         })
+    }
+
+    fn traced(&self, subject: &Subject, parts: Parts) -> Result<Traced> {
+        let Subject { scene, snapshot, view, .. } = subject;
+        let keep = self.keep.as_deref();
+        Traced::new(&traced::Subject { scene, snapshot, view: *view, keep }, parts)
+    }
+
+    /// What pictures of a scene's indirect light are judged by, refined until its noise is well below
+    /// the error of this one.
+    fn judged(
+        &self,
+        subject: &Subject,
+        renderer: &mut Renderer,
+        settings: &Settings,
+        picture: &Picture,
+    ) -> Result<Judged> {
+        let covered = covered(renderer, &subject.snapshot, subject.view, settings)?;
+        renderer.set_scene(&subject.snapshot);
+        let mut indirect = self.traced(subject, Parts::Indirect)?;
+        indirect.to(FIRST_SPP)?;
+        loop {
+            let judge = Judge::new(indirect.picture()?, covered.clone(), settings.pre_exposure)?;
+            let noise = judge.noise(indirect.film())?;
+            let samples = indirect.film().samples();
+            let enough = noise >= judge.psnr(picture)?.filtered + BELOW;
+            if enough || samples >= self.reference_spp {
+                return Ok(Judged { judge, noise, samples });
+            }
+            indirect.to(2 * samples)?;
+        }
     }
 }
 
@@ -283,6 +288,21 @@ fn draw_light(
     draw(renderer, view, settings, Lighting::INDIRECT)
 }
 
+impl Subject {
+    /// The same scene once more.
+    fn again(&self) -> Result<Self> {
+        Ok(Self { exposure: self.exposure, ..subject(&self.path)? })
+    }
+
+    /// The same scene after an edit.
+    fn edited(&self, edit: &Edit) -> Result<Self> {
+        let mut edited = self.again()?;
+        edited.scene.apply(edit)?;
+        edited.snapshot = edited.scene.snapshot();
+        Ok(edited)
+    }
+}
+
 fn section() -> Section {
     Section { title: "indirect light of scenes".to_owned(), command: "scenes" }
 }
@@ -290,13 +310,13 @@ fn section() -> Section {
 fn subject(path: &Path) -> Result<Subject> {
     let name = path.to_string_lossy();
     let mut scene = Scene::open(&name)?;
-    warnings::left_out(&scene);
     let under_sky = scene.is_dark();
     if under_sky {
         scene.apply(&Edit::SetEnvironment { environment: Environment::clear_sky(SKY) })?;
     }
     let published = SUBJECTS.iter().any(|subject| path.ends_with(subject.file));
     Ok(Subject {
+        path: path.to_owned(),
         name: scene.name().to_owned(),
         snapshot: scene.snapshot(),
         view: camera::view(&scene, None)?,
