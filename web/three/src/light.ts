@@ -84,7 +84,7 @@ export class LumencastLight {
   readonly #warned = new Set<string>();
   #show: Shown = 'both';
   #fittedRevision = -1;
-  #fittedAt = 0;
+  #fittedAt = -Infinity;
   #lightRevision = 0;
   #epoch: string | undefined;
 

@@ -67,7 +67,7 @@ export class Shadows {
     });
   }
 
-  /** Fits the shadow cameras to what the scene now holds. */
+  /** Fits the shadow cameras to what the scene now holds; maps are drawn anew, as they are read by these. */
   fit(content: Object3D): void {
     this.#bounds.setFromObject(content);
     if (this.#bounds.isEmpty()) return;
@@ -128,6 +128,7 @@ function fitDirectional(light: DirectionalLight, bounds: Box3): void {
   const texel = Math.max(extent.x, extent.y) / light.shadow.mapSize.x;
   light.shadow.normalBias = 1.5 * texel;
   light.shadow.bias = -texel / (camera.far - camera.near);
+  light.shadow.needsUpdate = true;
 }
 
 function fitLocal(light: PointLight | SpotLight, bounds: Box3): void {
@@ -139,4 +140,5 @@ function fitLocal(light: PointLight | SpotLight, bounds: Box3): void {
   // A texel grows with the distance; this is about one at a third of the scene's extent.
   light.shadow.normalBias = (reach / 3 / light.shadow.mapSize.x) * 2;
   light.shadow.bias = -1e-4;
+  light.shadow.needsUpdate = true;
 }

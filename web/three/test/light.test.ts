@@ -441,6 +441,33 @@ function drawn(within: () => void): void {
   scene.onAfterRender(undefined!, scene, camera, undefined!, undefined!, undefined!);
 }
 
+describe('shadows', () => {
+  /** What a shadow map is drawn by, and whether it is to be drawn. */
+  function shadowOf({ shadow }: PointLight) {
+    const { camera, needsUpdate } = shadow;
+    return { far: (camera as PerspectiveCamera).far, needsUpdate };
+  }
+
+  it('are fitted for the first picture, and drawn anew when they are fitted again', () => {
+    const [room, lamp] = [new Mesh(new PlaneGeometry(3, 4)), new PointLight()];
+    const own = new Scene().add(room, lamp);
+    const lit = new LumencastLight(session as unknown as LightSession, platform, { scene: own });
+    lamp.shadow.autoUpdate = false;
+    lit.update(camera, 100);
+    expect(shadowOf(lamp)).toEqual({ far: 7.5, needsUpdate: true });
+
+    lamp.shadow.needsUpdate = false;
+    lit.update(camera, 1000);
+    expect(shadowOf(lamp)).toEqual({ far: 7.5, needsUpdate: false });
+
+    room.scale.setScalar(2);
+    session.tell('snapshot', []);
+    lit.update(camera, 2000);
+    expect(shadowOf(lamp)).toEqual({ far: 15, needsUpdate: true });
+    lit.dispose();
+  });
+});
+
 describe('show', () => {
   it('darkens lights for the time of rendering only', () => {
     const lamp = new PointLight(0xffffff, 5);
