@@ -7,7 +7,7 @@ use lumencast_charts::{LaidOut, Sheet, laid_out, sheets};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job};
 use lumencast_light::{FieldId, Lightmap};
-use lumencast_scene::{Environment, LightmapSpec, Material, Snapshot};
+use lumencast_scene::{Edit, Environment, LightmapSpec, Material, Scene, Snapshot, Transform};
 use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{GatherOptions, LightmapSolver, Solver, spread, with_backs};
 use lumencast_testkit::scenes::{Stage, lambert};
@@ -283,4 +283,56 @@ fn backs_of_what_comes_later_have_lumels() {
     let nodes: Vec<u32> = rested.instances.iter().skip(later).map(|i| i.node.0).collect();
     assert_eq!(sides(nodes[0]), [false, true]);
     assert!(nodes[1..].iter().all(|node| sides(*node) == [false]));
+}
+
+/// A lamp that moves changes the light of cells by less than the noise of their lumels: it is followed
+/// by a few samples a lumel, and what was known of light's pattern stays.
+#[test]
+fn a_lamp_that_moves_is_followed() {
+    let mut scene = Scene::builtin("cornell").expect("a built-in scene");
+    let before = scene.snapshot();
+    let lamp = scene.nodes().find(|node| node.light.is_some()).expect("a lamp").id;
+    let transform =
+        Transform { translation: Some(Vec3::new(0.5, 1.5, 0.3)), ..Transform::default() };
+    scene.apply(&Edit::MoveNode { node: lamp, transform }).expect("an edit");
+    let after = scene.snapshot();
+    let fronts = sheets(&before, None, &|_| true).expect("charts").sheets;
+    let laid_out = laid_out(&fronts, LightmapSpec::Size(128)).expect("a layout");
+    let mut tracer = tracer();
+    let mut gathered = |job: Job| {
+        let ticket = tracer.submit(Job { bounces: 2, ..job });
+        tracer.wait(ticket).expect("light")
+    };
+    let mut converged = |scene: &Arc<Snapshot>| {
+        let mut solver = LightmapSolver::new(FieldId(0), scene, &laid_out, MEAN);
+        let job = Job { seed: 77, ..solver.job(scene.clone(), 512) };
+        let budgets = job.budgets.clone();
+        solver.take(&gathered(job), &budgets);
+        let mut lightmap = solver.dark();
+        solver.solve(true, &mut lightmap);
+        lightmap
+    };
+    let right = converged(&after);
+    let mut solver = LightmapSolver::new(FieldId(0), &before, &laid_out, BlendSettings::default());
+    let lumels = solver.lumel_count() as u64;
+    let mut lightmap = solver.dark();
+    let mut live = |solver: &mut LightmapSolver, scene: &Arc<Snapshot>, each: u64| {
+        let mut spent = 0;
+        while spent < each * lumels {
+            let (job, budgets) = solver.next_job(scene.clone(), lumels / 4);
+            spent += job.samples();
+            solver.take(&gathered(Job { seed: spent, ..job }), &budgets);
+            solver.solve(true, &mut lightmap);
+        }
+        let read = |lightmap: &Lightmap| irradiances(scene, lightmap, 2000);
+        let (read, right) = (read(&lightmap), read(&right));
+        let off: f32 = read.iter().zip(&right).map(|(a, b)| (*a - *b).abs().element_sum()).sum();
+        off / right.iter().map(|e| e.element_sum()).sum::<f32>()
+    };
+    let moved = live(&mut solver, &before, 200);
+    solver.expect_change();
+    let soon = live(&mut solver, &after, 2);
+    let later = live(&mut solver, &after, 16);
+    assert!(moved > 0.08, "{moved}");
+    assert!(soon < 0.65 * moved && later < 0.4 * moved, "{moved}, {soon}, {later}");
 }

@@ -3,6 +3,7 @@
 mod backs;
 mod beyond;
 mod cells;
+mod change;
 mod fill;
 mod filter;
 mod places;
@@ -24,22 +25,32 @@ use rayon::prelude::*;
 use crate::blend::BlendSettings;
 pub use backs::with_backs;
 use cells::{BLOCK, Block, Cells};
+use change::{Change, Prior};
 use filter::{Noisy, REACH, filter};
 use places::{LumelPlace, lumel_places};
 use point::Point;
 pub use points::spread;
 use seams::Seams;
 pub use seams::sides_of_seams;
-use sums::{Sum, have_changed, noise};
+use sums::{Sum, noise};
 
 /// What a lumel has in place of a receiver where no surface covers it.
 const NO_RECEIVER: u32 = u32::MAX;
 
-/// Standard deviations by which light must differ to be another where a change is expected.
-const EXPECTED: f32 = 2.0;
+/// Standard deviations of the ratio by which the light of a cell changes: after an edit, while something
+/// in the scene moves, and where all is still.
+const EDITED: f32 = 0.2;
+const MOVING: f32 = 0.02;
+const STILL: f32 = 0.0;
+/// What is known of a lumel weighs so many samples where the pattern of light is another now.
+const OTHER: f32 = 4.0;
+/// Of light that was scaled after an edit, so much is still wrong at a lumel, as a share of it.
+const WRONG: f32 = 0.1;
+/// A cell that is brighter or darker by this ratio is gathered at sooner than others.
+const MUCH: f32 = 0.1;
 
 /// What has moved gets lumels again once it has rested for so many seconds of scene time.
-const REST: f64 = 2.0;
+const RESTING: f64 = 2.0;
 
 /// Blocks that are solved at a time since what they had read of others is another now.
 const STALE_AT_ONCE: usize = 8;
@@ -91,6 +102,9 @@ pub struct LightmapSolver {
     without: BTreeSet<InstanceId>,
     /// The version of the scene that was followed last.
     followed: Option<u64>,
+    /// The version of the scene that was gathered last, and whether it was another one before.
+    gathered: Option<u64>,
+    is_moving: bool,
 }
 
 impl LightmapSolver {
@@ -130,6 +144,8 @@ impl LightmapSolver {
             moved: BTreeMap::new(),
             newcomers: BTreeMap::new(),
             followed: None,
+            gathered: None,
+            is_moving: false,
             layout,
         }
     }
@@ -158,6 +174,7 @@ impl LightmapSolver {
     /// it is. The job has these alone; the budgets that come with it tell which they are, for
     /// [`Self::take`].
     pub fn next_job(&mut self, scene: Arc<Snapshot>, samples: u64) -> (Job, Vec<Budget>) {
+        self.is_moving = self.gathered.replace(scene.version) != Some(scene.version);
         let budgets = self.cells.budgets(samples, scene.version);
         let point = |budget: &Budget| self.points[budget.receiver as usize].receiver();
         let receivers: Vec<Receiver> = budgets.iter().map(point).collect();
@@ -216,7 +233,7 @@ impl LightmapSolver {
 
     /// Instances without lumels that have rested long enough to get some.
     pub(crate) fn newcomers(&self, time: f64) -> Vec<InstanceId> {
-        let rested = self.newcomers.iter().filter(|(_, at)| time - at.since >= REST);
+        let rested = self.newcomers.iter().filter(|(_, at)| time - at.since >= RESTING);
         rested.map(|(id, _)| *id).collect()
     }
 
@@ -282,7 +299,7 @@ impl LightmapSolver {
         if comes {
             *moved = Moved { at, since: scene.time };
         }
-        let rests = scene.time - moved.since >= REST;
+        let rests = scene.time - moved.since >= RESTING;
         if comes && is_home {
             self.hurry(id);
         }
@@ -333,8 +350,8 @@ impl LightmapSolver {
         self.cells.expect_change();
     }
 
-    /// Adds what was gathered; `budgets` tell at which lumels. What is not finite does not count. Where
-    /// a cell's lumels together tell that light is another, what was known of the cell is forgotten.
+    /// Adds what was gathered; `budgets` tell at which lumels. What is not finite does not count. What is
+    /// known of a cell follows what its lumels together tell ([`change`]).
     pub fn take(&mut self, gathered: &Gathered, budgets: &[Budget]) {
         let found: Vec<(usize, Sum)> = budgets
             .iter()
@@ -347,13 +364,14 @@ impl LightmapSolver {
         for of_cell in of_cells {
             let (first, _) = of_cell[0];
             let cell = self.cells.cell_of(first as u32);
-            let known = of_cell.iter().map(|(receiver, new)| (&self.sums[*receiver], new));
-            let significance = self.settings.significance;
-            let is_expected = self.cells.count_update(cell) && significance.is_finite();
-            let significance = if is_expected { EXPECTED.min(significance) } else { significance };
             let block = Block::of(self.lumels[first], page_size);
-            if have_changed(known, significance) {
-                self.sums[self.cells.receivers_of(cell)].fill(Sum::default());
+            let is_expected = self.cells.count_update(cell);
+            let deviation = match is_expected {
+                true => EDITED,
+                false if self.is_moving => MOVING,
+                false => STILL,
+            };
+            if self.adapt(cell, of_cell, deviation) {
                 self.cells.hasten(cell);
                 self.stale.extend(self.readers.get(&block).into_iter().flatten());
             }
@@ -365,6 +383,27 @@ impl LightmapSolver {
             self.news.extend(self.beside.get(&block).into_iter().flatten());
             self.news.insert(block);
         }
+    }
+
+    /// Lets what is known of a cell's lumels follow what is new. Whether light has changed much.
+    fn adapt(&mut self, cell: usize, new: &[(usize, Sum)], deviation: f32) -> bool {
+        let significance = self.settings.significance;
+        if significance.is_infinite() {
+            return false;
+        }
+        let pairs = new.iter().map(|(receiver, new)| (&self.sums[*receiver], new));
+        let Change { gain, is_other } = Change::of(pairs, Prior { deviation, significance });
+        if gain != Vec3::ONE || is_other {
+            for sum in &mut self.sums[self.cells.receivers_of(cell)] {
+                sum.brighten(gain);
+                if is_other {
+                    sum.limit(OTHER);
+                } else if deviation == EDITED {
+                    sum.doubt(WRONG);
+                }
+            }
+        }
+        is_other || (gain - 1.0).abs().max_element() > MUCH
     }
 
     /// Makes light of what has been taken in since the last time: filtered on the surface where

@@ -7,14 +7,10 @@ use lumencast_light::luminance;
 /// Share of backs, by winding, above which a lumel lies within something: its light is that of the
 /// lumels about it.
 const BURIED_ABOVE: f32 = 0.5;
+/// What is doubted weighs as many samples as that, at least.
+const LEAST: f32 = 8.0;
 /// Samples of a lumel from which on its light is shown.
 const SETTLED: f32 = 24.0;
-/// By how much the squares of noise scatter more than those of a normal distribution do.
-const TAILS: f32 = 1.5;
-/// Share of the light by which lumels may differ together without counting as another light: their paths
-/// end in the same light of the tick before, whose noise they share.
-const SHARED: f32 = 0.02;
-
 /// What has arrived at a lumel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Sum {
@@ -37,9 +33,29 @@ impl Sum {
         is_sound.then_some(Self { sum, squares, samples, backs })
     }
 
+    /// Samples of these luminances.
+    #[cfg(test)]
+    pub(crate) fn of_samples(values: impl Iterator<Item = f32>) -> Self {
+        let add = |all: Self, value: f32| Self {
+            sum: all.sum + value,
+            squares: all.squares + value * value,
+            samples: all.samples + 1.0,
+            ..all
+        };
+        values.fold(Self::default(), add)
+    }
+
     /// Adds what is new, which weighs no less than `ratio`.
     pub(crate) fn add(&mut self, new: &Self, ratio: f32) {
-        let most = new.samples * (1.0 - ratio) / ratio;
+        self.limit(new.samples * (1.0 - ratio) / ratio);
+        self.sum += new.sum;
+        self.squares += new.squares;
+        self.backs += new.backs;
+        self.samples += new.samples;
+    }
+
+    /// Lets what is known weigh no more than so many samples.
+    pub(crate) fn limit(&mut self, most: f32) {
         if self.samples > most {
             let share = most / self.samples;
             self.sum *= share;
@@ -47,10 +63,31 @@ impl Sum {
             self.backs *= share;
             self.samples = most;
         }
-        self.sum += new.sum;
-        self.squares += new.squares;
-        self.backs += new.backs;
-        self.samples += new.samples;
+    }
+
+    /// Lets what is known weigh no more than samples that leave this share of it as noise.
+    pub(crate) fn doubt(&mut self, share: f32) {
+        let wrong = (share * luminance(self.mean())).powi(2);
+        if wrong > 0.0 {
+            self.limit((self.scatter() / wrong).max(LEAST));
+        }
+    }
+
+    /// Makes light so much brighter.
+    pub(crate) fn brighten(&mut self, gain: Vec3) {
+        let before = luminance(self.sum);
+        self.sum *= gain;
+        let brighter = if before > 0.0 { luminance(self.sum) / before } else { 1.0 };
+        self.squares *= brighter * brighter;
+    }
+
+    pub(crate) fn samples(&self) -> f32 {
+        self.samples
+    }
+
+    /// Irradiance, lux; zero where nothing has arrived.
+    pub(crate) fn mean(&self) -> Vec3 {
+        if self.samples > 0.0 { self.sum / self.samples } else { Vec3::ZERO }
     }
 
     /// Whether enough has arrived for light to be shown.
@@ -68,40 +105,14 @@ impl Sum {
         if self.samples == 0.0 {
             return Some((Vec3::ZERO, f32::INFINITY));
         }
-        let mean = self.sum / self.samples;
-        (!self.is_buried()).then(|| (mean, self.scatter() / self.samples))
+        (!self.is_buried()).then(|| (self.mean(), self.scatter() / self.samples))
     }
 
     /// Variance a sample of the luminance.
-    fn scatter(&self) -> f32 {
-        let mean = luminance(self.sum / self.samples);
+    pub(crate) fn scatter(&self) -> f32 {
+        let mean = luminance(self.mean());
         (self.squares / self.samples - mean * mean).max(0.0)
     }
-}
-
-/// Whether what is new at some lumels differs from what is known there by more than chance explains. Two
-/// sums tell: that of squared differences finds light that has changed here and there; that of
-/// differences finds light that has changed a little everywhere. Each may lie so many of its own standard
-/// deviations from what noise makes of it.
-pub(crate) fn have_changed<'a>(
-    known_and_new: impl Iterator<Item = (&'a Sum, &'a Sum)>,
-    significance: f32,
-) -> bool {
-    let (mut squares, mut expected, mut count) = (0.0, 0.0, 0.0);
-    let (mut drift, mut level) = (0.0f32, 0.0);
-    for (known, new) in known_and_new.filter(|(known, _)| known.samples > 0.0) {
-        let [before, now] = [known, new].map(|sum| luminance(sum.sum / sum.samples));
-        // Few samples tell little of how they scatter: those of both together tell more.
-        let (n, m) = (known.samples, new.samples);
-        let scatter = (n * known.scatter() + m * new.scatter()) / (n + m);
-        expected += scatter * (1.0 / n + 1.0 / m);
-        squares += (now - before).powi(2);
-        drift += now - before;
-        level += before;
-        count += 1.0;
-    }
-    let chance = 1.0 + significance * TAILS * (2.0 / count as f32).sqrt();
-    squares > chance * expected || drift.abs() > significance * expected.sqrt() + SHARED * level
 }
 
 /// How noisy a sample is at some lumels, as it is displayed: the standard deviation of its luminance, by
@@ -109,7 +120,7 @@ pub(crate) fn have_changed<'a>(
 pub(crate) fn noise(sums: &[Sum]) -> f32 {
     let (mut squares, mut known) = (0.0, 0.0);
     for sum in sums.iter().filter(|sum| sum.samples > 0.0 && !sum.is_buried()) {
-        let mean = luminance(sum.sum / sum.samples);
+        let mean = luminance(sum.mean());
         squares += if mean > 0.0 { sum.scatter() / mean } else { 0.0 };
         known += 1.0;
     }
@@ -119,52 +130,6 @@ pub(crate) fn noise(sums: &[Sum]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::{mix, unit};
-
-    /// Sums of so many samples of a level, each with noise of a standard deviation.
-    fn sum(level: f32, noise: f32, samples: u32, seed: u64) -> Sum {
-        let mut all = Sum::default();
-        for sample in 0..samples {
-            let random = unit((mix(seed << 32 | u64::from(sample)) >> 32) as u32);
-            let value = level + noise * 12.0f32.sqrt() * (random - 0.5);
-            all.sum += value;
-            all.squares += value * value;
-            all.samples += 1.0;
-        }
-        all
-    }
-
-    fn changed(before: f32, now: f32, seed: u64) -> bool {
-        let pairs: Vec<(Sum, Sum)> = (0..16)
-            .map(|k| {
-                (
-                    sum(before, 1.0, 64, 2 * (16 * seed + k)),
-                    sum(now, 1.0, 16, 2 * (16 * seed + k) + 1),
-                )
-            })
-            .collect();
-        have_changed(pairs.iter().map(|(a, b)| (a, b)), 3.5)
-    }
-
-    #[test]
-    fn changes_are_told_from_noise() {
-        let false_alarms = (0..500).filter(|seed| changed(2.0, 2.0, *seed)).count();
-        assert!(false_alarms <= 5, "{false_alarms} of 500");
-        let found = (0..500).filter(|seed| changed(2.0, 2.8, *seed)).count();
-        assert!(found > 450, "{found} of 500");
-    }
-
-    #[test]
-    fn little_that_is_known_tells_nothing() {
-        let (nothing, new) = (Sum::default(), sum(1.0, 0.1, 16, 1));
-        assert!(!have_changed([(&nothing, &new); 16].into_iter(), 3.5));
-        let before = sum(9.0, 0.1, 16, 2);
-        assert!(have_changed([(&before, &new); 1].into_iter(), 3.5), "of one lumel, much");
-        let near = sum(1.05, 0.1, 16, 2);
-        assert!(!have_changed([(&near, &new); 1].into_iter(), 3.5), "little");
-        assert!(have_changed([(&before, &new); 16].into_iter(), 3.5));
-        assert!(!have_changed([(&before, &new); 16].into_iter(), f32::INFINITY));
-    }
 
     /// Updates are averaged until they weigh the ratio.
     #[test]
