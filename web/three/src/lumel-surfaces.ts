@@ -16,6 +16,7 @@ import {
 import type { Content } from './content.js';
 import { laterShare } from './handover.js';
 import { materialsOf } from './patch.js';
+import { isSamePlace } from './same-place.js';
 
 /** Where surfaces lie in the texture of all pages. */
 export interface PlacedLayout {
@@ -206,7 +207,7 @@ export class LumelSurfaces {
     const { mesh, original, charted, share, worldFromObject } = lit;
     if (mesh.geometry !== original && mesh.geometry !== charted) return this.#leave(key, lit);
     const isWanted = this.#wanted.has(key);
-    lit.comes = isWanted && mesh.matrixWorld.equals(worldFromObject);
+    lit.comes = isWanted && isSamePlace(mesh.matrixWorld, worldFromObject);
     if (share === 0 && !isWanted) return this.#release(key, lit);
     mesh.geometry = share > 0 || lit.comes ? charted : original;
     setLumelShare(charted, share);

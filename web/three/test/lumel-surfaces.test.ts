@@ -152,6 +152,21 @@ describe('meshes that a layout names', () => {
     expect(share(mesh)).toBe(0.5);
   });
 
+  it('keep their lumels where they are put right by rounding', () => {
+    const mesh = square(0);
+    mesh.position.set(-2.501316059358957, 0.1, 800.01);
+    set(0);
+    frame();
+    mesh.position.fromArray([...mesh.position].map(Math.fround));
+    frame();
+    frame(1000);
+    expect([share(mesh), surfaces.count]).toEqual([1, 1]);
+    mesh.position.y += 1e-3;
+    frame();
+    frame(1000);
+    expect(surfaces.count).toBe(0);
+  });
+
   it('have lumels where they are found when the page is shown again', () => {
     const mesh = square(0);
     set(0);
