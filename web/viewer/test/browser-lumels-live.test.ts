@@ -54,6 +54,14 @@ const pictures = () =>
     };
   });
 
+/** Brightness of the walls' indirect light. */
+async function lumelsOnWalls(): Promise<number> {
+  await page.evaluate(() => window.lumencast!.setMode('indirect'));
+  const walls = await seen(page);
+  await page.evaluate(() => window.lumencast!.setMode('both'));
+  return walls.flat().reduce((sum, value) => sum + value, 0);
+}
+
 /** Checks that the walls' indirect light is that of lumels. */
 async function expectLumelsOnWalls(): Promise<void> {
   await page.evaluate(() => window.lumencast!.setMode('indirect'));
@@ -149,4 +157,17 @@ it('stays when the server dies, and goes on when it is back', async () => {
   expect((await pictures()).kinds).toEqual(['planes']);
   await expectLumelsOnWalls();
   expect(difference(before, await look(page, 'both'))).toBeLessThan(0.25);
+
+  // It is that server's light which they show.
+  const dim = await lumelsOnWalls();
+  await page.evaluate(() => {
+    const { light, viewer } = window.lumencast!;
+    const [lamp] = viewer.lights;
+    return light.edit({
+      edit: 'set_light',
+      node: light.content.nodeOf(lamp)!,
+      intensity: 16 * lamp.intensity,
+    });
+  });
+  await expect.poll(lumelsOnWalls).toBeGreaterThan(1.3 * dim);
 });
