@@ -7,7 +7,8 @@ import {
   BufferAttribute,
   BufferGeometry,
   InstancedBufferAttribute,
-  type InterleavedBufferAttribute,
+  InstancedInterleavedBuffer,
+  InterleavedBufferAttribute,
   type Mesh,
   type TypedArray,
 } from 'three';
@@ -24,16 +25,25 @@ export const NO_LUMELS = -1;
 
 /**
  * The attribute that tells how much of a geometry's diffuse light its lumels make, 0 to 1; probes make the
- * rest. One value is for all vertices: it counts instances, of which a mesh has one.
+ * rest. It has a value for each copy that is drawn in one go: a mesh that is no InstancedMesh has one.
  */
 export const LUMEL_SHARE = 'lumelShare';
+
+/**
+ * The attribute that tells where the lumels of a copy begin, x, y in the pages' texture plus {@link FIRST}, of
+ * its front and its back: {@link LUMELS} then counts from there. {@link NO_LUMELS} where that side of the copy
+ * has none. Geometries without copies have no such attribute.
+ */
+export const LUMEL_CORNER = 'lumelCorner';
+
+type Attribute = BufferAttribute | InterleavedBufferAttribute;
 
 /** Charts of the two sides of a primitive. */
 export type Sides = readonly [front: Charts | undefined, back: Charts | undefined];
 
 /** What a geometry becomes by charts, wherever these lie on pages. */
 export interface Parted {
-  readonly attributes: Readonly<Record<string, BufferAttribute>>;
+  readonly attributes: Readonly<Record<string, Attribute>>;
   readonly index: BufferAttribute;
   /** Of each vertex the vertex of the charts of each side, or −1. */
   readonly chartVertices: readonly [front: Int32Array, back: Int32Array];
@@ -51,9 +61,9 @@ export function isCharted(geometry: BufferGeometry | undefined): boolean {
   return geometry !== undefined && originals.has(geometry);
 }
 
-/** Whether a mesh may take light from lumels: one that neither deforms nor stands for several. */
+/** Whether a mesh may take light from lumels: one that does not deform, nor is a batch of others. */
 export function canHaveLumels(mesh: Mesh): boolean {
-  const isOther = ['isInstancedMesh', 'isSkinnedMesh', 'isBatchedMesh'].some((kind) => kind in mesh);
+  const isOther = ['isSkinnedMesh', 'isBatchedMesh'].some((kind) => kind in mesh);
   return !isOther && Object.keys(mesh.geometry.morphAttributes).length === 0;
 }
 
@@ -68,7 +78,9 @@ export function part(geometry: BufferGeometry, sides: Sides): Parted | undefined
   const { sources, chartVertices } = vertices.found();
   const attributes = Object.entries(geometry.attributes);
   return {
-    attributes: Object.fromEntries(attributes.map(([name, all]) => [name, gather(all, sources)])),
+    attributes: Object.fromEntries(
+      attributes.map(([name, all]) => [name, isOfCopies(all) ? all : gather(all, sources)]),
+    ),
     index: new BufferAttribute(sources.length > 0xffff ? index : Uint16Array.from(index), 1),
     chartVertices,
   };
@@ -138,8 +150,14 @@ function fits({ triangles, sources }: Charts, own: TypedArray): boolean {
   return true;
 }
 
+/** Whether an attribute has values of copies rather than of vertices. */
+function isOfCopies(attribute: Attribute): boolean {
+  if ('data' in attribute) return 'isInstancedInterleavedBuffer' in attribute.data;
+  return 'isInstancedBufferAttribute' in attribute;
+}
+
 /** The values of these vertices. */
-function gather(all: BufferAttribute | InterleavedBufferAttribute, sources: Uint32Array): BufferAttribute {
+function gather(all: Attribute, sources: Uint32Array): BufferAttribute {
   const { itemSize, normalized } = all;
   const isInterleaved = 'data' in all;
   const stride = isInterleaved ? all.data.stride : itemSize;
@@ -182,19 +200,24 @@ export function lumelsAttribute(
   return new BufferAttribute(array, itemSize);
 }
 
-/** A geometry that stands in for another: parted, and with lumels. What it is made of may be shared. */
+/**
+ * A geometry that stands in for another: parted, and with lumels. What it is made of may be shared. With
+ * `copies`, what {@link LUMEL_CORNER} tells of each, it is for an InstancedMesh.
+ */
 export function chartedGeometry(
   original: BufferGeometry,
   { attributes, index }: Parted,
   lumels: BufferAttribute,
   share = 1,
+  copies?: Float32Array,
 ): BufferGeometry {
   const geometry = new BufferGeometry();
   geometry.name = original.name;
   geometry.userData = original.userData;
   for (const [name, attribute] of Object.entries(attributes)) geometry.setAttribute(name, attribute);
   geometry.setAttribute(LUMELS, lumels);
-  geometry.setAttribute(LUMEL_SHARE, new InstancedBufferAttribute(Float32Array.of(share), 1));
+  if (copies) setCopies(geometry, copies, share);
+  else geometry.setAttribute(LUMEL_SHARE, new InstancedBufferAttribute(Float32Array.of(share), 1));
   geometry.setIndex(index);
   // Triangles keep their order, and so does what counts them.
   for (const { start, count, materialIndex } of original.groups)
@@ -208,16 +231,30 @@ export function chartedGeometry(
   return geometry;
 }
 
+/** Corners and shares of copies lie in one buffer: WebGPU allows eight a geometry. */
+function setCopies(geometry: BufferGeometry, corners: Float32Array, share: number): void {
+  const count = corners.length / 4;
+  const array = new Float32Array(5 * count);
+  for (let copy = 0; copy < count; copy++) {
+    array.set(corners.subarray(4 * copy, 4 * copy + 4), 5 * copy);
+    array[5 * copy + 4] = share;
+  }
+  const buffer = new InstancedInterleavedBuffer(array, 5);
+  geometry.setAttribute(LUMEL_CORNER, new InterleavedBufferAttribute(buffer, 4, 0));
+  geometry.setAttribute(LUMEL_SHARE, new InterleavedBufferAttribute(buffer, 1, 4));
+}
+
 /** Sets how much of a geometry's diffuse light its lumels make. */
 export function setLumelShare(geometry: BufferGeometry, share: number): void {
   const attribute = geometry.getAttribute(LUMEL_SHARE);
-  if (attribute.getX(0) === share) return;
-  attribute.setX(0, share);
+  // As it is stored.
+  if (attribute.getX(0) === Math.fround(share)) return;
+  for (let copy = 0; copy < attribute.count; copy++) attribute.setX(copy, share);
   attribute.needsUpdate = true;
 }
 
 /** What a geometry does not share with others of the same charts. */
-const OWN: readonly string[] = [LUMELS, LUMEL_SHARE];
+const OWN: readonly string[] = [LUMELS, LUMEL_SHARE, LUMEL_CORNER];
 
 /** Frees what a geometry alone has; what it shares stays for the others. */
 export function disposeCharted(geometry: BufferGeometry, isLast: boolean): void {

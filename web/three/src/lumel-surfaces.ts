@@ -1,9 +1,7 @@
-import type { LightmapLayout, LightmapSurface } from '@lumencast/client';
-import { type BufferGeometry, Matrix4, type Mesh, type Object3D } from 'three';
+import { type BufferGeometry, type InstancedMesh, Matrix4, type Mesh, type Object3D } from 'three';
 import {
   canHaveLumels,
   chartedGeometry,
-  type Corners,
   disposeCharted,
   isCharted,
   lumelsAttribute,
@@ -15,15 +13,10 @@ import {
 } from './charted.js';
 import type { Content } from './content.js';
 import { laterShare } from './handover.js';
+import { type Copies, lumelsOfCopies } from './lumel-copies.js';
+import { isSame, type Placed, type PlacedLayout, type Wanted, wantedBy } from './lumel-wanted.js';
 import { materialsOf } from './patch.js';
 import { isSamePlace } from './same-place.js';
-
-/** Where surfaces lie in the texture of all pages. */
-export interface PlacedLayout {
-  readonly layout: LightmapLayout;
-  /** The first lumel of a page there. */
-  readonly corner: (page: number) => readonly [x: number, y: number];
-}
 
 /** Milliseconds of a frame in which geometries are made, beyond the first one. */
 const BUDGET = 1;
@@ -32,14 +25,6 @@ const BUDGET = 1;
  * lumels again after two seconds: on a page that was hidden, nobody saw that they were gone.
  */
 const GAP = 1500;
-
-/** A primitive of a node that is to have lumels. */
-interface Wanted {
-  readonly node: number;
-  readonly primitive: number;
-  readonly sides: Sides;
-  readonly corners: readonly [front: Corners, back: Corners];
-}
 
 /** A mesh that has lumels, or is on its way to them or back. */
 interface Lit {
@@ -83,7 +68,7 @@ export class LumelSurfaces {
   #revision = -1;
   #updatedAt = -Infinity;
   #hasLayouts = false;
-  #hasWarned = false;
+  readonly #warned = new Set<string>();
 
   constructor(
     private readonly scene: Object3D,
@@ -167,16 +152,19 @@ export class LumelSurfaces {
     }
     if (!canHaveLumels(mesh) || materialsOf(mesh).some(isTransmissive)) return false;
     const original = withoutCharts(mesh.geometry);
-    const kept = this.#keep(original, wanted.sides);
+    const of = lumelsOf(mesh, wanted);
+    if (of?.isWhole === false) this.#warnOf(mesh, 'copies whose charts are not those of most others');
+    if (!of?.sides.some((charts) => charts)) return false;
+    const kept = this.#keep(original, of.sides);
     if (!kept) {
-      this.#warnOf(mesh);
+      this.#warnOf(mesh, "meshes whose triangles are not those of the server's file");
       return true;
     }
     kept.users++;
-    const lumels = lumelsAttribute(kept.parted, wanted.sides, wanted.corners);
+    const lumels = lumelsAttribute(kept.parted, of.sides, of.corners);
     const known = before?.mesh === mesh ? before : undefined;
     const share = known?.share ?? firstShare;
-    const charted = chartedGeometry(original, kept.parted, lumels, share);
+    const charted = chartedGeometry(original, kept.parted, lumels, share, of.each);
     const worldFromObject = new Matrix4();
     const lit = { wanted, mesh, original, charted, kept, worldFromObject, share, comes: true };
     if (known) worldFromObject.copy(known.worldFromObject);
@@ -235,60 +223,24 @@ export class LumelSurfaces {
     disposeCharted(charted, isLast);
   }
 
-  #warnOf({ name }: Mesh): void {
-    if (this.#hasWarned) return;
-    this.#hasWarned = true;
-    this.warn(
-      `meshes whose triangles are not those of the server's file are lit by probes alone${name && `, such as ${name}`}`,
-    );
+  /** Says, once, what is lit by probes alone. */
+  #warnOf({ name }: Mesh, what: string): void {
+    if (this.#warned.has(what)) return;
+    this.#warned.add(what);
+    this.warn(`${what} are lit by probes alone${name && `, such as ${name}`}`);
   }
+}
+
+/** The lumels of a mesh, or of its copies. */
+function lumelsOf(mesh: Mesh, wanted: Wanted): (Placed & Partial<Copies>) | undefined {
+  const { instanceMatrix } = mesh as Partial<InstancedMesh>;
+  return instanceMatrix ? lumelsOfCopies(wanted, instanceMatrix.count) : wanted.copies.get(0);
 }
 
 /** Says that a mesh has its lumels where it now stands. */
 function place({ mesh, worldFromObject }: Lit): void {
   mesh.updateWorldMatrix(true, false);
   worldFromObject.copy(mesh.matrixWorld);
-}
-
-function wantedBy(layouts: readonly PlacedLayout[]): ReadonlyMap<string, Wanted> {
-  const sides = new Map<string, [PlacedSurface | undefined, PlacedSurface | undefined]>();
-  for (const { layout, corner } of layouts) {
-    for (const surface of layout.surfaces) {
-      // Further instances of a node are drawn in one go, with one geometry.
-      if (surface.copy !== 0 || surface.rectangles.length !== surface.charts.sizes.length) continue;
-      const key = `${surface.node}/${surface.primitive}`;
-      const of = sides.get(key) ?? [undefined, undefined];
-      of[Number(surface.back)] ??= { surface, corners: cornersOf(surface, corner) };
-      sides.set(key, of);
-    }
-  }
-  return new Map([...sides].map(([key, of]) => [key, wanted(of)]));
-}
-
-interface PlacedSurface {
-  readonly surface: LightmapSurface;
-  readonly corners: Corners;
-}
-
-function wanted([front, back]: readonly [PlacedSurface | undefined, PlacedSurface | undefined]): Wanted {
-  const { node, primitive } = (front ?? back)!.surface;
-  const sides = [front?.surface.charts, back?.surface.charts] as const;
-  return { node, primitive, sides, corners: [front?.corners ?? [], back?.corners ?? []] };
-}
-
-function cornersOf({ rectangles }: LightmapSurface, corner: PlacedLayout['corner']): Corners {
-  return rectangles.map(({ page, x, y }) => {
-    const [left, top] = corner(page);
-    return [left + x, top + y] as const;
-  });
-}
-
-function isSame(a: Wanted, b: Wanted): boolean {
-  return a.sides.every((charts, side) => charts === b.sides[side] && isAt(a.corners[side], b.corners[side]));
-}
-
-function isAt(a: Corners, b: Corners): boolean {
-  return a.length === b.length && a.every(([x, y], i) => x === b[i][0] && y === b[i][1]);
 }
 
 /** Light goes through it, and what it scatters is little of what arrives. */

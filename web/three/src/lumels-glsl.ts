@@ -1,4 +1,4 @@
-import { FIRST, LUMEL_SHARE, LUMELS } from './charted.js';
+import { FIRST, LUMEL_CORNER, LUMEL_SHARE, LUMELS } from './charted.js';
 
 /**
  * What a vertex hands on in place of coordinates where its side has no lumels, and where its geometry
@@ -14,13 +14,21 @@ const BELOW_NOWHERE = '- 2e6';
 export const LUMELS_OF_VERTEX = /* glsl */ `
 attribute vec4 ${LUMELS};
 attribute float ${LUMEL_SHARE};
+attribute vec4 ${LUMEL_CORNER};
 varying highp vec4 vLumels;
 flat varying float vLumelShare;
+
+// A geometry without copies has no corners: below ${FIRST}, they are none.
+vec2 lumelsPlaced( vec2 lumels, vec2 corner ) {
+	if ( lumels.x < 1.5 || corner.x < 0.0 ) return vec2( ${NOWHERE} );
+	return lumels - ${FIRST}.0 + max( corner - ${FIRST}.0, 0.0 );
+}
 `;
 
 export const LUMELS_OF_VERTEX_MAIN = /* glsl */ `
-vLumels.xy = ${LUMELS}.x > 1.5 ? ${LUMELS}.xy - ${FIRST}.0 : vec2( ${LUMELS}.x < 0.0 ? ${NOWHERE} : ${UNKNOWN} );
-vLumels.zw = ${LUMELS}.z > 1.5 ? ${LUMELS}.zw - ${FIRST}.0 : vec2( ${NOWHERE} );
+bool isUnknown = ${LUMELS}.x > -0.5 && ${LUMELS}.x < 1.5;
+vLumels.xy = isUnknown ? vec2( ${UNKNOWN} ) : lumelsPlaced( ${LUMELS}.xy, ${LUMEL_CORNER}.xy );
+vLumels.zw = lumelsPlaced( ${LUMELS}.zw, ${LUMEL_CORNER}.zw );
 vLumelShare = ${LUMEL_SHARE};
 `;
 

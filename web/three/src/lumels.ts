@@ -3,7 +3,8 @@ import type { Light, Scene, Texture } from 'three';
 import type { Content } from './content.js';
 import { planAtlas } from './lumel-atlas.js';
 import { type LumelLook, LumelPages } from './lumel-pages.js';
-import { LumelSurfaces, type PlacedLayout } from './lumel-surfaces.js';
+import { LumelSurfaces } from './lumel-surfaces.js';
+import type { PlacedLayout } from './lumel-wanted.js';
 import type { Platform } from './platform.js';
 
 /** A field that is a lightmap. */

@@ -15,9 +15,10 @@ import {
   varying,
   vec2,
   vec3,
+  vec4,
 } from 'three/tsl';
 import { AnalyticLightNode, type Node, type NodeBuilder, type NodeFrame } from 'three/webgpu';
-import { FIRST, LUMEL_SHARE, LUMELS } from './charted.js';
+import { FIRST, LUMEL_CORNER, LUMEL_SHARE, LUMELS } from './charted.js';
 import { sizeOf } from './webgpu-pages.js';
 
 /** Uniforms of all scenes; other than neutral only while a scene is drawn. */
@@ -94,12 +95,17 @@ interface Seen {
 function seenBy({ geometry }: NodeBuilder): Seen | undefined {
   const stored = geometry?.getAttribute(LUMELS);
   if (!stored) return undefined;
-  const handedOn = (stored: Node<'vec2'>, name: string) =>
-    varying(stored.x.greaterThan(1.5).select(stored.sub(FIRST), vec2(NOWHERE)), name);
   const both = attribute<'vec4'>(LUMELS, 'vec4');
   const hasBack = stored.itemSize === 4;
-  const front = handedOn(hasBack ? both.xy : attribute<'vec2'>(LUMELS, 'vec2'), 'vLumelsOfFront');
-  const back = hasBack ? handedOn(both.zw, 'vLumelsOfBack') : vec2(NOWHERE);
+  const hasCopies = geometry?.hasAttribute(LUMEL_CORNER);
+  const corners = hasCopies ? attribute<'vec4'>(LUMEL_CORNER, 'vec4') : vec4(FIRST);
+  const handedOn = (lumels: Node<'vec2'>, corner: Node<'vec2'>, name: string) => {
+    const has = lumels.x.greaterThan(1.5).and(corner.x.greaterThan(1.5));
+    return varying(has.select(lumels.add(corner).sub(2 * FIRST), vec2(NOWHERE)), name);
+  };
+  const ofFront = hasBack ? both.xy : attribute<'vec2'>(LUMELS, 'vec2');
+  const front = handedOn(ofFront, corners.xy, 'vLumelsOfFront');
+  const back = hasBack ? handedOn(both.zw, corners.zw, 'vLumelsOfBack') : vec2(NOWHERE);
   const share = varying(attribute<'float'>(LUMEL_SHARE, 'float'), 'vLumelShare');
   return {
     at: frontFacing.select(front, back),

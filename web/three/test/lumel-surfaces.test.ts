@@ -1,7 +1,9 @@
 /** Which meshes get geometries with lumels, and when they get their own ones back. */
+import type { LightmapSurface } from '@lumencast/client';
 import {
   type BufferAttribute,
   Group,
+  InstancedBufferAttribute,
   InstancedMesh,
   Mesh,
   MeshPhysicalMaterial,
@@ -10,7 +12,7 @@ import {
   Scene,
 } from 'three';
 import { beforeEach, describe, expect, it } from 'vitest';
-import { isCharted, LUMEL_SHARE, LUMELS } from '../src/charted.js';
+import { FIRST, isCharted, LUMEL_CORNER, LUMEL_SHARE, LUMELS, NO_LUMELS } from '../src/charted.js';
 import { Content, instantiateMesh } from '../src/content.js';
 import { LumelSurfaces } from '../src/lumel-surfaces.js';
 import { load, POSITION } from './support/glb.js';
@@ -59,6 +61,14 @@ const isLit = (object: Object3D) => isCharted((object as Mesh).geometry);
 
 /** How much of a mesh's light lumels make; 0 where it shows its own geometry. */
 const share = ({ geometry }: Mesh) => geometry.attributes[LUMEL_SHARE]?.getX(0) ?? 0;
+
+/** Copies of a square, drawn in one go. */
+function squares(node: number, count: number): InstancedMesh {
+  const mesh = new InstancedMesh(new PlaneGeometry(2, 2), undefined, count);
+  scene.add(mesh);
+  content.setNode(node, mesh);
+  return mesh;
+}
 
 describe('meshes that a layout names', () => {
   it('get a geometry with lumels, and their own one back when it names them no more', () => {
@@ -305,15 +315,13 @@ describe('probes alone light', () => {
     expect(warnings).toEqual([expect.stringMatching(/triangles.*wall/)]);
   });
 
-  it('instances of a node, and what light goes through', () => {
-    const instances = new InstancedMesh(new PlaneGeometry(2, 2), undefined, 2);
+  it('what light goes through', () => {
     const glass = new Mesh(new PlaneGeometry(2, 2), new MeshPhysicalMaterial({ transmission: 1 }));
-    scene.add(instances, glass);
-    content.setNode(0, instances);
-    content.setNode(1, glass);
-    set(0, 1);
+    scene.add(glass);
+    content.setNode(0, glass);
+    set(0);
     frame();
-    expect([instances, glass].map(isLit)).toEqual([false, false]);
+    expect(isLit(glass)).toBe(false);
     expect(warnings).toEqual([]);
   });
 
@@ -369,4 +377,87 @@ it('meshes are found by node and primitive in what GLTFLoader has read', async (
     if ((object as Mesh).isMesh) later.push(object as Mesh);
   });
   expect(later.map(isLit)).toEqual([false, false]);
+});
+
+describe('copies of a mesh', () => {
+  const OTHER = chartsOf([0, 2, 1, 2, 3, 1]);
+  const of = (copy: number, changes: Partial<LightmapSurface> = {}) =>
+    surface({ charts: SQUARE, copy, rectangles: [{ page: 0, x: 10 * copy, y: copy }], ...changes });
+  const corners = ({ geometry }: Mesh) => {
+    const attribute = geometry.getAttribute(LUMEL_CORNER);
+    return Array.from({ length: attribute.count }, (_, copy) =>
+      Array.from({ length: 4 }, (_, k) => attribute.getComponent(copy, k)),
+    );
+  };
+  const put = (x: number, y: number) => [FIRST + x, FIRST + y];
+  const NONE = [NO_LUMELS, NO_LUMELS];
+  const lay = (...all: LightmapSurface[]) => surfaces.setLayouts([{ layout: layout(...all), corner }]);
+
+  it('have lumels of their own, on both sides', () => {
+    const mesh = squares(0, 3);
+    lay(of(0), of(0, { back: true, rectangles: [{ page: 0, x: 50, y: 60 }] }), of(2), of(3));
+    frame();
+    expect(corners(mesh)).toEqual([
+      [...put(0, 0), ...put(50, 60)],
+      [...NONE, ...NONE],
+      [...put(20, 2), ...NONE],
+    ]);
+    // Their charts begin at each one's corner.
+    const lumels = mesh.geometry.getAttribute(LUMELS);
+    expect([lumels.getX(0), lumels.getY(0)]).toEqual(put(1, 1));
+    expect(mesh.geometry.getAttribute(LUMEL_SHARE).count).toBe(3);
+    expect([surfaces.count, warnings]).toEqual([1, []]);
+  });
+
+  it('pass from probes to lumels, and back, all at once', () => {
+    const mesh = squares(0, 2);
+    lay(of(0), of(1));
+    frame();
+    mesh.position.x = 1;
+    frame();
+    frame(125);
+    const { geometry } = mesh;
+    const shares = () => [0, 1].map((copy) => geometry.getAttribute(LUMEL_SHARE).getX(copy));
+    expect(shares()).toEqual([0.75, 0.75]);
+    const [[x]] = corners(mesh);
+    expect(x).toBe(FIRST);
+    frame(375);
+    expect(isLit(mesh)).toBe(false);
+  });
+
+  it('keep what they have where others move on the pages', () => {
+    const mesh = squares(0, 2);
+    lay(of(0), of(1));
+    frame();
+    lay(of(0), of(1, { rectangles: [{ page: 0, x: 70, y: 80 }] }));
+    frame();
+    expect(corners(mesh)).toEqual([
+      [...put(0, 0), ...NONE],
+      [...put(70, 80), ...NONE],
+    ]);
+  });
+
+  it('stay with probes where their charts are not those of most, or lie on several rectangles', () => {
+    const mesh = squares(0, 3);
+    lay(of(0, { charts: OTHER }), of(1), of(2));
+    frame();
+    expect(corners(mesh).map(([x]) => x)).toEqual([NO_LUMELS, FIRST + 10, FIRST + 20]);
+    expect(warnings).toEqual([expect.stringMatching(/copies.*probes/)]);
+
+    const [whole, all] = [{ ...SQUARE, sizes: [SQUARE.sizes[0], SQUARE.sizes[0]] }, squares(1, 1)];
+    const rectangles = [0, 1].map((page) => ({ page, x: 0, y: 0 }));
+    lay(of(0, { node: 1, charts: whole, rectangles }));
+    frame();
+    expect(isLit(all)).toBe(false);
+    expect(warnings).toHaveLength(1);
+  });
+
+  it('keep what their geometry has for each of them', () => {
+    const mesh = squares(0, 2);
+    const tint = new InstancedBufferAttribute(Float32Array.of(1, 2), 1);
+    mesh.geometry.setAttribute('tint', tint);
+    lay(of(0), of(1));
+    frame();
+    expect(mesh.geometry.getAttribute('tint')).toBe(tint);
+  });
 });

@@ -45,8 +45,12 @@ describe.skipIf(!chromiumProgram)('lumels', () => {
   beforeEach(() => void (opened.complaints.length = 0));
 
   describe.each(['webgl', 'webgpu', 'fallback'] as const)('drawn by %s', (kind: Drawer) => {
-    const rows = (steps: readonly Step[]): Promise<Radiance[][]> =>
-      opened.page.evaluate(([kind, steps]) => window.measure!.lumels(kind, steps), [kind, steps] as const);
+    const rows = (steps: readonly Step[], areCopies = false): Promise<Radiance[][]> =>
+      opened.page.evaluate(([kind, steps, areCopies]) => window.measure!.lumels(kind, steps, areCopies), [
+        kind,
+        steps,
+        areCopies,
+      ] as const);
 
     /** Of steps whose tiles are of one value, irradiance of the left floor, and radiance of the right one. */
     const middles = async (steps: readonly Step[]) =>
@@ -211,6 +215,25 @@ describe.skipIf(!chromiumProgram)('lumels', () => {
         expect(Math.abs(value - (seen[i - 1] ?? first)[0])).toBeLessThan(way / 30 + 0.01);
       });
       expect(seen.at(-1)![0]).toBeCloseTo(9, 2);
+    }, 60_000);
+
+    it('of copies of a mesh are each one’s own', async () => {
+      const tiles = [halves(GRADIENT, 32), halves(even(7), 16), undefined, halves(even(5), 16)];
+      const lit = Object.fromEntries(
+        tiles.flatMap((picture, tile) => (picture ? [[tile, { picture, revision: 1 }]] : [])),
+      );
+      const [above, below, moved, half] = await rows(
+        [{ tiles: lit }, { turned: true }, { turned: false, moved: 0.5 }, { after: 250 }],
+        true,
+      );
+      for (const pixel of LEFT) expect(above[pixel][0] * Math.PI).toBeCloseTo(1 + lumelAt(pixel), 1);
+      expect(above[RIGHT][0] * Math.PI).toBeCloseTo(7, 2);
+      // From below, left is right, and its copy's back has none.
+      expect(below[SIZE - MIDDLE][0] * Math.PI).toBeCloseTo(5, 2);
+      expect(below[SIZE - RIGHT][0]).toBeCloseTo(1, 2);
+      expect(moved[RIGHT][0] * Math.PI).toBeCloseTo(7, 2);
+      expect(half[RIGHT][0] * Math.PI).toBeCloseTo((7 + Math.PI) / 2, 2);
+      expect(opened.complaints).toEqual([]);
     }, 60_000);
 
     it('are seen as a checkerboard', async () => {

@@ -1,13 +1,14 @@
-/** Draws two floors side by side, of which the left one has lumels, and reads them back after each change. */
+/** Draws two floors side by side, of which one or both have lumels, and reads them back after each change. */
 import {
   type Charts,
   halfBits,
   type LightmapLayout,
   type LightmapLight,
+  type LightmapSurface,
   type LumelPicture,
   type LumelRegion,
 } from '@lumencast/client';
-import { DoubleSide, Mesh, MeshLambertMaterial, PlaneGeometry, Scene } from 'three';
+import { DoubleSide, InstancedMesh, Matrix4, Mesh, MeshLambertMaterial, PlaneGeometry, Scene } from 'three';
 import { WebGPURenderer } from 'three/webgpu';
 import {
   fromAbove,
@@ -59,20 +60,29 @@ export type Picture =
       readonly chroma: number;
     };
 
-/** Radiance along x of both floors: the volume's is 1 everywhere. */
-export async function lumels(kind: Drawer, steps: readonly Step[]): Promise<Radiance[][]> {
+/**
+ * Radiance along x of both floors: the volume's is 1 everywhere. As copies of one mesh, drawn in one go, the
+ * right one has lumels, too, in the second tile, but none on its back.
+ */
+export async function lumels(kind: Drawer, steps: readonly Step[], areCopies = false): Promise<Radiance[][]> {
   const renderer = kind === 'fallback' ? new WebGPURenderer({ forceWebGL: true }) : await rendererOf(kind);
   if (kind === 'fallback') await (renderer as WebGPURenderer).init();
   const scene = new Scene();
   // One material for what has lumels and for what has none.
   const material = new MeshLambertMaterial({ color: 0xffffff, side: DoubleSide });
-  const floors = [-1, 1].map((x) => {
-    const mesh = new Mesh(new PlaneGeometry(2, 4), material);
-    mesh.rotation.x = -Math.PI / 2;
+  const floor = new PlaneGeometry(2, 4);
+  const copies = new InstancedMesh(floor, material, 2);
+  const meshes = [-1, 1].map((x, i) => {
+    copies.setMatrixAt(i, new Matrix4().makeTranslation(x, 0, 0));
+    const mesh = new Mesh(floor, material);
     mesh.position.x = x;
-    scene.add(mesh);
     return mesh;
   });
+  const floors = areCopies ? [copies] : meshes;
+  for (const mesh of floors) {
+    mesh.rotation.x = -Math.PI / 2;
+    scene.add(mesh);
+  }
   const coefficients = Array.from({ length: 24 * 27 }, (_, i) => (i % 27 < 3 ? 1 / 0.282095 : 0));
   const volume = volumeLight(coefficients, { id: 1, size: [8, 4, 8] });
   const field = {
@@ -82,13 +92,14 @@ export async function lumels(kind: Drawer, steps: readonly Step[]): Promise<Radi
     shape: { coding: 'halves', pageSize: PAGE, pages: 1, layout: '0'.repeat(64) },
   } as const;
   const nothing: LightmapLayout = { pageSize: PAGE, pages: 1, surfaces: [] };
+  const surface = (copy: number, back: boolean, x: number, y: number): LightmapSurface => ({
+    ...{ node: 0, copy, primitive: 0, back, charts: CHARTS },
+    rectangles: [{ page: 0, x, y }],
+  });
   const both: LightmapLayout = {
     ...nothing,
-    surfaces: [false, true].map((back) => ({
-      ...{ node: 0, copy: 0, primitive: 0, back, charts: CHARTS },
-      // The back's lumels lie in the last tile.
-      rectangles: [{ page: 0, x: back ? TILE : 0, y: back ? TILE : 0 }],
-    })),
+    // The back's lumels lie in the last tile. Without copies, the second one is nobody's.
+    surfaces: [surface(0, false, 0, 0), surface(0, true, TILE, TILE), surface(1, false, TILE, 0)],
   };
   let layout = both;
   let lightmap: LightmapLight | undefined;
