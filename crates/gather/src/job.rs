@@ -104,7 +104,22 @@ pub enum Receiver {
         /// Edge vectors of the parallelogram, which is centred on `position`, metres; zero for a
         /// point.
         footprint: [Vec3; 2],
+        /// The normals that irradiance is asked for on.
+        shading: Shading,
     },
+}
+
+/// The normals that a lumel's irradiance is asked for on. Only light from above the surface counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Shading {
+    /// The surface's own.
+    #[default]
+    Own,
+    /// The surface's own, and those tilted about it: after irradiance its sums are x, y and z of its
+    /// slope ([`lumencast_light::slope_by`]) times it.
+    Tilted,
+    /// This world unit normal.
+    By(Vec3),
 }
 
 impl Receiver {
@@ -115,15 +130,21 @@ impl Receiver {
 
     /// A lumel without extent at a world position (metres) with a unit normal.
     pub fn point(position: Vec3, normal: Vec3) -> Self {
-        Self::Lumel { position, normal, footprint: [Vec3::ZERO; 2] }
+        Self::point_shaded(position, normal, Shading::Own)
+    }
+
+    /// The same, where irradiance is asked for on other normals.
+    pub fn point_shaded(position: Vec3, normal: Vec3, shading: Shading) -> Self {
+        Self::Lumel { position, normal, footprint: [Vec3::ZERO; 2], shading }
     }
 
     /// Number of entries of [`crate::SumsAt::sum`]: one for each coefficient of a probe, one for a
-    /// lumel.
+    /// lumel, and three more where its normal is tilted.
     pub fn terms(&self, order: Order) -> usize {
         match self {
             Self::Probe { .. } => order.coefficients(),
-            Self::Lumel { .. } => 1,
+            Self::Lumel { shading: Shading::Tilted, .. } => 4,
+            Self::Lumel { shading: Shading::Own | Shading::By(_), .. } => 1,
         }
     }
 }

@@ -6,7 +6,8 @@ use glam::Vec3;
 ///
 /// A *term* is the weight of one sample. A probe has `order.coefficients()` terms, 4π·Y_lm(ω), with
 /// directions spread uniformly over the sphere. A lumel has the single term π. Its directions are
-/// distributed by the cosine about its normal, its origins uniformly over its footprint.
+/// distributed by the cosine about its normal, its origins uniformly over its footprint. Where other
+/// normals count too, terms differ by direction, and flat directions are more frequent.
 ///
 /// Memory: 16 bytes a term and 16 bytes an entry, plus distances and surfaces where they are asked
 /// for.

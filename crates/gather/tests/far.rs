@@ -7,7 +7,7 @@ use lumencast_gather::path_trace::{CpuPathTracer, Levels, Options};
 use lumencast_gather::reference::{
     Film, PictureSettings, ProbeEstimate, ProbeSettings, Renderer, probe_sh,
 };
-use lumencast_gather::{Gather, Job, Receiver, Sums};
+use lumencast_gather::{Gather, Job, Receiver, Shading, Sums};
 use lumencast_light::{FieldId, Grid, Light, Order, ProbeVolume};
 use lumencast_scene::View;
 use lumencast_testkit::rooms::{Placed, Rooms};
@@ -134,7 +134,7 @@ fn floor(rooms: &Rooms, points: &[Vec3]) -> Vec<Vec3> {
     let footprint = [Vec3::X * 0.2, Vec3::Z * 0.2];
     let lumel = |point: &Vec3| {
         let position = Vec3 { y: rooms.at.y as f32, ..*point };
-        Receiver::Lumel { position, normal: Vec3::Y, footprint }
+        Receiver::Lumel { position, normal: Vec3::Y, footprint, shading: Shading::Own }
     };
     let sums = gathered(rooms, points.iter().map(lumel).collect(), 2048, |job| job);
     sums.iter().map(|sums| sums.mean().next().expect("irradiance")).collect()

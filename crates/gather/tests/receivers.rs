@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_gather::{Budget, Gather, Job, Receiver, Sums, SumsAt};
-use lumencast_light::{FieldId, Grid, Light, Order, Place, ProbeVolume};
+use lumencast_gather::{Budget, Gather, Job, Receiver, Shading, Sums, SumsAt};
+use lumencast_light::{FieldId, Grid, Light, Order, Place, ProbeVolume, slope_by};
 use lumencast_scene::{Environment, LightKind, Material, PunctualLight, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -23,7 +23,7 @@ fn gather(job: Job) -> Sums {
 }
 
 fn lumel(position: Vec3, normal: Vec3, footprint: [Vec3; 2]) -> Receiver {
-    Receiver::Lumel { position, normal, footprint }
+    Receiver::Lumel { position, normal, footprint, shading: Shading::Own }
 }
 
 /// Irradiance of a lumel whose light comes straight from sources.
@@ -162,6 +162,56 @@ fn lumels_under_a_rectangle_of_light() {
     });
     let mean = mean.sum::<f32>() / 4e4;
     check(irradiance(&scene, lumel(place, Vec3::Y, footprint)), mean, point, 1e-2);
+}
+
+/// A low rectangle of light beside a point, and a sky over it: irradiance on the surface's normal, its
+/// slope, and irradiance on tilted normals.
+#[test]
+fn lumels_of_tilted_normals() {
+    let (corner, along, up) = (Vec3::new(0.8, 0.05, -0.5), Vec3::Z, Vec3::new(0.2, 0.6, 0.0));
+    let facing = along.cross(up).normalize();
+    let mut stage = Stage::default();
+    let lamp = stage.material(lambert(BLACK, Vec3::ONE));
+    stage.quad(corner, along, up, lamp);
+    let of_lamp = stage.snapshot();
+    let mut stage = Stage::default();
+    stage.environment(Environment::Constant { radiance: Vec3::ONE });
+    let of_sky = stage.snapshot();
+    let steps = || (0..400).map(|i| (i as f32 + 0.5) / 400.0);
+    let integral = |of: &dyn Fn(Vec3) -> Vec3| -> Vec3 {
+        let parts = steps().flat_map(|u| steps().map(move |v| corner + u * along + v * up));
+        let area = along.cross(up).length() / 160_000.0;
+        parts
+            .map(|at| {
+                let to = at.normalize();
+                area * facing.dot(-to).max(0.0) / at.length_squared() * of(to)
+            })
+            .sum()
+    };
+    let gathered = |scene: &Arc<Snapshot>, shading| -> Vec<Vec3> {
+        let point = Receiver::point_shaded(BLACK, Vec3::Y, shading);
+        let job = Job { bounces: 0, ..Job::new(scene.clone(), [point], 1 << 17) };
+        gather(job).at(0).mean().collect()
+    };
+    let own = integral(&|to| Vec3::splat(to.y)).x;
+    let slope = integral(&|to| slope_by(to, Vec3::Y));
+    let found = gathered(&of_lamp, Shading::Tilted);
+    assert_eq!(found.len(), 4);
+    check(found[0].x, own, slope.x, 3e-3);
+    check(found[1].x, slope.x, own, 3e-3);
+    check(found[2].x, slope.y, own, 2e-2);
+    assert!(found[3].x.abs() < 3e-3 * slope.x, "{}", found[3].x);
+    let [irradiance, x, y, z] = gathered(&of_sky, Shading::Tilted)[..] else { panic!() };
+    check(irradiance.x, PI, 2.0 * PI, 3e-3);
+    check(y.x, 0.5 * PI, PI, 5e-3);
+    assert!(x.x.abs() < 1e-2 && z.x.abs() < 1e-2, "{x} {z}");
+    for tilt in [0.5f32, -0.5] {
+        let shading = Vec3::new(tilt.sin(), tilt.cos(), 0.0);
+        let right = integral(&|to| Vec3::splat(shading.dot(to).max(0.0))).x;
+        check(gathered(&of_lamp, Shading::By(shading))[0].x, right, own, 5e-3);
+        let right = 0.5 * PI * (1.0 + tilt.cos());
+        check(gathered(&of_sky, Shading::By(shading))[0].x, right, PI, 5e-3);
+    }
 }
 
 /// Above an endless plane at height h, distances counted up to D: below they are h/cos θ.

@@ -21,7 +21,10 @@ pub mod zh;
 pub use field::Field;
 pub use field_id::FieldId;
 pub use light::Light;
-pub use lightmap::{ChartVertex, Charts, Layout, Lightmap, Rectangle, Surface, SurfaceId};
+pub use lightmap::{
+    ChartVertex, Charts, Layout, Lightmap, Rectangle, STEEPEST, Surface, SurfaceId, TILT, Told,
+    slope, slope_by, tilted,
+};
 pub use luminance::luminance;
 pub use place::{OnTriangle, Place};
 pub use scale::ScaleRule;

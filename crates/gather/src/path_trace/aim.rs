@@ -7,15 +7,15 @@
 use std::f32::consts::PI;
 
 use glam::{Mat3, Quat, Vec3};
-use lumencast_light::{Order, sh};
+use lumencast_light::{Order, sh, slope_by};
 
 use super::paths::Look;
 use crate::accel::Ray;
 use crate::bsdf::frame;
-use crate::sampling::{Sampler, cosine_hemisphere, lattice, power_heuristic};
+use crate::sampling::{Sampler, cosine_hemisphere, lattice, power_heuristic, tilted_hemisphere};
 use crate::surface::gamma;
 use crate::world::{Passing, World};
-use crate::{Budget, Job, Receiver};
+use crate::{Budget, Job, Receiver, Shading};
 
 /// Distance of samples' origins from the surface, as a share of the lumel's size.
 const LIFT: f32 = 1e-3;
@@ -51,6 +51,7 @@ enum Prepared {
         footprint: [Vec3; 2],
         /// World from the frame whose z is the normal.
         frame: Mat3,
+        shading: Shading,
     },
 }
 
@@ -66,7 +67,7 @@ impl Aim {
                 let (position, turn) = (position - origin, lattice::turn(seed, receiver));
                 Prepared::Probe { order: job.order, position, turn }
             }
-            Receiver::Lumel { position, normal, footprint } => {
+            Receiver::Lumel { position, normal, footprint, shading } => {
                 let normal = normal.normalize_or(Vec3::Y);
                 let size = footprint[0].length().max(footprint[1].length());
                 let position = position - origin;
@@ -77,6 +78,7 @@ impl Aim {
                     position: position + lift * normal,
                     footprint,
                     frame: frame(normal),
+                    shading,
                 }
             }
         };
@@ -87,8 +89,11 @@ impl Aim {
         let mut sampler = Sampler::new(self.seed, self.receiver, sample);
         let (origin, direction) = match &self.place {
             Prepared::Probe { position, turn, .. } => (*position, self.towards(turn, sample)),
-            Prepared::Lumel { position, footprint: [a, b], frame } => {
-                let direction = frame * cosine_hemisphere(sampler.square());
+            Prepared::Lumel { position, footprint: [a, b], frame, shading } => {
+                let direction = match shading {
+                    Shading::Own => frame * cosine_hemisphere(sampler.square()),
+                    Shading::Tilted | Shading::By(_) => frame * tilted_hemisphere(sampler.square()),
+                };
                 let at = sampler.square() - 0.5;
                 (position + at.x * a + at.y * b, direction.normalize())
             }
@@ -117,21 +122,34 @@ impl Aim {
 
     /// Density per steradian with which samples choose a direction.
     fn density(&self, direction: Vec3) -> f32 {
+        let above = |frame: &Mat3| frame.z_axis.dot(direction);
         match &self.place {
             Prepared::Probe { .. } => 0.25 / PI,
-            Prepared::Lumel { frame, .. } => frame.z_axis.dot(direction).max(0.0) / PI,
+            Prepared::Lumel { frame, shading: Shading::Own, .. } => above(frame).max(0.0) / PI,
+            Prepared::Lumel { frame, .. } if above(frame) <= 0.0 => 0.0,
+            Prepared::Lumel { frame, .. } => (0.5 * above(frame) + 0.25) / PI,
         }
     }
 
     /// Factors of radiance from a direction in the receiver's integral; the first
     /// [`Receiver::terms`] numbers count.
     pub(super) fn integrand(&self, direction: Vec3) -> [f32; sh::MAX_COEFFICIENTS] {
-        match &self.place {
-            Prepared::Probe { order, .. } => sh::basis(*order, direction),
-            Prepared::Lumel { frame, .. } => {
-                [frame.z_axis.dot(direction).max(0.0); sh::MAX_COEFFICIENTS]
+        let (normal, shading) = match &self.place {
+            Prepared::Probe { order, .. } => return sh::basis(*order, direction),
+            Prepared::Lumel { frame, shading, .. } => (frame.z_axis, shading),
+        };
+        let mut factors = [0.0; sh::MAX_COEFFICIENTS];
+        let cosine = normal.dot(direction).max(0.0);
+        match shading {
+            Shading::Own => factors[0] = cosine,
+            Shading::Tilted => {
+                factors[0] = cosine;
+                factors[1..4].copy_from_slice(&slope_by(direction, normal).to_array());
             }
+            Shading::By(shading) if cosine > 0.0 => factors[0] = shading.dot(direction).max(0.0),
+            Shading::By(_) => {}
         }
+        factors
     }
 
     /// Factors of a sample's light: the integral's factors over the sample's density. The first
@@ -141,7 +159,12 @@ impl Aim {
             Prepared::Probe { order, turn, .. } => {
                 sh::basis(*order, self.towards(turn, sample)).map(|y| 4.0 * PI * y)
             }
-            Prepared::Lumel { .. } => [PI; sh::MAX_COEFFICIENTS],
+            Prepared::Lumel { shading: Shading::Own, .. } => [PI; sh::MAX_COEFFICIENTS],
+            Prepared::Lumel { .. } => {
+                let Look { direction, .. } = self.look(sample);
+                let density = self.density(direction);
+                self.integrand(direction).map(|factor| factor / density.max(f32::MIN_POSITIVE))
+            }
         }
     }
 

@@ -76,6 +76,15 @@ pub(crate) fn cosine_hemisphere(u: Vec2) -> Vec3 {
     d.extend((1.0 - d.length_squared()).max(0.0).sqrt())
 }
 
+/// Maps the unit square to the upper hemisphere with density (2 cos θ + 1)/4π: half by the cosine, half
+/// evenly.
+#[inline]
+pub(crate) fn tilted_hemisphere(u: Vec2) -> Vec3 {
+    let z = 0.5 * ((1.0 + 8.0 * u.x).sqrt() - 1.0);
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    (r * turned(u.y)).extend(z)
+}
+
 /// Maps the unit square to the sphere with density 1/4π.
 #[inline]
 #[cfg(test)]

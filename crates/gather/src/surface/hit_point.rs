@@ -115,7 +115,7 @@ impl Bump {
 
     /// The shading normal in object space, of any length.
     #[inline(always)]
-    fn bend(&self, vertex_normal: Vec3) -> Vec3 {
+    pub(super) fn bend(&self, vertex_normal: Vec3) -> Vec3 {
         let n = vertex_normal.normalize_or_zero();
         let bitangent = n.cross(self.tangent) * self.sign;
         self.normal.x * self.tangent + self.normal.y * bitangent + self.normal.z * n

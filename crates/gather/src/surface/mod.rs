@@ -2,6 +2,7 @@
 
 mod frames;
 mod hit_point;
+mod shading;
 pub(crate) mod texture;
 mod triangle;
 
@@ -13,6 +14,7 @@ use crate::bsdf::Bsdf;
 
 pub(crate) use frames::{Frames, gamma};
 pub(crate) use hit_point::{Bump, HitPoint, interpolate, scaled_cross};
+pub use shading::shading_normal;
 pub(crate) use triangle::{Spot, Triangle};
 
 /// The material model.

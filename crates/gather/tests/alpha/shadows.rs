@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::{Affine3A, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Levels, Options};
-use lumencast_gather::{Gather, Job, Receiver};
+use lumencast_gather::{Gather, Job, Receiver, Shading};
 use lumencast_scene::{AlphaMode, Environment, Filter, LightKind, Material};
 
 use super::common::*;
@@ -148,7 +148,8 @@ fn masks_are_compared_after_filtering() {
         let scene = with_sheet(stage, 1.0, mask(filter)).snapshot();
         // Over two periods.
         let footprint = [2.0 * Vec3::X, Vec3::Z];
-        let lumel = Receiver::Lumel { position: 2e-3 * Vec3::Y, normal: Vec3::Y, footprint };
+        let (position, shading) = (2e-3 * Vec3::Y, Shading::Own);
+        let lumel = Receiver::Lumel { position, normal: Vec3::Y, footprint, shading };
         let mut tracer = CpuPathTracer::new(Options::default()).unwrap();
         let ticket = tracer.submit(Job { bounces: 0, ..Job::new(scene, [lumel; 32], 1024) });
         let sums = tracer.wait(ticket).unwrap().sums;

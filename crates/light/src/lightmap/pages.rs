@@ -5,8 +5,19 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::layout::Layout;
+use super::slope::tilted;
 use crate::field_id::FieldId;
 use crate::place::OnTriangle;
+
+/// What is told of lumels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Told {
+    /// [`Lightmap::irradiance`].
+    #[default]
+    Irradiance,
+    /// [`Lightmap::slopes`].
+    Slopes,
+}
 
 /// Irradiance on the surfaces of a scene, lumel by lumel.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,13 +28,34 @@ pub struct Lightmap {
     pub layout: Arc<Layout>,
     /// Lux; in the order of [`Layout::index`].
     pub irradiance: Vec<Vec3>,
+    /// How irradiance depends on the normal of shading ([`tilted`]), in the same order; nothing where it
+    /// is told on the surface's own normal alone.
+    pub slopes: Option<Vec<Vec3>>,
 }
 
 impl Lightmap {
     /// Pages without light.
     pub fn dark(id: FieldId, layout: Arc<Layout>) -> Self {
         let irradiance = vec![Vec3::ZERO; layout.lumel_count()];
-        Self { id, layout, irradiance }
+        Self { id, layout, irradiance, slopes: None }
+    }
+
+    /// The same with slopes of 0, or without any.
+    #[must_use]
+    pub fn with_slopes(self, directional: bool) -> Self {
+        let slopes = directional.then(|| vec![Vec3::ZERO; self.irradiance.len()]);
+        Self { slopes, ..self }
+    }
+
+    /// What is told of lumels, to be told anew. Slopes are 0 where there were none.
+    pub fn told_mut(&mut self, told: Told) -> &mut [Vec3] {
+        match told {
+            Told::Irradiance => &mut self.irradiance,
+            Told::Slopes => {
+                let count = self.irradiance.len();
+                self.slopes.get_or_insert_with(|| vec![Vec3::ZERO; count])
+            }
+        }
     }
 
     /// Irradiance at a point of the scene, lux, filtered bilinearly; nothing where it has no lumels.
@@ -33,10 +65,24 @@ impl Lightmap {
         Some(self.read(page, at))
     }
 
+    /// The same on a unit normal of shading, where the surface's own unit normal is another: world, on
+    /// the side that is asked for.
+    pub fn irradiance_on(&self, point: &OnTriangle, normal: Vec3, shading: Vec3) -> Option<Vec3> {
+        let surface = self.layout.surface(point.surface)?;
+        let (page, at) = surface.at(point.triangle, point.weights)?;
+        let slope =
+            self.slopes.as_ref().map_or(Vec3::ZERO, |slopes| self.read_of(slopes, page, at));
+        Some(tilted(slope, normal, shading) * self.read(page, at))
+    }
+
     /// Irradiance at a point of a page, lux: lumels from the page's corner, filtered bilinearly.
     pub fn read(&self, page: u32, at: Vec2) -> Vec3 {
+        self.read_of(&self.irradiance, page, at)
+    }
+
+    fn read_of(&self, lumels: &[Vec3], page: u32, at: Vec2) -> Vec3 {
         let taps = self.layout.taps(page, at);
-        taps.into_iter().map(|(lumel, weight)| weight * self.irradiance[lumel]).sum()
+        taps.into_iter().map(|(lumel, weight)| weight * lumels[lumel]).sum()
     }
 }
 
@@ -84,6 +130,27 @@ mod tests {
         let back = SurfaceId { back: true, ..surface };
         let point = OnTriangle { surface: back, triangle: 0, weights: Vec3::X };
         assert_eq!(lightmap.irradiance_at(&point), None, "no such surface");
+    }
+
+    /// Light from above +X, on a surface that faces +Y.
+    #[test]
+    fn slopes_turn_light_with_the_normal() {
+        let flat = lightmap();
+        let surface = SurfaceId { node: 3, primitive: 1, ..SurfaceId::default() };
+        let point = OnTriangle { surface, triangle: 0, weights: Vec3::X };
+        let tilts = [0.5, 0.0, -0.5].map(|x: f32| Vec3::new(x, 1.0, 0.0).normalize());
+        let read = |lightmap: &Lightmap| {
+            tilts.map(|shading| lightmap.irradiance_on(&point, Vec3::Y, shading).unwrap().x)
+        };
+        let own = flat.irradiance_at(&point).unwrap().x;
+        assert_eq!(read(&flat), [own; 3], "without slopes all normals see the same");
+        let mut tilted = flat.with_slopes(true);
+        assert_eq!(read(&tilted), [own; 3]);
+        tilted.slopes.as_mut().unwrap().fill(Vec3::new(1.0, 1.0, 0.0));
+        let right = tilts.map(|shading| own * (shading.x + shading.y));
+        read(&tilted).iter().zip(right).for_each(|(a, b)| assert!((a - b).abs() < 1e-4, "{a} {b}"));
+        let nowhere = OnTriangle { triangle: 2, ..point };
+        assert_eq!(tilted.irradiance_on(&nowhere, Vec3::Y, Vec3::Y), None);
     }
 
     #[test]
