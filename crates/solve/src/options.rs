@@ -18,6 +18,8 @@ pub struct GatherOptions {
     pub fit: Option<FitOptions>,
     /// Where in front of surfaces clients are to read the light. Fitted light is right there alone.
     pub offset: Offset,
+    /// Whether lumels also tell how light depends on the normal, for surfaces with normal maps.
+    pub directional: bool,
 }
 
 impl Default for GatherOptions {
@@ -28,6 +30,7 @@ impl Default for GatherOptions {
             blend: BlendSettings::default(),
             fit: None,
             offset: Offset::default(),
+            directional: false,
         }
     }
 }

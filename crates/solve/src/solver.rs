@@ -80,7 +80,9 @@ impl Solver {
     pub fn set_lightmap(&mut self, scene: &Snapshot, laid_out: Option<&LaidOut>) {
         self.fields.retain(|field| field.as_volume().is_some());
         if let Some(laid_out) = laid_out {
-            let lightmap = LightmapSolver::new(self.next_id(), scene, laid_out, self.options.blend);
+            let GatherOptions { blend, directional, .. } = self.options;
+            let lightmap = LightmapSolver::new(self.next_id(), scene, laid_out, blend)
+                .with_slopes(directional);
             self.fields.push(FieldSolver::Lightmap(lightmap));
         }
         self.list_light();

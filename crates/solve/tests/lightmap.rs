@@ -5,8 +5,8 @@ use std::f32::consts::PI;
 use glam::{Affine3A, Vec3};
 use lumencast_charts::{LaidOut, Sheet, laid_out, sheets};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_gather::{Gather, Job};
-use lumencast_light::{FieldId, Lightmap};
+use lumencast_gather::{Gather, Job, Receiver, Shading};
+use lumencast_light::{FieldId, Lightmap, Place};
 use lumencast_scene::{Edit, Environment, LightmapSpec, Material, Scene, Snapshot, Transform};
 use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{GatherOptions, LightmapSolver, Solver, spread, with_backs};
@@ -62,6 +62,54 @@ fn a_furnace_is_as_bright_everywhere() {
         let ratio = irradiance / expected;
         assert!((ratio - 1.0).abs().max_element() < 0.02, "{ratio}");
     }
+}
+
+/// A floor between a wall that shines and a dark sky: on tilted normals lumels with slopes come much
+/// nearer to what arrives there, and on the surface's own they tell what those without tell.
+#[test]
+fn slopes_tell_what_arrives_on_tilted_normals() {
+    let mut stage = Stage::default();
+    let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
+    let lamp = stage.material(lambert(Vec3::ZERO, Vec3::new(4.0, 3.0, 2.0)));
+    stage.environment(Environment::Constant { radiance: Vec3::splat(0.2) });
+    stage.quad(Vec3::new(-1.0, 0.0, 1.0), 2.0 * Vec3::X, -2.0 * Vec3::Z, grey);
+    stage.quad(Vec3::new(1.5, 0.2, -1.0), 2.0 * Vec3::Z, 1.5 * Vec3::Y, lamp);
+    let scene = stage.snapshot();
+    let laid_out = laid(&scene);
+    let mut tracer = tracer();
+    let mut gathered = |receivers: Vec<Receiver>, samples| {
+        let job = Job { bounces: 0, ..Job::new(scene.clone(), receivers, samples) };
+        let ticket = tracer.submit(job);
+        tracer.wait(ticket).expect("light")
+    };
+    let mut solver = LightmapSolver::new(FieldId(3), &scene, &laid_out, MEAN).with_slopes(true);
+    let job = solver.job(scene.clone(), 256);
+    solver.take(&gathered(job.receivers.to_vec(), 256), &job.budgets);
+    let mut lightmap = solver.dark();
+    solver.solve(true, &mut lightmap);
+    let floor = |place: &Place| place.normal.y > 0.9;
+    let places: Vec<Place> =
+        spread(&scene, &lightmap.layout, 600).into_iter().filter(floor).collect();
+    assert!(places.len() > 200);
+    let tilted = |k: usize| {
+        let (sin, cos) = (k as f32 * 2.4).sin_cos();
+        Vec3::new(0.45 * sin, 1.0, 0.45 * cos).normalize()
+    };
+    let shaded = |(k, place): (usize, &Place)| {
+        Receiver::point_shaded(place.position, place.normal, Shading::By(tilted(k)))
+    };
+    let right = gathered(places.iter().enumerate().map(shaded).collect(), 4096);
+    let error = |lightmap: &Lightmap| {
+        let squares = places.iter().enumerate().zip(right.sums.iter()).map(|((k, place), sums)| {
+            let right = sums.mean().next().expect("irradiance");
+            let on = place.on.expect("a point");
+            let told = lightmap.irradiance_on(&on, place.normal, tilted(k)).expect("lumels");
+            (told / right - 1.0).length_squared() / 3.0
+        });
+        (squares.sum::<f32>() / places.len() as f32).sqrt()
+    };
+    let (with, without) = (error(&lightmap), error(&lightmap.clone().with_slopes(false)));
+    assert!(without > 0.15 && with < 0.3 * without, "{with}, without slopes {without}");
 }
 
 /// A closed room whose walls shine, so brightly.

@@ -22,7 +22,8 @@ pub(crate) struct Reading {
 
 impl Reading {
     pub(crate) fn gathered(self, bounces: u32, clamp: f32, blend: BlendSettings) -> GatherOptions {
-        GatherOptions { bounces, clamp, blend, fit: self.fit, offset: self.offset }
+        let (fit, offset) = (self.fit, self.offset);
+        GatherOptions { bounces, clamp, blend, fit, offset, ..GatherOptions::default() }
     }
 }
 

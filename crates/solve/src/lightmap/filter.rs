@@ -31,6 +31,8 @@ pub(crate) struct Noisy {
     /// World, unit.
     pub(crate) normal: Vec3,
     pub(crate) irradiance: Vec3,
+    /// Its slope times its luminance; 0 where it is not known.
+    pub(crate) slope: Vec3,
     /// Variance of the mean's luminance.
     pub(crate) variance: f32,
 }
@@ -74,7 +76,7 @@ fn neighbours(
 
 fn filtered(own: &Noisy, about: impl Iterator<Item = (Noisy, f32, f32)>, near: f32) -> Noisy {
     let y = luminance(own.irradiance);
-    let (mut sum, mut variance, mut weights) = (Vec3::ZERO, 0.0, 0.0);
+    let (mut sum, mut slope, mut variance, mut weights) = (Vec3::ZERO, Vec3::ZERO, 0.0, 0.0);
     for (lumel, kernel, steps) in about {
         let apart = lumel.position.distance(own.position);
         let facing = lumel.normal.dot(own.normal).max(0.0).powi(NORMAL_POWER);
@@ -86,13 +88,19 @@ fn filtered(own: &Noisy, about: impl Iterator<Item = (Noisy, f32, f32)>, near: f
         let alike = if differs == 0.0 { 1.0 } else { (-differs / spread.max(1e-30)).exp() };
         let weight = kernel * facing * alike;
         sum += weight * lumel.irradiance;
+        slope += weight * lumel.slope;
         variance += weight * weight * lumel.variance;
         weights += weight;
     }
     if weights == 0.0 {
         return *own;
     }
-    Noisy { irradiance: sum / weights, variance: variance / (weights * weights), ..*own }
+    Noisy {
+        irradiance: sum / weights,
+        slope: slope / weights,
+        variance: variance / (weights * weights),
+        ..*own
+    }
 }
 
 #[cfg(test)]
@@ -112,6 +120,7 @@ mod tests {
                 position: 0.1 * Vec3::new(x, 0.0, y),
                 normal: Vec3::Y,
                 irradiance: Vec3::splat(right(number) + off),
+                slope: Vec3::ZERO,
                 variance: noise * noise,
             })
         };

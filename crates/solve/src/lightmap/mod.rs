@@ -10,6 +10,7 @@ mod places;
 mod point;
 mod points;
 mod seams;
+mod slopes;
 mod sums;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -17,8 +18,8 @@ use std::sync::Arc;
 
 use glam::{Affine3A, UVec2, Vec3};
 use lumencast_charts::{LaidOut, lumels_on_pages};
-use lumencast_gather::{Budget, Gathered, Job, Receiver};
-use lumencast_light::{Field, FieldId, Layout, Light, Lightmap, Surface};
+use lumencast_gather::{Budget, Gathered, Job, Receiver, Shading};
+use lumencast_light::{Field, FieldId, Layout, Light, Lightmap, Surface, luminance, slope};
 use lumencast_scene::Snapshot;
 use rayon::prelude::*;
 
@@ -32,6 +33,7 @@ use point::Point;
 pub use points::spread;
 use seams::Seams;
 pub use seams::sides_of_seams;
+use slopes::Slopes;
 use sums::{Sum, noise};
 
 /// What a lumel has in place of a receiver where no surface covers it.
@@ -67,6 +69,12 @@ struct Moved {
     since: f64,
 }
 
+/// What is shown of a block's lumels, row by row of [`BLOCK`].
+struct Solved {
+    irradiance: Vec<Vec3>,
+    slopes: Option<Vec<Vec3>>,
+}
+
 /// What makes light of lumels' sums.
 #[derive(Clone, Debug)]
 pub struct LightmapSolver {
@@ -81,6 +89,8 @@ pub struct LightmapSolver {
     /// The receivers of the lumels of all pages; about charts, those that lie there ([`beyond`]).
     receiver_of: Arc<[u32]>,
     sums: Vec<Sum>,
+    /// Where lumels tell how light depends on the normal.
+    slopes: Option<Slopes>,
     seams: Arc<Seams>,
     /// Blocks of which more is known than is solved.
     news: BTreeSet<Block>,
@@ -134,6 +144,7 @@ impl LightmapSolver {
             points,
             receiver_of: receiver_of.into(),
             sums: vec![Sum::default(); places.len()],
+            slopes: None,
             seams: Arc::new(Seams::new(scene, &layout)),
             news: BTreeSet::new(),
             readers: Arc::new(readers),
@@ -150,8 +161,20 @@ impl LightmapSolver {
         }
     }
 
+    /// The same, whose lumels also tell how light depends on the normal, or do not: 12 bytes a lumel.
+    #[must_use]
+    pub fn with_slopes(self, directional: bool) -> Self {
+        let slopes = directional.then(|| Slopes::new(self.sums.len()));
+        Self { slopes, ..self }
+    }
+
     pub(crate) fn id(&self) -> FieldId {
         self.id
+    }
+
+    /// What a lumel gathers as.
+    fn receiver(&self, point: &Point) -> Receiver {
+        point.receiver(if self.slopes.is_some() { Shading::Tilted } else { Shading::Own })
     }
 
     /// Number of lumels that lie on surfaces.
@@ -166,7 +189,8 @@ impl LightmapSolver {
 
     /// What to gather: so many samples a lumel.
     pub fn job(&self, scene: Arc<Snapshot>, samples: u32) -> Job {
-        let receivers: Vec<Receiver> = self.points.iter().map(Point::receiver).collect();
+        let receivers: Vec<Receiver> =
+            self.points.iter().map(|point| self.receiver(point)).collect();
         Job::new(scene, receivers, samples)
     }
 
@@ -176,7 +200,7 @@ impl LightmapSolver {
     pub fn next_job(&mut self, scene: Arc<Snapshot>, samples: u64) -> (Job, Vec<Budget>) {
         self.is_moving = self.gathered.replace(scene.version) != Some(scene.version);
         let budgets = self.cells.budgets(samples, scene.version);
-        let point = |budget: &Budget| self.points[budget.receiver as usize].receiver();
+        let point = |budget: &Budget| self.receiver(&self.points[budget.receiver as usize]);
         let receivers: Vec<Receiver> = budgets.iter().map(point).collect();
         let own = (0..).zip(&budgets).map(|(receiver, of)| Budget { receiver, ..*of });
         (Job::with_budgets(scene, receivers, own.collect()), budgets)
@@ -258,15 +282,21 @@ impl LightmapSolver {
         tried: &[InstanceId],
         shown: &mut Lightmap,
     ) {
-        let mut new = Self::new(self.id(), scene, laid_out, self.settings);
+        let mut new =
+            Self::new(self.id(), scene, laid_out, self.settings).with_slopes(self.slopes.is_some());
         for (receiver, lumel) in new.lumels.iter().enumerate() {
             let entry = self.receiver_of.get(*lumel as usize);
             let Some(before) = entry.and_then(|entry| beyond::own(*entry)) else { continue };
             if self.points[before as usize] == new.points[receiver] {
                 new.sums[receiver] = self.sums[before as usize];
+                if let Some((new, old)) = new.slopes.as_mut().zip(self.slopes.as_ref()) {
+                    new.keep(receiver, old, before as usize);
+                }
             }
         }
-        shown.irradiance.resize(laid_out.layout.lumel_count(), Vec3::ZERO);
+        for lumels in std::iter::once(&mut shown.irradiance).chain(&mut shown.slopes) {
+            lumels.resize(laid_out.layout.lumel_count(), Vec3::ZERO);
+        }
         let (with, without): (Vec<InstanceId>, Vec<InstanceId>) =
             tried.iter().partition(|id| new.placed.contains_key(id));
         new.without = std::mem::take(&mut self.without);
@@ -353,11 +383,14 @@ impl LightmapSolver {
     /// Adds what was gathered; `budgets` tell at which lumels. What is not finite does not count. What is
     /// known of a cell follows what its lumels together tell ([`change`]).
     pub fn take(&mut self, gathered: &Gathered, budgets: &[Budget]) {
-        let found: Vec<(usize, Sum)> = budgets
+        let (found, of_slopes): (Vec<(usize, Sum)>, Vec<Vec3>) = budgets
             .iter()
             .zip(gathered.sums.iter())
-            .filter_map(|(budget, found)| Some((budget.receiver as usize, Sum::of(&found)?)))
-            .collect();
+            .filter_map(|(budget, found)| {
+                Some(((budget.receiver as usize, Sum::of(&found)?), slopes::sum_of(&found)))
+            })
+            .unzip();
+        let mut of_slopes = of_slopes.iter();
         let page_size = self.layout.page_size;
         let cell = |(receiver, _): &(usize, Sum)| self.cells.cell_of(*receiver as u32);
         let of_cells: Vec<&[(usize, Sum)]> = found.chunk_by(|a, b| cell(a) == cell(b)).collect();
@@ -375,8 +408,13 @@ impl LightmapSolver {
                 self.cells.hasten(cell);
                 self.stale.extend(self.readers.get(&block).into_iter().flatten());
             }
-            for (receiver, new) in of_cell {
-                self.sums[*receiver].add(new, self.settings.ratio);
+            for ((receiver, new), slope) in of_cell.iter().zip(&mut of_slopes) {
+                let sum = &mut self.sums[*receiver];
+                let before = *sum;
+                sum.add(new, self.settings.ratio);
+                if let Some(slopes) = &mut self.slopes {
+                    slopes.add(*receiver, *slope, [&before, new, sum]);
+                }
             }
             let noise = noise(&self.sums[self.cells.receivers_about(cell)]);
             self.cells.set_noise(cell, noise);
@@ -415,15 +453,13 @@ impl LightmapSolver {
             self.news.extend(self.stale.pop_first());
         }
         let news: Vec<Block> = std::mem::take(&mut self.news).into_iter().collect();
-        let solved: Vec<Vec<Vec3>> =
+        let solved: Vec<Solved> =
             news.par_iter().map(|block| self.solved(block, filtered)).collect();
         let size = self.layout.page_size;
-        for (block, light) in news.iter().zip(solved) {
-            for (row, light) in (block.corner().y..size).zip(light.chunks(BLOCK as usize)) {
-                let columns = (size - block.corner().x).min(BLOCK) as usize;
-                let at = UVec2::new(block.corner().x, row);
-                let first = self.layout.index(block.page, at);
-                shown.irradiance[first..first + columns].copy_from_slice(&light[..columns]);
+        for (block, solved) in news.iter().zip(solved) {
+            self.put(block, &solved.irradiance, &mut shown.irradiance);
+            if let Some((solved, shown)) = solved.slopes.zip(shown.slopes.as_mut()) {
+                self.put(block, &solved, shown);
             }
         }
         let seams = self.seams.about(|lumel| news.binary_search(&Block::of(lumel, size)).is_ok());
@@ -431,10 +467,23 @@ impl LightmapSolver {
         let is_known = |lumel: &u32| of(lumel).is_some_and(|l| l.variance < f32::INFINITY);
         let known: Vec<bool> = seams.lumels().iter().map(is_known).collect();
         seams.apply(&mut shown.irradiance, &known);
+        if let Some(slopes) = &mut shown.slopes {
+            seams.apply_signed(slopes, &known);
+        }
     }
 
-    /// The light of a block, row by row of [`BLOCK`] lumels, with those about it that count for it.
-    fn solved(&self, block: &Block, filtered: bool) -> Vec<Vec3> {
+    /// Puts the lumels of a block, row by row of [`BLOCK`], among those of all pages.
+    fn put(&self, block: &Block, lumels: &[Vec3], into: &mut [Vec3]) {
+        let size = self.layout.page_size;
+        for (row, lumels) in (block.corner().y..size).zip(lumels.chunks(BLOCK as usize)) {
+            let columns = (size - block.corner().x).min(BLOCK) as usize;
+            let first = self.layout.index(block.page, UVec2::new(block.corner().x, row));
+            into[first..first + columns].copy_from_slice(&lumels[..columns]);
+        }
+    }
+
+    /// The light of a block, with those about it that count for it.
+    fn solved(&self, block: &Block, filtered: bool) -> Solved {
         let size = self.layout.page_size as i32;
         let side = BLOCK + 2 * REACH;
         let low = block.corner().as_ivec2() - REACH as i32;
@@ -451,25 +500,35 @@ impl LightmapSolver {
         if filtered {
             filter(&mut window, side, self.texel);
         }
-        let known: Vec<Option<Vec3>> = entries
+        let known: Vec<Option<Noisy>> = entries
             .iter()
             .zip(window)
             .map(|(entry, lumel)| {
-                let lumel = beyond::own(*entry).and(lumel)?;
-                (lumel.variance < f32::INFINITY).then_some(lumel.irradiance)
+                beyond::own(*entry).and(lumel).filter(|lumel| lumel.variance < f32::INFINITY)
             })
             .collect();
-        let mut light: Vec<Vec3> = known.iter().map(|light| light.unwrap_or_default()).collect();
-        fill::fill(&mut light, side, |number| known[number].is_some());
-        let rows = light.chunks(side as usize).skip(REACH as usize).take(BLOCK as usize);
-        rows.flat_map(|row| &row[REACH as usize..(REACH + BLOCK) as usize]).copied().collect()
+        let filled = |of: &dyn Fn(&Noisy) -> Vec3| -> Vec<Vec3> {
+            let mut light: Vec<Vec3> =
+                known.iter().map(|lumel| lumel.as_ref().map_or(Vec3::ZERO, of)).collect();
+            fill::fill(&mut light, side, |number| known[number].is_some());
+            let rows = light.chunks(side as usize).skip(REACH as usize).take(BLOCK as usize);
+            rows.flat_map(|row| &row[REACH as usize..(REACH + BLOCK) as usize]).copied().collect()
+        };
+        let of_slope = |lumel: &Noisy| slope(lumel.slope, luminance(lumel.irradiance));
+        Solved {
+            irradiance: filled(&|lumel| lumel.irradiance),
+            slopes: self.slopes.as_ref().map(|_| filled(&of_slope)),
+        }
     }
 
     /// What is known at a receiver; nothing where it lies within something.
     fn known(&self, receiver: u32) -> Option<Noisy> {
-        let point = self.points[receiver as usize];
-        let (irradiance, variance) = self.sums[receiver as usize].known()?;
-        Some(Noisy { position: point.position, normal: point.normal(), irradiance, variance })
+        let receiver = receiver as usize;
+        let point = self.points[receiver];
+        let (irradiance, variance) = self.sums[receiver].known()?;
+        let slope = self.slopes.as_ref().map(|slopes| slopes.at(receiver) * luminance(irradiance));
+        let (position, normal, slope) = (point.position, point.normal(), slope.unwrap_or_default());
+        Some(Noisy { position, normal, irradiance, slope, variance })
     }
 
     /// Irradiances that light has at the lumels that surfaces cover.
@@ -482,7 +541,7 @@ impl LightmapSolver {
 
     /// The lightmap without light, for [`Self::solve`] to fill.
     pub fn dark(&self) -> Lightmap {
-        Lightmap::dark(self.id, self.layout.clone())
+        Lightmap::dark(self.id, self.layout.clone()).with_slopes(self.slopes.is_some())
     }
 }
 

@@ -1,7 +1,7 @@
 //! A lumel's point, in few bytes: there are millions of them.
 
 use glam::{Vec2, Vec3};
-use lumencast_gather::Receiver;
+use lumencast_gather::{Receiver, Shading};
 
 /// A lumel's point in the world: 16 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,8 +34,8 @@ impl Point {
     }
 
     /// As a gatherer takes it.
-    pub(crate) fn receiver(&self) -> Receiver {
-        Receiver::point(self.position, self.normal())
+    pub(crate) fn receiver(&self, shading: Shading) -> Receiver {
+        Receiver::point_shaded(self.position, self.normal(), shading)
     }
 }
 

@@ -152,6 +152,16 @@ impl Seams {
     /// Closes the seams of the light of all pages. `known`: of each lumel that takes part whether its
     /// light is its own. Lumels that take no part stay as they are.
     pub(crate) fn apply(&self, light: &mut [Vec3], known: &[bool]) {
+        self.close(light, known, 0.0);
+    }
+
+    /// The same for what is told of light, such as slopes, which may be below 0.
+    pub(crate) fn apply_signed(&self, told: &mut [Vec3], known: &[bool]) {
+        self.close(told, known, f32::NEG_INFINITY);
+    }
+
+    /// Closes seams, where nothing falls below `least`.
+    fn close(&self, light: &mut [Vec3], known: &[bool], least: f32) {
         if self.points.is_empty() {
             return;
         }
@@ -164,8 +174,11 @@ impl Seams {
         let strengths: Vec<f32> = self.points.iter().map(strength).collect();
         for _ in 0..ROUNDS {
             let points = || self.points.iter().zip(&strengths);
-            points().for_each(|(point, strength)| project(&mut x, &yields, point, *strength));
-            points().rev().for_each(|(point, strength)| project(&mut x, &yields, point, *strength));
+            let mut close = |(point, strength): (_, &f32)| {
+                project(&mut x, &yields, point, *strength, least);
+            };
+            points().for_each(&mut close);
+            points().rev().for_each(&mut close);
         }
         for (lumel, value) in self.lumels.iter().zip(x) {
             light[*lumel as usize] = value;
@@ -174,12 +187,12 @@ impl Seams {
 }
 
 /// Brings both sides of a point together.
-fn project(x: &mut [Vec3], yields: &[f32], point: &[(u32, f32); 8], strength: f32) {
+fn project(x: &mut [Vec3], yields: &[f32], point: &[(u32, f32); 8], strength: f32, least: f32) {
     let apart: Vec3 = point.iter().map(|(lumel, weight)| *weight * x[*lumel as usize]).sum();
     let step = RELAXED / strength.max(f32::MIN_POSITIVE) * apart;
     for (lumel, weight) in point {
         let lumel = *lumel as usize;
-        x[lumel] = (x[lumel] - weight * yields[lumel] * step).max(Vec3::ZERO);
+        x[lumel] = (x[lumel] - weight * yields[lumel] * step).max(Vec3::splat(least));
     }
 }
 
