@@ -122,7 +122,8 @@ pub fn reader(mut data: &[u8]) {
         for lightmap in light.lightmaps() {
             for surface in lightmap.layout.surfaces() {
                 let (surface, weights) = (surface.id, glam::Vec3::X);
-                let read = lightmap.irradiance_at(&OnTriangle { surface, triangle: 0, weights });
+                let point = OnTriangle { surface, triangle: 0, weights };
+                let read = lightmap.irradiance_on(&point, glam::Vec3::Y, glam::Vec3::X);
                 assert!(read.is_none_or(|irradiance| !irradiance.is_nan()));
             }
         }

@@ -138,7 +138,8 @@ fn dark(size: UVec3, order: Order) -> LightFile {
 /// A lightmap as a server would save it.
 fn saved_lightmap() -> LightFile {
     let scene = SceneInfo { name: "fuzz".into(), root: "fuzz.glb".into() };
-    LightFile::of_fields(scene, "seed", [&lightmap(1.0).into()], UpdateInfo::default())
+    let field = lightmap(1.0).with_slopes(true).into();
+    LightFile::of_fields(scene, "seed", [&field], UpdateInfo::default())
 }
 
 /// All that a client reads of a lightmap: its catalog, layout, charts and light.

@@ -33,6 +33,9 @@ impl LightmapCache {
         };
         let common = lightmap.irradiance.len().min(before.irradiance.len());
         lightmap.irradiance[..common].copy_from_slice(&before.irradiance[..common]);
+        if let Some((slopes, before)) = lightmap.slopes.as_mut().zip(before.slopes.as_ref()) {
+            slopes[..common].copy_from_slice(&before[..common]);
+        }
         lightmap.layout = match before.layout.pages == pages {
             true => before.layout.clone(),
             false => {

@@ -41,13 +41,14 @@ impl TileCache {
     ) -> Result<bool, DecodeError> {
         let light = self.decoder.decode(frame)?;
         let places = self.tile.rows(lightmap.layout.page_size);
-        let (info, shown) = (light.head.info, &mut lightmap.irradiance[..]);
-        Ok(self.passage.take_in(info, light.irradiance, (now, tick_seconds), shown, places))
+        let (info, told) = (light.head.info, light.told(self.tile.told));
+        let shown = lightmap.told_mut(self.tile.told);
+        Ok(self.passage.take_in(info, told, (now, tick_seconds), shown, places))
     }
 
     /// Brings `lightmap` to what is to be seen at `now`.
     pub(crate) fn show(&mut self, now: f64, lightmap: &mut Lightmap) {
         let places = self.tile.rows(lightmap.layout.page_size);
-        self.passage.show(now, &mut lightmap.irradiance, places);
+        self.passage.show(now, lightmap.told_mut(self.tile.told), places);
     }
 }

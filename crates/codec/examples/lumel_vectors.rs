@@ -5,7 +5,8 @@
 //! the decoded lumels' little-endian f32 bits, r, g, b by turns; `first` the first of them. `changed`
 //! tells whether any lumel is another than in the frame before. `error` is the kind of the error where
 //! a frame is to be refused. `mutations`: the frame of a sequence with one byte replaced, given to a
-//! decoder that has decoded those before it; the hash, or null where it is to be refused.
+//! decoder that has decoded those before it; the hash, or null where it is to be refused. `slopes`: the
+//! keyframe of a tile of slopes, and the slopes of its first lumels.
 
 #![expect(clippy::print_stdout, reason = "its purpose is to print a file")]
 
@@ -17,7 +18,7 @@ use glam::{UVec2, Vec3};
 use lumencast_codec::{
     Coding, DecodeError, LightmapShape, LumelCoding, LumelDecoder, LumelEncoder, UpdateInfo,
 };
-use lumencast_light::{FieldId, Layout, Lightmap};
+use lumencast_light::{FieldId, Layout, Lightmap, STEEPEST, Told};
 use lumencast_testkit::vectors::fnv;
 use serde_json::{Value, json};
 
@@ -53,7 +54,10 @@ fn main() {
         .iter()
         .map(|s| json!({ "name": s.name, "size": s.size, "frames": s.expected() }))
         .collect();
-    let all = json!({ "sequences": sequences, "malformed": malformed(), "mutations": mutations });
+    let all = json!({
+        "sequences": sequences, "malformed": malformed(), "mutations": mutations,
+        "slopes": slopes(),
+    });
     println!("{}", serde_json::to_string_pretty(&all).expect("plain values"));
 }
 
@@ -94,6 +98,23 @@ fn sequence(
         frames.extend(encoded.into_iter().map(|frame| frame.bytes));
     }
     Sequence { name, size, frames }
+}
+
+/// A tile of slopes, from one bound to the other.
+fn slopes() -> Value {
+    let mut lightmap = Lightmap::dark(FieldId(0), Arc::new(Layout::new(8, 1, Vec::new())));
+    for (lumel, slope) in (0..).zip(lightmap.told_mut(Told::Slopes)) {
+        let t = lumel as f32 / 63.0;
+        *slope = Vec3::new(STEEPEST - 2.0 * STEEPEST * t, 0.0, 0.3 - t);
+    }
+    let shape = LightmapShape::of(&lightmap, Coding::Halves);
+    let tile = shape.tiles().find(|tile| tile.told == Told::Slopes).expect("a tile of slopes");
+    let mut encoder = LumelEncoder::new(shape, LumelCoding::Halves);
+    let encoded = encoder.encode(&lightmap, UpdateInfo::default(), |region| region == tile.id);
+    let bytes = &encoded.expect("frames")[0].bytes;
+    let light = LumelDecoder::new(Coding::Halves, tile.size).decode(bytes).expect("slopes");
+    let first = &light.told(Told::Slopes)[..16];
+    json!({ "region": tile.id, "size": tile.size, "bytes": BASE64_STANDARD.encode(bytes), "first": first })
 }
 
 /// A gradient with an edge.

@@ -195,6 +195,7 @@ mod tests {
             (read.fields.len() - 1, read.unknown.len())
         };
         assert_eq!(kept("page_size", json!(600)), (1, 0));
+        assert_eq!(kept("slopes", json!(true)), (1, 0));
         for coding in [json!("av1"), json!(null), json!(7)] {
             assert_eq!(kept("coding", coding), (0, 1));
         }
@@ -204,6 +205,7 @@ mod tests {
             ("page_size", json!(1.5)),
             ("pages", json!(0)),
             ("pages", json!(24)),
+            ("slopes", json!(1)),
             ("layout", json!("12")),
             ("layout", json!(null)),
         ] {

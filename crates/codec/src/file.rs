@@ -205,9 +205,10 @@ impl LightFile {
                     let light = LumelDecoder::new(shape.coding, tile.size).decode(&frame.bytes)?;
                     let field = entry.or_insert_with(|| info.dark());
                     let Some(lightmap) = field.as_lightmap_mut() else { continue };
-                    let rows = light.irradiance.chunks(tile.size.x as usize);
+                    let (told, shown) = (light.told(tile.told), lightmap.told_mut(tile.told));
+                    let rows = told.chunks(tile.size.x as usize);
                     for (row, values) in tile.rows(shape.page_size).zip(rows) {
-                        lightmap.irradiance[row].copy_from_slice(values);
+                        shown[row].copy_from_slice(values);
                     }
                 }
             }

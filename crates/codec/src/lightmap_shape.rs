@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lumencast_light::{FieldId, Layout, Lightmap};
 use serde::{Deserialize, Serialize};
 
-use crate::lumel::{Coding, Tile, per_side, tile, tiles};
+use crate::lumel::{Coding, Cut, Tile};
 use crate::{
     DecodeError, LayoutResource, Resource, ResourceHash, layout_resources, limits, read_charts,
 };
@@ -20,6 +20,9 @@ pub struct LightmapShape {
     pub page_size: u32,
     /// Number of pages.
     pub pages: u32,
+    /// Whether there are slopes, too ([`Lightmap::slopes`]).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub slopes: bool,
     /// The resource that tells where surfaces lie on the pages.
     pub layout: ResourceHash,
 }
@@ -29,13 +32,14 @@ impl LightmapShape {
     pub fn of(lightmap: &Lightmap, coding: Coding) -> Self {
         let Layout { page_size, pages, .. } = *lightmap.layout;
         let layout = layout_resources(&lightmap.layout).0.hash();
-        Self { coding, page_size, pages, layout }
+        Self { coding, page_size, pages, slopes: lightmap.slopes.is_some(), layout }
     }
 
     /// A lightmap of this shape without light, whose layout has no surfaces: nothing is read from it
     /// until the layout is known.
     pub fn dark(&self, id: FieldId) -> Lightmap {
-        Lightmap::dark(id, Arc::new(Layout::new(self.page_size, self.pages, Vec::new())))
+        let layout = Layout::new(self.page_size, self.pages, Vec::new());
+        Lightmap::dark(id, Arc::new(layout)).with_slopes(self.slopes)
     }
 
     /// Whether frames of the one are frames of the other too: only their layouts may differ.
@@ -43,27 +47,30 @@ impl LightmapShape {
         Self { layout: other.layout, ..self.clone() } == *other
     }
 
-    /// Number of lumels of all pages.
+    /// Number of lumels of all pages; where there are slopes, of these too.
     pub fn lumel_count(&self) -> usize {
-        self.pages as usize * (self.page_size as usize).pow(2)
+        let irradiance = self.pages as usize * (self.page_size as usize).pow(2);
+        if self.slopes { 2 * irradiance } else { irradiance }
     }
 
-    /// Lumels of a tile along a side, at most: as video a page is one.
-    fn tile_size(&self) -> u32 {
-        match self.coding {
+    /// How it is cut into tiles: as video a page is one.
+    fn cut(&self) -> Cut {
+        let Self { page_size, pages, slopes, .. } = *self;
+        let side = match self.coding {
             Coding::Halves => limits::TILE_LUMELS,
-            Coding::H264 | Coding::H264Stacked => self.page_size,
-        }
+            Coding::H264 | Coding::H264Stacked => page_size,
+        };
+        Cut { page_size, pages, slopes, side }
     }
 
     /// Its tiles, in order of their numbers.
     pub fn tiles(&self) -> impl Iterator<Item = Tile> + use<> {
-        tiles(self.page_size, self.tile_size(), self.pages)
+        self.cut().tiles()
     }
 
     /// The tile of a number.
     pub fn tile(&self, id: u32) -> Option<Tile> {
-        tile(self.page_size, self.tile_size(), self.pages, id)
+        self.cut().tile(id)
     }
 
     /// Its layout, of resources that hold all of it.
@@ -98,9 +105,8 @@ impl LightmapShape {
         DecodeError::limit("lumels of a page along a side", side, most)?;
         let lumels = side.pow(2).saturating_mul(self.pages as usize);
         DecodeError::limit("lumels of a field", lumels, limits::FIELD_LUMELS)?;
-        let tiles =
-            per_side(self.page_size, self.tile_size()).pow(2) as usize * self.pages as usize;
-        DecodeError::limit("regions of a field", tiles, limits::REGIONS)?;
+        DecodeError::limit("lumels of a field", self.lumel_count(), limits::FIELD_LUMELS)?;
+        DecodeError::limit("regions of a field", self.cut().count(), limits::REGIONS)?;
         Ok(self)
     }
 }

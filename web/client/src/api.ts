@@ -52,7 +52,7 @@ export interface LightmapLight extends FieldAge {
   readonly layout: LightmapLayout | undefined;
   /** Regions that have light. */
   readonly regions: readonly LumelRegion[];
-  /** The largest of the regions' scales: a power of two, by which half floats are divided. */
+  /** The largest scale of regions of irradiance: a power of two, by which half floats are divided. */
   readonly scale: number;
 }
 
@@ -60,6 +60,8 @@ export interface LightmapLight extends FieldAge {
 export interface LumelRegion {
   readonly region: number;
   readonly page: number;
+  /** Whether its picture tells slopes of the page (`slopeOf` tells what its values mean), not irradiance. */
+  readonly slopes?: true;
   /** Its first lumel. */
   readonly min: readonly [number, number];
   /** Lumels along x and y. */

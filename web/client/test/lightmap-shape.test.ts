@@ -39,7 +39,31 @@ describe('the shape of a lightmap', () => {
     expect(unknown).toEqual([{ id: 4, kind: 'lightmap' }]);
   });
 
+  it('may have slopes, whose regions come after those of irradiance', () => {
+    const [, lightmap] = parseCatalog(catalog((shape) => (shape.slopes = true))).fields;
+    expect(lightmap.shape).toEqual({
+      coding: 'halves',
+      pageSize: 600,
+      pages: 2,
+      slopes: true,
+      layout: LAYOUT,
+    });
+    const shape = shapeOf({ pageSize: 300, pages: 2, slopes: true });
+    expect([tileCount(shape), lumelCount(shape)]).toEqual([16, 4 * 300 ** 2]);
+    const [size, min] = [
+      [44, 44],
+      [256, 256],
+    ];
+    expect([7, 15, 16].map((region) => tileOf(shape, region))).toEqual([
+      { page: 1, min, size },
+      { page: 1, slopes: true, min, size },
+      undefined,
+    ]);
+  });
+
   const wrong: [string, unknown][] = [
+    ['slopes', 1],
+    ['slopes', null],
     ['page_size', 0],
     ['page_size', 4097],
     ['page_size', 1.5],

@@ -2,7 +2,9 @@
 import { describe, expect, it } from 'vitest';
 
 import { halfValue } from '../src/codec/half.js';
+import { tileOf } from '../src/codec/lightmap-shape.js';
 import { LumelDecoder, type TileLight } from '../src/codec/lumels.js';
+import { slopeOf, STEEPEST } from '../src/slopes.js';
 import { WireError } from '../src/wire-error.js';
 import { bytesOf, fnv, readVectors } from './support/vectors.js';
 
@@ -28,6 +30,7 @@ interface Vectors {
   }[];
   malformed: { name: string; bytes: string; error: string }[];
   /** One byte of a frame changed: the hash of what is decoded then, null where it is refused. */
+  slopes: { region: number; size: Size; bytes: string; first: [number, number, number][] };
   mutations: { sequence: number; frame: number; offset: number; byte: number; irradiance: number | null }[];
 }
 
@@ -64,6 +67,15 @@ describe('vectors/lumels.json', () => {
       }
     });
   }
+
+  it('tells slopes by light', () => {
+    const { region, size, bytes, first } = vectors.slopes;
+    const shape = { coding: 'halves', pageSize: 8, pages: 1, slopes: true, layout: '' } as const;
+    expect(tileOf(shape, region)).toMatchObject({ page: 0, slopes: true, size });
+    const told = irradianceOf(new LumelDecoder(size).decode(bytesOf(bytes)));
+    first.flat().forEach((slope, i) => expect(slopeOf(told[i])).toBeCloseTo(slope, 5));
+    expect(first[0][0]).toBe(STEEPEST);
+  });
 
   for (const { name, bytes, error } of vectors.malformed) {
     it(`refuses ${name}`, () => {

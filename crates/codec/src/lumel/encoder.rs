@@ -111,7 +111,7 @@ impl LumelEncoder {
                     } else {
                         break;
                     }
-                    *next = (*next + 1) % self.shape.pages as usize;
+                    *next = (*next + 1) % encoders.len();
                 }
             }
         }

@@ -1,10 +1,11 @@
 //! One page as video.
 
-use lumencast_light::Lightmap;
+use lumencast_light::{Lightmap, Told};
 use lumencast_video::{H264Encoder, PictureEncoder, Qp, VideoError};
 
 use super::mapping::{CodeTable, Mapping};
 use super::planes::{Packing, Planes};
+use super::slope_codes::{self, as_light};
 use super::tiles::Tile;
 use super::video_frame::VideoHead;
 use crate::{EncodedRegion, UpdateInfo};
@@ -65,10 +66,15 @@ impl PageEncoder {
     ) -> Result<Option<EncodedRegion>, VideoError> {
         let lumels = self.tile.lumel_count();
         let first = self.tile.page as usize * lumels;
-        let page = &lightmap.irradiance[first..first + lumels];
+        let page = &*as_light(lightmap, self.tile.told, first..first + lumels);
         let before = self.table.as_ref().map(|(mapping, _)| *mapping);
         let suits = |mapping: &Mapping| mapping.scale_log2 == scale_log2 && mapping.suits(page);
-        let mapping = before.filter(suits).unwrap_or_else(|| Mapping::of(page, scale_log2));
+        let mapping = match self.tile.told {
+            Told::Slopes => slope_codes::MAPPING,
+            Told::Irradiance => {
+                before.filter(suits).unwrap_or_else(|| Mapping::of(page, scale_log2))
+            }
+        };
         let group = self.group.filter(|group| {
             before == Some(mapping) && (1..=255).contains(&info.update.wrapping_sub(group.newest))
         });

@@ -1,10 +1,11 @@
 //! One tile as halves.
 
-use lumencast_light::Lightmap;
+use lumencast_light::{Lightmap, Told};
 
 use super::halves::{Lumel, from_rgb};
 use super::header::LumelHeader;
 use super::model::code_tile;
+use super::slope_codes::{self, as_light};
 use super::tiles::Tile;
 use crate::range_coder::Encoder;
 use crate::{EncodedRegion, UpdateInfo};
@@ -48,11 +49,15 @@ impl TileEncoder {
         info: UpdateInfo,
         scale_log2: i8,
     ) -> EncodedRegion {
-        let Tile { id, size, .. } = self.tile;
+        let Tile { id, told, size, .. } = self.tile;
+        let scale_log2 = match told {
+            Told::Irradiance => scale_log2,
+            Told::Slopes => slope_codes::MAPPING.scale_log2,
+        };
         let rows = self.tile.rows(lightmap.layout.page_size);
         let lumels: Vec<Lumel> = rows
-            .flat_map(|row| &lightmap.irradiance[row])
-            .map(|irradiance| from_rgb(*irradiance, scale_log2))
+            .flat_map(|row| as_light(lightmap, told, row).into_owned())
+            .map(|light| from_rgb(light, scale_log2))
             .collect();
         let base = self.newest.as_ref().filter(|newest| {
             !(info.update + u64::from(id)).is_multiple_of(KEYFRAME_EVERY)

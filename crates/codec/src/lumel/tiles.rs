@@ -3,12 +3,15 @@
 use std::ops::Range;
 
 use glam::UVec2;
+use lumencast_light::Told;
 
 /// A part of a page, the unit of tracks: the regions of a lightmap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tile {
     /// Its number within the field.
     pub id: u32,
+    /// What it holds.
+    pub told: Told,
     /// Number of its page.
     pub page: u32,
     /// Its first lumel.
@@ -32,24 +35,48 @@ impl Tile {
     }
 }
 
-/// Cuts pages into tiles of at most `side`² lumels, page after page, row after row.
-pub(crate) fn tiles(page_size: u32, side: u32, pages: u32) -> impl Iterator<Item = Tile> {
-    let count = pages * per_side(page_size, side).pow(2);
-    (0..count).filter_map(move |id| tile(page_size, side, pages, id))
+/// How pages are cut into tiles, page after page, row after row: those of slopes after those of
+/// irradiance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cut {
+    pub(crate) page_size: u32,
+    pub(crate) pages: u32,
+    /// Whether there are slopes.
+    pub(crate) slopes: bool,
+    /// Lumels of a tile along a side, at most.
+    pub(crate) side: u32,
 }
 
-/// Tiles along a side of a page.
-pub(crate) fn per_side(page_size: u32, side: u32) -> u32 {
-    page_size.div_ceil(side)
-}
+impl Cut {
+    /// Pages of irradiance, and of slopes.
+    fn pictures(self) -> u32 {
+        if self.slopes { 2 * self.pages } else { self.pages }
+    }
 
-/// The tile of a number.
-pub(crate) fn tile(page_size: u32, side: u32, pages: u32, id: u32) -> Option<Tile> {
-    let per_side = per_side(page_size, side);
-    let page = id.checked_div(per_side.pow(2)).filter(|page| *page < pages)?;
-    let min = side * UVec2::new(id % per_side, id / per_side % per_side);
-    let size = (UVec2::splat(page_size) - min).min(UVec2::splat(side));
-    Some(Tile { id, page, min, size })
+    /// Tiles along a side of a page.
+    fn per_side(self) -> u32 {
+        self.page_size.div_ceil(self.side)
+    }
+
+    /// Number of all tiles.
+    pub(crate) fn count(self) -> usize {
+        self.pictures() as usize * (self.per_side() as usize).pow(2)
+    }
+
+    /// The tiles, in order of their numbers.
+    pub(crate) fn tiles(self) -> impl Iterator<Item = Tile> {
+        (0..self.count() as u32).filter_map(move |id| self.tile(id))
+    }
+
+    /// The tile of a number.
+    pub(crate) fn tile(self, id: u32) -> Option<Tile> {
+        let (per_side, pages) = (self.per_side(), self.pages);
+        let picture = id.checked_div(per_side.pow(2)).filter(|page| *page < self.pictures())?;
+        let told = if picture < pages { Told::Irradiance } else { Told::Slopes };
+        let min = self.side * UVec2::new(id % per_side, id / per_side % per_side);
+        let size = (UVec2::splat(self.page_size) - min).min(UVec2::splat(self.side));
+        Some(Tile { id, told, page: picture % pages, min, size })
+    }
 }
 
 #[cfg(test)]
@@ -66,19 +93,27 @@ mod tests {
             (300, 300, 3, 3),
         ];
         for (page_size, side, pages, count) in cases {
-            let mut seen = vec![0; pages as usize * (page_size as usize).pow(2)];
-            let tiles: Vec<Tile> = tiles(page_size, side, pages).collect();
-            assert_eq!(tiles.len(), count);
-            for (number, cut) in (0..).zip(&tiles) {
-                assert_eq!((cut.id, tile(page_size, side, pages, number)), (number, Some(*cut)));
-                assert_eq!(cut.rows(page_size).flatten().count(), cut.lumel_count());
-                cut.rows(page_size).flatten().for_each(|lumel| seen[lumel] += 1);
+            for (slopes, all) in [(false, count), (true, 2 * count)] {
+                let cut = Cut { page_size, side, pages, slopes };
+                let lumels = pages as usize * (page_size as usize).pow(2);
+                let mut seen = [vec![0; lumels], vec![0; lumels]];
+                let tiles: Vec<Tile> = cut.tiles().collect();
+                assert_eq!((tiles.len(), cut.count()), (all, all));
+                for (number, tile) in (0..).zip(&tiles) {
+                    assert_eq!((tile.id, cut.tile(number)), (number, Some(*tile)));
+                    assert_eq!(tile.rows(page_size).flatten().count(), tile.lumel_count());
+                    let seen = &mut seen[usize::from(tile.told == Told::Slopes)];
+                    tile.rows(page_size).flatten().for_each(|lumel| seen[lumel] += 1);
+                }
+                assert!(seen[0].iter().all(|times| *times == 1));
+                assert!(seen[1].iter().all(|times| *times == u32::from(slopes)));
+                assert_eq!(cut.tile(all as u32), None);
             }
-            assert!(seen.iter().all(|times| *times == 1));
-            assert_eq!(tile(page_size, side, pages, count as u32), None);
         }
-        let last = tiles(300, 256, 2).last();
+        let cut = Cut { page_size: 300, side: 256, pages: 2, slopes: true };
         let (min, size) = (UVec2::splat(256), UVec2::splat(44));
-        assert_eq!(last, Some(Tile { id: 7, page: 1, min, size }));
+        let last = |id, told| Some(Tile { id, told, page: 1, min, size });
+        assert_eq!(cut.tile(7), last(7, Told::Irradiance));
+        assert_eq!(cut.tiles().last(), last(15, Told::Slopes));
     }
 }

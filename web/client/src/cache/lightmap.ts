@@ -68,14 +68,15 @@ export class LightmapCache implements FieldCache {
       const region = tile.at(now);
       if (region) regions.push(region);
     }
-    if (regions.length === 0) return undefined;
+    const scales = regions.filter(({ slopes }) => !slopes).map(({ picture }) => picture.scale);
+    if (scales.length === 0) return undefined;
     const oldest = this.span()?.oldest;
     return {
       kind: 'lightmap',
       field: this.field,
       layout: this.layout,
       regions,
-      scale: Math.max(...regions.map(({ picture }) => picture.scale)),
+      scale: Math.max(...scales),
       age: oldest && ageOf(oldest.head.tick, oldest.arrived),
       sceneVersion: oldest?.head.sceneVersion,
       tick: oldest?.head.tick,

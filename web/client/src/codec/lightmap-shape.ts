@@ -10,6 +10,8 @@ export interface LightmapShape {
   /** Lumels along both sides of each page. */
   readonly pageSize: number;
   readonly pages: number;
+  /** Whether there are slopes, too, which tell how irradiance depends on the normal. */
+  readonly slopes?: true;
   /** The resource that tells where surfaces lie on the pages: the SHA-256 of its bytes, in hexadecimal. */
   readonly layout: string;
 }
@@ -33,20 +35,30 @@ export function isVideo(coding: Coding): coding is VideoCoding {
 /** A part of a page that is coded and sent as one frame: a region of a lightmap. */
 export interface Tile {
   readonly page: number;
+  /** Whether it tells slopes of the page (see `slopeOf`), in place of irradiance. */
+  readonly slopes?: true;
   /** Its first lumel. */
   readonly min: readonly [number, number];
   /** Lumels along x and y. */
   readonly size: readonly [number, number];
 }
 
-/** Number of lumels of all pages. */
-export function lumelCount({ pages, pageSize }: LightmapShape): number {
-  return pages * pageSize * pageSize;
+/** Number of lumels of all pages; where there are slopes, of these too. */
+export function lumelCount(shape: LightmapShape): number {
+  return pictureCount(shape) * shape.pageSize ** 2;
 }
 
-/** Number of a lightmap's regions, which are numbered from 0, page after page, row after row. */
+/** Pages of irradiance, and of slopes. */
+function pictureCount({ pages, slopes }: LightmapShape): number {
+  return slopes ? 2 * pages : pages;
+}
+
+/**
+ * Number of a lightmap's regions, which are numbered from 0, page after page, row after row; those of slopes
+ * come after those of irradiance.
+ */
 export function tileCount(shape: LightmapShape): number {
-  return shape.pages * tilesAlongSide(shape) ** 2;
+  return pictureCount(shape) * tilesAlongSide(shape) ** 2;
 }
 
 /** The tile of a number; `undefined` where there is none. */
@@ -57,7 +69,9 @@ export function tileOf(shape: LightmapShape, region: number): Tile | undefined {
   const [column, row] = [region % along, Math.floor(region / along) % along];
   const min = [column * side, row * side] as const;
   const size = [Math.min(side, shape.pageSize - min[0]), Math.min(side, shape.pageSize - min[1])] as const;
-  return { page: Math.floor(region / along ** 2), min, size };
+  const picture = Math.floor(region / along ** 2);
+  if (picture < shape.pages) return { page: picture, min, size };
+  return { page: picture - shape.pages, slopes: true, min, size };
 }
 
 /** Lumels along a side of tiles; those at a page's right and lower edge may be smaller. */
@@ -76,10 +90,14 @@ function tilesAlongSide(shape: LightmapShape): number {
 export function parseLightmapShape(json: Json): LightmapShape | undefined {
   const coding = CODINGS.find((coding) => coding === json.coding);
   if (!coding) return undefined;
+  if (json.slopes !== undefined && typeof json.slopes !== 'boolean') {
+    throw new WireError('malformed', 'slopes is neither true nor false');
+  }
   const shape = {
     coding,
     pageSize: whole(json.page_size, 'page_size', LIMITS.pageLumels, 1),
     pages: whole(json.pages, 'pages', LIMITS.lumelsPerField, 1),
+    ...(json.slopes && { slopes: true as const }),
     layout: parseHash(json.layout, 'layout'),
   };
   const [lumels, tiles] = [lumelCount(shape), tileCount(shape)];
