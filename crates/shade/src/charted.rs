@@ -13,25 +13,27 @@ use crate::part::{Corner, LumelPlace, Part, upload_corners};
 /// Where surfaces lie on the layers of the pages' texture.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SurfaceLayouts {
-    /// With the layer of their first page.
-    layouts: Vec<(Arc<Layout>, u32)>,
+    /// With the layers of their first pages: of light, and of slopes.
+    layouts: Vec<(Arc<Layout>, [u32; 2])>,
 }
 
 impl SurfaceLayouts {
     pub(crate) fn of(light: &Light) -> Self {
         let mut next = 0;
         let layouts = light.lightmaps().map(|lightmap| {
+            let pages = lightmap.layout.pages;
             let first = next;
-            next += lightmap.layout.pages;
-            (lightmap.layout.clone(), first)
+            let slopes = if lightmap.slopes.is_some() { first + pages } else { first };
+            next = slopes + pages;
+            (lightmap.layout.clone(), [first, slopes])
         });
         Self { layouts: layouts.collect() }
     }
 
     /// Whether they are the very same.
     pub(crate) fn is(&self, other: &Self) -> bool {
-        let addresses = |of: &Self| -> Vec<*const Layout> {
-            of.layouts.iter().map(|(layout, _)| Arc::as_ptr(layout)).collect()
+        let addresses = |of: &Self| -> Vec<(*const Layout, [u32; 2])> {
+            of.layouts.iter().map(|(layout, first)| (Arc::as_ptr(layout), *first)).collect()
         };
         addresses(self) == addresses(other)
     }
@@ -43,7 +45,7 @@ impl SurfaceLayouts {
             let id = SurfaceId { node, copy, primitive, back };
             self.layouts.iter().find_map(|(layout, first)| {
                 let surface = layout.surface(id)?;
-                Some(Side { surface, first_layer: *first, share: layout.share(id) })
+                Some(Side { surface, first_layers: *first, share: layout.share(id) })
             })
         })
     }
@@ -53,8 +55,8 @@ impl SurfaceLayouts {
 #[derive(Clone, Copy)]
 struct Side<'a> {
     surface: &'a Surface,
-    /// The layer of the first page.
-    first_layer: u32,
+    /// The layers of the first pages: of light, and of slopes.
+    first_layers: [u32; 2],
     /// How much of the light the lumels make.
     share: f32,
 }
@@ -108,11 +110,15 @@ impl Charted {
         for (number, primitive) in primitives.iter().enumerate() {
             let of = layouts.sides(instance, number);
             let of = of.map(|side| side.filter(|side| fits(&side.surface.charts, primitive)));
-            for Side { surface, first_layer, share } in of.into_iter().flatten() {
+            for Side { surface, first_layers: [first_layer, slopes], share } in
+                of.into_iter().flatten()
+            {
                 rectangles.extend(surface.rectangles.iter().map(|rectangle| layout::Rectangle {
                     corner: rectangle.corner.as_vec2(),
                     layer: first_layer + rectangle.page,
                     share,
+                    slopes: slopes + rectangle.page,
+                    _pad0: 0,
                 }));
             }
             sides.push(of.map(|side| side.map(|side| side.surface.charts.clone())));

@@ -1,4 +1,5 @@
-//! Lumels on the device: all pages of all lightmaps, in the layers of one texture.
+//! Lumels on the device: all pages of all lightmaps, in the layers of one texture; of each lightmap
+//! those of slopes after those of light.
 
 use glam::{UVec2, UVec3, Vec3};
 use half::f16;
@@ -45,11 +46,13 @@ impl GpuLumels {
         for lightmap in lightmaps {
             let side = lightmap.layout.page_size;
             let page_lumels = (side as usize).pow(2);
-            let texel = |irradiance: &Vec3| {
-                let Vec3 { x, y, z } = factor * *irradiance;
-                [x, y, z, 0.0].map(|value| f16::from_f32(value).to_bits())
-            };
-            for page in lightmap.irradiance.chunks(page_lumels) {
+            let light = lightmap.irradiance.chunks(page_lumels).map(|page| (page, factor));
+            let slopes = lightmap.slopes.iter().flat_map(|slopes| slopes.chunks(page_lumels));
+            for (page, factor) in light.chain(slopes.map(|page| (page, 1.0))) {
+                let texel = |value: &Vec3| {
+                    let Vec3 { x, y, z } = factor * *value;
+                    [x, y, z, 0.0].map(|value| f16::from_f32(value).to_bits())
+                };
                 let texels: Vec<[u16; CHANNELS]> = page.par_iter().map(texel).collect();
                 let origin = wgpu::Origin3d { z: layer, ..wgpu::Origin3d::ZERO };
                 let to = wgpu::TexelCopyTextureInfo { origin, ..self.pages.as_image_copy() };
@@ -74,10 +77,14 @@ impl GpuLumels {
     }
 }
 
-/// The side of the largest page and the number of all; nothing where there is none.
+/// The side of the largest page and the number of all, those of slopes too; nothing where there is none.
 fn size(lightmaps: &[&Lightmap]) -> Option<UVec3> {
     let side = lightmaps.iter().map(|lightmap| lightmap.layout.page_size).max()?;
-    let pages: u32 = lightmaps.iter().map(|lightmap| lightmap.layout.pages).sum();
+    let pages = |lightmap: &&Lightmap| {
+        let pages = lightmap.layout.pages;
+        if lightmap.slopes.is_some() { 2 * pages } else { pages }
+    };
+    let pages: u32 = lightmaps.iter().map(pages).sum();
     (side > 0 && pages > 0).then_some(UVec3::new(side, side, pages))
 }
 

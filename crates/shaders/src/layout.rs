@@ -48,6 +48,8 @@ pub struct Rectangle {
     pub corner: Vec2,
     pub layer: u32,
     pub share: f32,
+    pub slopes: u32,
+    pub _pad0: u32,
 }
 
 /// What holds for all of a frame's passes. Group 1, binding 0.

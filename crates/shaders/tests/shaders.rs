@@ -94,7 +94,7 @@ fn layouts_agree() {
         View { clip_from_world, world_from_clip, view_from_clip, eye, perspective, forward, turn }
     );
     same!(m, Instance { world_from_object, normal_from_object, mirrors, lumels, still, _pad0 });
-    same!(m, Rectangle { corner, layer, share });
+    same!(m, Rectangle { corner, layer, share, slopes, _pad0 });
     same!(
         m,
         Frame {

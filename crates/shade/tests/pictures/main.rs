@@ -11,6 +11,7 @@ mod environments;
 mod far;
 mod indirect_light;
 mod lumels;
+mod lumels_directional;
 mod materials;
 mod occlusion;
 mod screen;

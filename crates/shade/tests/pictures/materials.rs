@@ -99,7 +99,7 @@ fn waves() -> Image {
 }
 
 /// Normals that lean up to 40° to either side, along x and y differently.
-fn bumps() -> Image {
+pub(super) fn bumps() -> Image {
     let texel = |i: u32| {
         let at = TAU * Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) / SIDE as f32;
         [0.5 + 0.25 * (at.x + 0.5).sin(), 0.45 + 0.2 * (at.y + at.x).cos(), 0.85, 1.0]
@@ -127,7 +127,7 @@ fn decoded_twice(image: &Image) -> Image {
     })
 }
 
-fn map(image: Image) -> Option<TextureRef> {
+pub(super) fn map(image: Image) -> Option<TextureRef> {
     Some(TextureRef {
         image: Arc::new(image),
         tex_coord: 0,

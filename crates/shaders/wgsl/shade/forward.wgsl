@@ -203,9 +203,10 @@ fn radiance_of(in: Varying, p: Point, faces_front: bool, turn: f32) -> vec3f {
                 visible = ambient_visibility(in.clip, p.slopes);
             }
             let lumels = in.lumels / in.one;
-            var arriving = Lumels(in.rectangles.x, lumels.xy);
+            let own = visible_normal(shading_normal(in, p, false), geometric, v);
+            var arriving = Lumels(in.rectangles.x, lumels.xy, own);
             if !front {
-                arriving = Lumels(in.rectangles.y, lumels.zw);
+                arriving = Lumels(in.rectangles.y, lumels.zw, own);
             }
             let strength = select(frame.moving, frame.still, instances[in.instance].still == 1u);
             radiance +=

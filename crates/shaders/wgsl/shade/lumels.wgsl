@@ -12,6 +12,8 @@ struct Lumels {
     rectangle: u32,
     // Lumels from its corner.
     at: vec2f,
+    // The surface's unit normal there, without a normal map, on the side that is seen.
+    normal: vec3f,
 }
 
 // Whether a point lies in one of every other lumel, as on a checkerboard.
@@ -28,10 +30,15 @@ fn lumel_share(lumels: Lumels) -> f32 {
     return rectangles[lumels.rectangle].share;
 }
 
-// Irradiance at a point that has lumels, lux.
-fn lumel_light(lumels: Lumels) -> vec3f {
-    let corner = rectangles[lumels.rectangle].corner;
-    let layer = rectangles[lumels.rectangle].layer;
-    let place = (corner + lumels.at) / vec2f(textureDimensions(pages));
-    return textureSampleLevel(pages, atlas_sampler, place, layer, 0.0).rgb * fields.lumel_scale;
+// Irradiance at a point that has lumels on a unit normal of shading, lux (`light::slope`).
+fn lumel_light(lumels: Lumels, shading: vec3f) -> vec3f {
+    let rectangle = rectangles[lumels.rectangle];
+    let place = (rectangle.corner + lumels.at) / vec2f(textureDimensions(pages));
+    let light = textureSampleLevel(pages, atlas_sampler, place, rectangle.layer, 0.0).rgb;
+    var share = 1.0;
+    if rectangle.slopes != rectangle.layer {
+        let slope = textureSampleLevel(pages, atlas_sampler, place, rectangle.slopes, 0.0).rgb;
+        share = max(0.0, 1.0 + dot(slope, shading - lumels.normal));
+    }
+    return light * share * fields.lumel_scale;
 }

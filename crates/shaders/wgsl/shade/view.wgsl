@@ -33,4 +33,7 @@ struct Rectangle {
     layer: u32,
     // How much of the light its lumels make; the rest is the probes'.
     share: f32,
+    // The layer that tells how its light depends on the normal, or that of its light where none does.
+    slopes: u32,
+    _pad0: u32,
 }
