@@ -9,7 +9,7 @@ use lumencast_gather::path_trace::Levels;
 use lumencast_light::Field;
 use lumencast_scene::{FileContents, Scene};
 use lumencast_solve::blend::BlendSettings;
-use lumencast_solve::{Baked, Spent};
+use lumencast_solve::{Baked, GatherOptions, Spent};
 use serde_json::json;
 
 use crate::arguments::{
@@ -57,10 +57,11 @@ impl Bake {
         let mut scene = self.scene.source.open()?;
         out_file::check_apart([&self.output], &self.scene.source.files(&scene))?;
         let mut gatherer = self.gather.gatherer(Levels::One)?;
-        let Wanted { volumes, lightmap } =
+        let Wanted { volumes, lightmap, directional } =
             self.fields.wanted(&mut scene, &self.scene, &mut *gatherer)?;
         let snapshot = scene.snapshot();
         let options = self.gather.options(BlendSettings::default(), self.gather.reading.baked());
+        let options = GatherOptions { directional, ..options };
         let bar = output::share_bar("Computing light");
         let wanted = lumencast_solve::Bake {
             scene: &snapshot,

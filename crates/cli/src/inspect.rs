@@ -151,6 +151,7 @@ fn light_report(catalog: &Catalog, fields: &[Field], bytes: u64) -> Value {
             Shape::Lightmap(shape) => json!({
                 "page_size": shape.page_size,
                 "pages": shape.pages,
+                "slopes": shape.slopes,
                 "layout": shape.layout.to_string(),
                 "lightmap": field.and_then(Field::as_lightmap).map(lightmap_statistics),
             }),

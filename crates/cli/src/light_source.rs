@@ -11,7 +11,7 @@ use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::Field;
 use lumencast_scene::{Edit, Scene, Snapshot, VolumeSpec};
 use lumencast_solve::blend::BlendSettings;
-use lumencast_solve::{Bake, Baked, Done, Effort, Receivers, bake};
+use lumencast_solve::{Bake, Baked, Done, Effort, GatherOptions, Receivers, bake};
 
 use crate::arguments::{Reading, Wanted};
 use crate::output::{self, tell};
@@ -97,7 +97,8 @@ impl Computed {
         volumes: &[VolumeSpec],
         gatherer: &mut dyn Gather,
     ) -> Result<Baked> {
-        self.light(scene, &Wanted { volumes: volumes.to_vec(), lightmap: None }, gatherer)
+        let volumes = volumes.to_vec();
+        self.light(scene, &Wanted { volumes, lightmap: None, directional: false }, gatherer)
     }
 
     /// The light where it is wanted, with a bar that shows how far it is.
@@ -109,7 +110,8 @@ impl Computed {
     ) -> Result<Baked> {
         let options = self.reading.gathered(self.bounces, self.clamp, BlendSettings::default());
         let bar = output::share_bar("Computing light");
-        let Wanted { volumes, lightmap } = wanted;
+        let Wanted { volumes, lightmap, directional } = wanted;
+        let options = GatherOptions { directional: *directional, ..options };
         let (lightmap, effort) = (lightmap.as_ref(), self.effort);
         let wanted = Bake { scene, volumes, lightmap, effort, options };
         let light = bake(wanted, gatherer, |done| show(&bar, done));

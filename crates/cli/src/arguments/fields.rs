@@ -33,6 +33,10 @@ pub(crate) struct FieldsArguments {
     #[arg(long, value_name = "N", default_value_t = LUMEL_SAMPLES,
           value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     lumel_samples: u32,
+    /// Lets lumels also tell how light depends on the normal, for surfaces with normal maps. Takes about
+    /// twice the bytes.
+    #[arg(long)]
+    pub(crate) directional: bool,
     #[command(flatten)]
     pub(crate) lightmap: LightmapArguments,
 }
@@ -63,6 +67,10 @@ pub(crate) struct LiveFieldsArguments {
     /// How coarse the video is; 6 more make half the bytes or less.
     #[arg(long, value_name = "12..36", default_value_t, value_parser = qp)]
     qp: Qp,
+    /// Lets lumels also tell how light depends on the normal, for surfaces with normal maps. Takes about
+    /// twice the bytes.
+    #[arg(long)]
+    pub(crate) directional: bool,
     #[command(flatten)]
     lightmap: LightmapArguments,
 }
@@ -109,6 +117,8 @@ impl LiveFieldsArguments {
 pub(crate) struct Wanted {
     pub(crate) volumes: Vec<VolumeSpec>,
     pub(crate) lightmap: Option<LaidOut>,
+    /// Whether lumels also tell how light depends on the normal.
+    pub(crate) directional: bool,
 }
 
 impl FieldsArguments {
@@ -120,7 +130,8 @@ impl FieldsArguments {
         gatherer: &mut dyn Gather,
     ) -> Result<Wanted> {
         let volumes = if self.volumes() { volumes.volumes(scene, gatherer)? } else { Vec::new() };
-        Ok(Wanted { volumes, lightmap: self.lumels(scene, gatherer)? })
+        let lightmap = self.lumels(scene, gatherer)?;
+        Ok(Wanted { volumes, lightmap, directional: self.directional })
     }
 
     /// Whether there are to be volumes.

@@ -8,6 +8,7 @@ use lumencast_charts::Store;
 use lumencast_gather::Gather;
 use lumencast_scene::{Scene, Script};
 use lumencast_server::{SampleRange, TickOptions};
+use lumencast_solve::GatherOptions;
 use lumencast_solve::blend::BlendSettings;
 
 use super::fields::LiveFieldsArguments;
@@ -54,7 +55,8 @@ impl TickArguments {
         let lightmap = self.fields.lumels(scene, gatherer)?;
         let blend = BlendSettings { ratio: self.ratio, significance: self.significance };
         let feedback = if self.feedback { ", feedback" } else { "" };
-        let gather = gather.options(blend, gather.reading.served());
+        let options = gather.options(blend, gather.reading.served());
+        let gather = GatherOptions { directional: self.fields.directional, ..options };
         Ok(TickOptions {
             period: 1.0 / self.rate,
             samples: self.samples,

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use lumencast_codec::{LightmapShape, LumelCoding, LumelDecoder, LumelEncoder, Qp, UpdateInfo};
-use lumencast_light::Lightmap;
+use lumencast_light::{Lightmap, Told};
 use serde_json::{Value, json};
 
 /// Parameters that are tried.
@@ -16,8 +16,10 @@ pub(super) struct Coded {
     pub(super) stacked: bool,
     /// What clients see.
     pub(super) shown: Lightmap,
-    /// Bytes of a keyframe of all pages.
+    /// Bytes of a keyframe of the irradiance of all pages.
     pub(super) bytes: usize,
+    /// The same of slopes.
+    pub(super) slope_bytes: usize,
     pub(super) encode_seconds: f64,
     pub(super) decode_seconds: f64,
 }
@@ -40,28 +42,41 @@ impl Coded {
         };
         let shape = LightmapShape::of(lightmap, coding.coding());
         let mut encoder = LumelEncoder::new(shape.clone(), coding);
-        let (mut encode_seconds, mut decode_seconds, mut bytes) = (0.0, 0.0, 0);
+        let (mut encode_seconds, mut decode_seconds) = (0.0, 0.0);
+        let (mut bytes, mut slope_bytes) = (0, 0);
         let mut shown = lightmap.clone();
         // Pages take turns, so that the last has been coded after as many updates as there are pages.
-        for update in 0..u64::from(shape.pages) {
+        for update in 0..shape.tiles().count() as u64 {
             let start = Instant::now();
             let info = UpdateInfo { update, ..UpdateInfo::default() };
             let frames = encoder.encode(lightmap, info, |_| true)?;
             encode_seconds += start.elapsed().as_secs_f64();
             for frame in frames.iter().filter(|frame| frame.new_group) {
-                bytes += frame.bytes.len();
                 let tile = shape.tile(frame.region).context("a page that there is not")?;
+                match tile.told {
+                    Told::Irradiance => bytes += frame.bytes.len(),
+                    Told::Slopes => slope_bytes += frame.bytes.len(),
+                }
                 let start = Instant::now();
                 let light = LumelDecoder::new(shape.coding, tile.size).decode(&frame.bytes)?;
                 decode_seconds += start.elapsed().as_secs_f64();
-                let rows = light.irradiance.chunks(tile.size.x as usize);
+                let (told, shown) = (light.told(tile.told), shown.told_mut(tile.told));
+                let rows = told.chunks(tile.size.x as usize);
                 for (row, values) in tile.rows(shape.page_size).zip(rows) {
-                    shown.irradiance[row].copy_from_slice(values);
+                    shown[row].copy_from_slice(values);
                 }
             }
         }
         let stacked = matches!(coding, LumelCoding::H264Stacked(_));
-        Ok(Self { qp: qp.get(), stacked, shown, bytes, encode_seconds, decode_seconds })
+        Ok(Self {
+            qp: qp.get(),
+            stacked,
+            shown,
+            bytes,
+            slope_bytes,
+            encode_seconds,
+            decode_seconds,
+        })
     }
 
     /// Whether servers send it so unless told otherwise.
@@ -80,6 +95,7 @@ impl Coded {
             "qp": self.qp,
             "irradiance_db": irradiance_db,
             "keyframe_bytes": self.bytes,
+            "slope_keyframe_bytes": self.slope_bytes,
             "encode_ms": 1e3 * self.encode_seconds,
             "decode_ms": 1e3 * self.decode_seconds,
         })

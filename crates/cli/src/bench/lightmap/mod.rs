@@ -1,9 +1,11 @@
 //! `lumencast bench lightmap`: how right the light of lumels is.
 
 mod coded;
+mod directional;
 mod display;
 mod edges;
 mod live;
+mod reference;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -23,8 +25,9 @@ use lumencast_solve::{GatherOptions, LightmapSolver, sides_of_seams, spread};
 use serde_json::json;
 
 use self::coded::Coded;
-use self::display::{code, most};
+use self::directional::Directional;
 use self::live::{Goals, Live};
+use self::reference::{Reference, psnr, white};
 use crate::arguments::{LightmapArguments, Materials, SceneSource};
 use crate::bench::cast::moved_light;
 use crate::charting;
@@ -72,24 +75,16 @@ pub(crate) struct BenchLightmap {
     /// Samples of a point of the reference, at most.
     #[arg(long, default_value_t = 65_536, value_parser = clap::value_parser!(u32).range(512..=1 << 24))]
     reference_samples: u32,
+    /// Lets lumels also tell how light depends on the normal, and judges that on the normals of normal
+    /// maps. Where there are none, normals are tilted by up to 30 degrees.
+    #[arg(long)]
+    directional: bool,
     /// Also casts the scene for 20 seconds as `serve` does, and moves a light half-way.
     #[arg(long)]
     live: bool,
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
-}
-
-/// Irradiance at points, and how far to trust it.
-struct Reference {
-    /// Lux; nothing for points within something.
-    irradiance: Vec<Option<Vec3>>,
-    /// What is displayed as white, lux.
-    white: f32,
-    /// How far noise alone takes it from what is right, decibels.
-    noise: f64,
-    /// Samples a point.
-    samples: u32,
 }
 
 impl BenchLightmap {
@@ -106,7 +101,8 @@ impl BenchLightmap {
             .context("the scene has no still surface that lumels can lie on")?;
         let layout_seconds = start.elapsed().as_secs_f64();
 
-        let mut solver = LightmapSolver::new(FieldId(0), &snapshot, &laid_out, MEAN);
+        let mut solver = LightmapSolver::new(FieldId(0), &snapshot, &laid_out, MEAN)
+            .with_slopes(self.directional);
         let start = Instant::now();
         self.gather(&mut solver, &snapshot, &mut tracer)?;
         let gather_seconds = start.elapsed().as_secs_f64();
@@ -121,8 +117,11 @@ impl BenchLightmap {
         let seam = edges::relative(&sides);
 
         let places = spread(&snapshot, &laid_out.layout, POINTS);
-        let reference = self.reference(&places, &snapshot, &mut tracer)?;
-        let psnr = |lightmap: &Lightmap| reference.psnr(&places, lightmap);
+        let own = |place: &Place| Receiver::point(place.position, place.normal);
+        let reference = self.reference(places.iter().map(own), &snapshot, &mut tracer)?;
+        let psnr = |lightmap: &Lightmap| {
+            reference.psnr(&places, |place| lightmap.irradiance_at(place.on.as_ref()?))
+        };
         let (as_gathered, filtered) = (psnr(&gathered), psnr(&lightmap));
 
         let coded = Coded::all(&lightmap)?;
@@ -133,6 +132,18 @@ impl BenchLightmap {
         let seam_codes = edges::codes(&sides_of_seams(&snapshot, shown), reference.white);
         let many = spread(&snapshot, &laid_out.layout, POISON_POINTS);
         let poison = edges::poisoned(shown, &many, reference.white);
+
+        let directional = match self.directional {
+            true => {
+                let places = directional::shaded(&snapshot, &places);
+                let receivers = places.iter().map(|shaded| shaded.receiver());
+                let shaded = self.reference(receivers, &snapshot, &mut tracer)?;
+                let coded = coded.iter().map(|(coded, _)| coded);
+                let references = [&reference, &shaded];
+                Some(Directional::judge(&lightmap, coded, &places, references))
+            }
+            false => None,
+        };
 
         let live = match self.live {
             true => Some(self.live(scene, &laid_out, &lightmap, reference.white)?),
@@ -159,6 +170,7 @@ impl BenchLightmap {
                 "coded": coded.iter().map(|(coded, db)| coded.json(*db)).collect::<Vec<_>>(),
                 "seams": { "points": sides.len(), "p99": seam, "coded_codes_p99": seam_codes },
                 "poison_codes": poison,
+                "directional": directional.as_ref().map(Directional::json),
                 "live": live.as_ref().map(Live::json),
                 "reference": { "noise_db": reference.noise, "samples": reference.samples },
                 "seconds": {
@@ -197,6 +209,9 @@ impl BenchLightmap {
             );
         }
         say!("light from beyond charts changes points by {poison:.1} codes at most");
+        if let Some(directional) = &directional {
+            directional.say();
+        }
         if let Some(live) = &live {
             live.say();
         }
@@ -271,14 +286,13 @@ impl BenchLightmap {
     /// The path tracer's irradiance, refined until noise is as low as asked for.
     fn reference(
         &self,
-        places: &[Place],
+        receivers: impl Iterator<Item = Receiver>,
         scene: &Arc<Snapshot>,
         tracer: &mut CpuPathTracer,
     ) -> Result<Reference> {
-        let receivers: Arc<[Receiver]> =
-            places.iter().map(|place| Receiver::point(place.position, place.normal)).collect();
-        let mut halves = [vec![Vec3::ZERO; places.len()], vec![Vec3::ZERO; places.len()]];
-        let mut backs = vec![0.0; places.len()];
+        let receivers: Arc<[Receiver]> = receivers.collect();
+        let mut halves = [vec![Vec3::ZERO; receivers.len()], vec![Vec3::ZERO; receivers.len()]];
+        let mut backs = vec![0.0; receivers.len()];
         let mut passes = 0;
         let bar = output::spinner("Computing the reference".to_owned());
         loop {
@@ -321,30 +335,4 @@ impl BenchLightmap {
             }
         }
     }
-}
-
-impl Reference {
-    /// How near a lightmap comes at the points, decibels.
-    fn psnr(&self, places: &[Place], lightmap: &Lightmap) -> f64 {
-        let pairs = places.iter().zip(&self.irradiance).filter_map(|(place, right)| {
-            Some((lightmap.irradiance_at(place.on.as_ref()?)?, (*right)?))
-        });
-        psnr(pairs, self.white)
-    }
-}
-
-/// The 99th percentile of the largest channels.
-fn white<'a>(irradiances: impl Iterator<Item = &'a Vec3>) -> f32 {
-    most(irradiances.map(|e| f64::from(e.max_element())).collect()).unwrap_or(0.0) as f32
-}
-
-/// PSNR of displayed values: gamma 2.2, clamped.
-fn psnr(pairs: impl Iterator<Item = (Vec3, Vec3)>, white: f32) -> f64 {
-    let shown = |e: Vec3| e.map(|channel| code(channel, white) / 255.0);
-    let (mut squares, mut count) = (0.0, 0);
-    for (a, b) in pairs {
-        squares += f64::from((shown(a) - shown(b)).length_squared());
-        count += 3;
-    }
-    -10.0 * (squares / f64::from(count)).log10()
 }

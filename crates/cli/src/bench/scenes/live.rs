@@ -7,6 +7,7 @@ use lumencast_picture::Picture;
 use lumencast_scene::Edit;
 use lumencast_server::TickOptions;
 use lumencast_shade::{Renderer, Settings};
+use lumencast_solve::GatherOptions;
 use lumencast_solve::blend::BlendSettings;
 
 use super::report::Beside;
@@ -53,8 +54,9 @@ impl Live<'_> {
                 Some((edit, picture, judge))
             }
         };
+        let gather = served.gathered(BOUNCES - 1, f32::INFINITY, BlendSettings::default());
         let options = TickOptions {
-            gather: served.gathered(BOUNCES - 1, f32::INFINITY, BlendSettings::default()),
+            gather: GatherOptions { directional: wanted.directional, ..gather },
             volumes: wanted.volumes.clone(),
             lightmap: wanted.lightmap.clone(),
             ..TickOptions::default()

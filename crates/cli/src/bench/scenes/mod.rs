@@ -177,7 +177,7 @@ impl BenchScenes {
             false => Vec::new(),
         };
         let lightmap = self.fields.lumels(&mut subject.scene, &mut *gatherer)?;
-        let wanted = Wanted { volumes, lightmap };
+        let wanted = Wanted { volumes, lightmap, directional: self.fields.directional };
         let snapshot = subject.snapshot.clone();
         let mut bake = |computed: Computed| computed.light(&snapshot, &wanted, &mut *gatherer);
         let baked = bake(usual)?;
