@@ -328,6 +328,7 @@ export class LumencastLight {
     const ofLumels = this.#show === 'direct' ? 0 : this.#lumels.scale * strengths.static * preExposure;
     // What is looked into it by is shown as bright as white paper, whatever the exposure.
     set(factors.lumels, 'value', this.look === 'light' ? ofLumels : Math.PI);
+    set(factors.slopes, 'value', this.#lumels.slopes);
     if (pages) set(pages, 'value', this.#lumels.pages ?? null);
   }
 }

@@ -98,6 +98,7 @@ export class LumelPages {
     if (lightmap < 0) return [];
     const planned: Planned[] = [];
     for (const region of regions) {
+      if (region.slopes && this.plan.slopes === 0) continue;
       const { revision } = region;
       const key = `${field.id}/${region.region}`;
       const before = this.#painted.get(key);
@@ -110,7 +111,8 @@ export class LumelPages {
       const to = isWhole ? 1 : region.shown;
       const share = isWhole ? 1 : this.#look === 'light' ? shareOf(painted.shown, to) : 0;
       if (share <= 0) continue;
-      const [left, top] = this.plan.corner(lightmap, region.page);
+      const [left, first] = this.plan.corner(lightmap, region.page);
+      const top = region.slopes ? first + this.plan.slopes : first;
       const [x, y] = region.min;
       const [width, height] = region.size;
       planned.push({ painted, region, place: { x: left + x, y: top + y, width, height }, to, share });
@@ -138,7 +140,8 @@ export class LumelPages {
     }
     return planned.filter(isLoaded).map(({ painted, region, place, to, share }) => {
       painted.shown = to;
-      return { ...place, share, paint: painted.textures!.paint(region.picture, this.#scale) };
+      const scale = region.slopes ? 1 : this.#scale;
+      return { ...place, share, paint: painted.textures!.paint(region.picture, scale) };
     });
   }
 

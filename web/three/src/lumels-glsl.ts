@@ -1,3 +1,4 @@
+import { STEEPEST } from '@lumencast/client';
 import { FIRST, LUMEL_CORNER, LUMEL_SHARE, LUMELS } from './charted.js';
 
 /**
@@ -36,6 +37,7 @@ export const LUMELS_OF_FRAGMENT = /* glsl */ `
 uniform float lumencastStill;
 uniform float lumencastMoving;
 uniform float lumencastLumels;
+uniform float lumencastSlopes;
 uniform highp sampler2D lumencastPages;
 varying highp vec4 vLumels;
 flat varying float vLumelShare;
@@ -56,6 +58,16 @@ bool hasLumels() {
 vec3 lumelIrradiance() {
 	vec2 uv = lumelsSeen() / vec2( textureSize( lumencastPages, 0 ) );
 	return textureLod( lumencastPages, uv, 0.0 ).rgb * lumencastLumels;
+}
+
+// Irradiance on the normal of shading over that on the surface's own, both of view space. What is not
+// painted yet is 0 in all channels. Twin: tilt in webgpu-lumels.ts.
+float lumelTilt( vec3 own, vec3 shading ) {
+	if ( lumencastSlopes == 0.0 ) return 1.0;
+	vec2 uv = ( lumelsSeen() + vec2( 0.0, lumencastSlopes ) ) / vec2( textureSize( lumencastPages, 0 ) );
+	vec4 told = textureLod( lumencastPages, uv, 0.0 );
+	vec3 slope = ${STEEPEST.toFixed(1)} * ( 2.0 * told.rgb - told.a );
+	return max( 0.0, 1.0 + dot( slope, ( vec4( shading - own, 0.0 ) * viewMatrix ).xyz ) );
 }
 
 // How much of the light lumels make.

@@ -74,6 +74,11 @@ export class Lumels {
     return this.#pages?.scale ?? 0;
   }
 
+  /** Rows of {@link pages} from a lumel to its slope while they show light; 0 where there are no slopes. */
+  get slopes(): number {
+    return this.look === 'light' ? (this.#pages?.plan.slopes ?? 0) : 0;
+  }
+
   /** Meshes that have lumels now. */
   get meshes(): number {
     return this.#surfaces.count;
@@ -127,6 +132,6 @@ export class Lumels {
 
 /** Whether lightmaps take the same room, wherever surfaces lie in it. */
 function isSameRoom(a: readonly Lightmap[], b: readonly Lightmap[]): boolean {
-  const room = ({ id, shape }: Lightmap) => `${id} ${shape.pageSize} ${shape.pages}`;
+  const room = ({ id, shape }: Lightmap) => `${id} ${shape.pageSize} ${shape.pages} ${!!shape.slopes}`;
   return a.map(room).join() === b.map(room).join();
 }

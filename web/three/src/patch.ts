@@ -38,7 +38,8 @@ export function patchedIrradiance(): string {
     'if ( lumelShare() < 1.0 && isInsideLightProbeGrid(',
   );
   const grids = '#if NUM_LIGHT_PROBE_GRIDS > 0';
-  const lumels = 'if ( hasLumels() ) irradiance += lumelShare() * lumelIrradiance();';
+  const lumels =
+    'if ( hasLumels() ) irradiance += lumelShare() * lumelTilt( nonPerturbedNormal, normal ) * lumelIrradiance();';
   return replaceText(probes, grids, `${lumels}\n\n${grids}`);
 }
 
@@ -85,6 +86,7 @@ function rowOf(matrices: string, row: number): string {
 /** Uniforms of patched materials; other than neutral only while a scene is drawn. */
 export const uniforms = {
   lumels: { value: 1 },
+  slopes: { value: 0 },
   still: { value: 1 },
   moving: { value: 1 },
   pages: { value: null as Texture | null },
@@ -137,6 +139,7 @@ function patchMaterial(material: Material, withLumels: boolean): void {
       lumencastMoving: uniforms.moving,
       lumencastStill: uniforms.still,
       lumencastLumels: uniforms.lumels,
+      lumencastSlopes: uniforms.slopes,
       lumencastPages: uniforms.pages,
     });
     shader.vertexShader = replaceChunks(shader.vertexShader, vertex);

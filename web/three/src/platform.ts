@@ -64,6 +64,8 @@ export interface PagesTarget {
 export interface IndirectFactors {
   /** What the texture of pages holds. */
   readonly lumels: { value: number };
+  /** No factor: rows of that texture from a lumel to its slope, 0 where there are none. */
+  readonly slopes: { value: number };
   /** Light of probe grids on meshes that have lumels, where these have none, by as much as lumels count. */
   readonly still: { value: number };
   /** Light of probe grids on all other meshes. */

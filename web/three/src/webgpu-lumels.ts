@@ -1,3 +1,4 @@
+import { STEEPEST } from '@lumencast/client';
 import type { LightProbeGrid } from 'three/addons/lighting/LightProbeGrid.js';
 import { LightProbeGridNode } from 'three/addons/tsl/lighting/LightProbeGridNode.js';
 import { InterpolationSamplingType, Light, type Texture } from 'three';
@@ -9,6 +10,9 @@ import {
   If,
   INFINITY,
   mix,
+  negateOnBackSide,
+  normalWorld,
+  normalWorldGeometry,
   renderGroup,
   texture,
   uniform,
@@ -24,6 +28,7 @@ import { sizeOf } from './webgpu-pages.js';
 /** Uniforms of all scenes; other than neutral only while a scene is drawn. */
 export const factors = {
   lumels: uniform(1).setGroup(renderGroup),
+  slopes: uniform(0).setGroup(renderGroup),
   still: uniform(1).setGroup(renderGroup),
   moving: uniform(1).setGroup(renderGroup),
 };
@@ -74,6 +79,10 @@ class LumelNode extends AnalyticLightNode<LumelLight> {
       const uv = at.div(sizeOf(pages));
       const texel = pages.sample(uv).level(float(0)) as Node<'vec4'>;
       light.assign(texel.rgb.mul(factors.lumels.mul(share)));
+      If(factors.slopes.greaterThan(0), () => {
+        const below = at.add(vec2(0, factors.slopes)).div(sizeOf(pages));
+        light.mulAssign(tilt(pages.sample(below).level(float(0)) as Node<'vec4'>));
+      });
       If(share.greaterThanEqual(1), () => {
         lightProbeIrradiance.assign(vec3(0));
         lightProbePriority.assign(INFINITY);
@@ -81,6 +90,18 @@ class LumelNode extends AnalyticLightNode<LumelLight> {
     });
     irradiance.addAssign(light);
   }
+}
+
+/**
+ * Irradiance on the normal of shading over that on the surface's own, by what a lumel's slope is told by. What
+ * is not painted yet is 0 in all channels. Twin: lumelTilt in lumels-glsl.ts.
+ */
+function tilt(told: Node<'vec4'>): Node<'float'> {
+  const slope = told.rgb.mul(2).sub(vec3(told.a)).mul(STEEPEST);
+  return slope
+    .dot(normalWorld.sub(negateOnBackSide(normalWorldGeometry)))
+    .add(1)
+    .max(0);
 }
 
 /** What a fragment knows of the lumels of the side that is seen. */

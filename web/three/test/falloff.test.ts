@@ -143,8 +143,10 @@ describe('patchMaterials', () => {
     expect(vertex.indexOf('vLumels.xy =')).toBeGreaterThan(vertex.indexOf('void main()'));
     expect(fragment.indexOf('vec3 lumelIrradiance()')).toBeLessThan(fragment.indexOf('void main()'));
     expect(fragment).toContain('if ( lumelShare() < 1.0 && isInsideLightProbeGrid(');
-    const added = fragment.indexOf('irradiance += lumelShare() * lumelIrradiance()');
+    const added = fragment.indexOf('irradiance += lumelShare() * lumelTilt( nonPerturbedNormal, normal )');
     expect(added).toBeGreaterThan(fragment.indexOf('vec3 irradiance = getAmbientLightIrradiance'));
+    expect(added).toBeGreaterThan(fragment.indexOf('#include <normal_fragment_maps>'));
+    expect(fragment).toContain('#include <normal_fragment_maps>');
     // Where a scene has no grids, too.
     expect(added).toBeLessThan(fragment.indexOf('vec3 probeWorldPos'));
     expect(fragment).toContain('exp2( s6.w ) * gridFactor()');

@@ -30,6 +30,16 @@ describe('an atlas of pages', () => {
     }
   });
 
+  it('has slopes below all pages, where there is room', () => {
+    const lightmaps = [
+      { pageSize: 8, pages: 3, slopes: true },
+      { pageSize: 8, pages: 1 },
+    ];
+    expect(planAtlas(lightmaps, 64)).toMatchObject({ width: 16, height: 32, slopes: 16 });
+    expect(planAtlas(lightmaps, 16)).toMatchObject({ width: 16, height: 16, slopes: 0 });
+    expect(planAtlas(lightmaps.slice(1), 64)).toMatchObject({ height: 8, slopes: 0 });
+  });
+
   it('is none where textures are too small', () => {
     expect(planAtlas([{ pageSize: 1024, pages: 4 }], 2048)).toBeDefined();
     expect(planAtlas([{ pageSize: 1024, pages: 5 }], 2048)).toBeUndefined();

@@ -85,6 +85,24 @@ describe('pages', () => {
     expect(shares()).toEqual([[1]]);
   });
 
+  it('paint slopes below, as they are, and nowhere where there is no room', () => {
+    const [light, slopes] = [region({ picture: halves(1, 64, 32) }), region({ region: 1, slopes: true })];
+    const planned = (of: boolean) =>
+      new LumelPages(target(), planAtlas([{ pageSize: 8, pages: 1, slopes: of }], 64)!, [0]);
+    planned(true).update([{ ...lightmapLight([light, slopes]), scale: 32 }], 'light', 0);
+    planned(false).update([{ ...lightmapLight([light, slopes]), scale: 32 }], 'light', 0);
+    const factors = painted.map((strokes) =>
+      strokes.map(({ y, paint }) => [y, 'factor' in paint && paint.factor]),
+    );
+    expect(factors).toEqual([
+      [
+        [0, 1],
+        [8, 1],
+      ],
+      [[0, 1]],
+    ]);
+  });
+
   it('paint each tile in its place, of every lightmap', () => {
     const other = lightmapLight(
       [region({ page: 1, min: [2, 4], size: [6, 4], picture: halves(0, 24) })],

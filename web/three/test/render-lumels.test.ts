@@ -236,6 +236,38 @@ describe.skipIf(!chromiumProgram)('lumels', () => {
       expect(opened.complaints).toEqual([]);
     }, 60_000);
 
+    it('light normal maps from where light comes, once slopes tell it', async () => {
+      // The normal map leans along x, by codes of 8 bits.
+      const bump = [204, 128, 230] as const;
+      const [x, z] = [(2 * 204) / 255 - 1, (2 * 230) / 255 - 1];
+      const length = Math.hypot(x, z, 1 / 255);
+      const shading = [x / length, z / length];
+      const slope = [1, 0.5, -0.5];
+      const told = new Array<number[]>(TILE * TILE).fill(slope.map((s) => (1 + s / 3) / 2));
+      const slopes = (picture: Picture, revision: number) => ({
+        0: { picture, revision },
+        3: { picture, revision },
+      });
+      const tiles = slopes(halves(even(3), 16), 1);
+      const seen = await rows([
+        { tiles, bump },
+        { slopes: slopes(halves(told), 2) },
+        { turned: true },
+        { turned: false, look: 'lumels' },
+        { look: 'light' },
+      ]);
+      // On the back the normal and the map's lean are turned about.
+      const tilt = slope[0] * shading[0] + slope[1] * (shading[1] - 1);
+      const expected = [3, 3 * (1 + tilt), 3 * (1 - tilt), undefined, 3 * (1 + tilt)];
+      expected.forEach((value, i) => {
+        if (value === undefined) return;
+        expect(seen[i][i === 2 ? SIZE - MIDDLE : MIDDLE][0] * Math.PI).toBeCloseTo(value, 1);
+      });
+      expect(tilt).toBeGreaterThan(0.4);
+      expect(seen[1][RIGHT][0]).toBeCloseTo(1, 2);
+      expect(opened.complaints).toEqual([]);
+    }, 60_000);
+
     it('are seen as a checkerboard', async () => {
       const lit = { tiles: { 0: { picture: halves(even(3)), revision: 1 } } };
       const [, row] = await rows([lit, { look: 'lumels' }]);

@@ -8,7 +8,16 @@ import {
   type LumelPicture,
   type LumelRegion,
 } from '@lumencast/client';
-import { DoubleSide, InstancedMesh, Matrix4, Mesh, MeshLambertMaterial, PlaneGeometry, Scene } from 'three';
+import {
+  DataTexture,
+  DoubleSide,
+  InstancedMesh,
+  Matrix4,
+  Mesh,
+  MeshLambertMaterial,
+  PlaneGeometry,
+  Scene,
+} from 'three';
 import { WebGPURenderer } from 'three/webgpu';
 import {
   fromAbove,
@@ -32,6 +41,10 @@ export const TILE = PAGE / 2;
 export interface Step {
   /** Pictures of tiles by number, and how far along the way to them one is. */
   readonly tiles?: Readonly<Record<number, { picture: Picture; revision: number; shown?: number }>>;
+  /** The same of slopes. */
+  readonly slopes?: Step['tiles'];
+  /** A normal map, the same all over, by its codes; that of the first step. */
+  readonly bump?: readonly [number, number, number];
   readonly strengths?: { static: number; dynamic: number };
   readonly preExposure?: number;
   readonly show?: 'both' | 'direct';
@@ -70,6 +83,11 @@ export async function lumels(kind: Drawer, steps: readonly Step[], areCopies = f
   const scene = new Scene();
   // One material for what has lumels and for what has none.
   const material = new MeshLambertMaterial({ color: 0xffffff, side: DoubleSide });
+  const bump = steps.find((step) => step.bump)?.bump;
+  if (bump) {
+    material.normalMap = new DataTexture(Uint8Array.from([...bump, 255]), 1, 1);
+    material.normalMap.needsUpdate = true;
+  }
   const floor = new PlaneGeometry(2, 4);
   const copies = new InstancedMesh(floor, material, 2);
   const meshes = [-1, 1].map((x, i) => {
@@ -89,7 +107,10 @@ export async function lumels(kind: Drawer, steps: readonly Step[], areCopies = f
     id: 0,
     use: 'static',
     kind: 'lightmap',
-    shape: { coding: 'halves', pageSize: PAGE, pages: 1, layout: '0'.repeat(64) },
+    shape: {
+      ...({ coding: 'halves', pageSize: PAGE, pages: 1, layout: '0'.repeat(64) } as const),
+      ...(steps.some((step) => step.slopes) && { slopes: true as const }),
+    },
   } as const;
   const nothing: LightmapLayout = { pageSize: PAGE, pages: 1, surfaces: [] };
   const surface = (copy: number, back: boolean, x: number, y: number): LightmapSurface => ({
@@ -115,20 +136,25 @@ export async function lumels(kind: Drawer, steps: readonly Step[], areCopies = f
   const regions = new Map<number, LumelRegion>();
   const rows: Radiance[][] = [];
   for (const step of steps) {
-    for (const [region, { picture, revision, shown = 1 }] of Object.entries(step.tiles ?? {})) {
-      const number = Number(region);
-      regions.set(number, {
-        region: number,
-        page: 0,
-        min: [(number % 2) * TILE, Math.floor(number / 2) * TILE],
-        size: [TILE, TILE],
-        revision,
-        shown,
-        picture: pictureOf(picture),
-      });
+    for (const tiles of [step.tiles, step.slopes]) {
+      for (const [tile, { picture, revision, shown = 1 }] of Object.entries(tiles ?? {})) {
+        const number = Number(tile);
+        const isSlopes = tiles === step.slopes;
+        const region = isSlopes ? 4 + number : number;
+        regions.set(region, {
+          region,
+          page: 0,
+          ...(isSlopes && { slopes: true }),
+          min: [(number % 2) * TILE, Math.floor(number / 2) * TILE],
+          size: [TILE, TILE],
+          revision,
+          shown,
+          picture: pictureOf(picture),
+        });
+      }
     }
     const all = [...regions.values()];
-    const scale = Math.max(...all.map(({ picture }) => picture.scale));
+    const scale = Math.max(...all.filter(({ slopes }) => !slopes).map(({ picture }) => picture.scale));
     if (step.named !== undefined) layout = step.named ? both : nothing;
     if (all.length > 0)
       lightmap = {

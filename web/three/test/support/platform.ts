@@ -16,7 +16,7 @@ class FakeGrid extends Light {
 export const platform: Platform = {
   createGrid: () => new FakeGrid() as ProbeGrid,
   scaleIn: 'atlas',
-  factors: { lumels: { value: 1 }, still: { value: 1 }, moving: { value: 1 } },
+  factors: { lumels: { value: 1 }, slopes: { value: 0 }, still: { value: 1 }, moving: { value: 1 } },
   pages: { value: null },
   freeUnits: () => 2,
   max3DTextureSize: 256,
