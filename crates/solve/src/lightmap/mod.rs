@@ -381,7 +381,7 @@ impl LightmapSolver {
     }
 
     /// Adds what was gathered; `budgets` tell at which lumels. What is not finite does not count. What is
-    /// known of a cell follows what its lumels together tell ([`change`]).
+    /// known of a cell follows what its lumels together tell.
     pub fn take(&mut self, gathered: &Gathered, budgets: &[Budget]) {
         let (found, of_slopes): (Vec<(usize, Sum)>, Vec<Vec3>) = budgets
             .iter()
