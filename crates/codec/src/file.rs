@@ -205,11 +205,7 @@ impl LightFile {
                     let light = LumelDecoder::new(shape.coding, tile.size).decode(&frame.bytes)?;
                     let field = entry.or_insert_with(|| info.dark());
                     let Some(lightmap) = field.as_lightmap_mut() else { continue };
-                    let (told, shown) = (light.told(tile.told), lightmap.told_mut(tile.told));
-                    let rows = told.chunks(tile.size.x as usize);
-                    for (row, values) in tile.rows(shape.page_size).zip(rows) {
-                        shown[row].copy_from_slice(values);
-                    }
+                    tile.put(light, lightmap);
                 }
             }
         }

@@ -34,11 +34,7 @@ fn decoded(lightmap: &Lightmap, coding: LumelCoding) -> (Lightmap, usize) {
     for frame in &frames {
         let tile = shape.tile(frame.region).expect("a tile");
         let light = LumelDecoder::new(shape.coding, tile.size).decode(&frame.bytes).expect("light");
-        let told = light.told(tile.told);
-        let rows = told.chunks(tile.size.x as usize);
-        for (row, values) in tile.rows(SIDE).zip(rows) {
-            shown.told_mut(tile.told)[row].copy_from_slice(values);
-        }
+        tile.put(light, &mut shown);
     }
     (shown, frames.len())
 }

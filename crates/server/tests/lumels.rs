@@ -219,11 +219,7 @@ fn shown(stepped: &Stepped) -> Lightmap {
         for (_, frame) in of_tile {
             assert_eq!(frame.layer, 0);
             let light = decoder.decode(&frame.bytes).expect("light");
-            for (row, light) in
-                tile.rows(shape.page_size).zip(light.irradiance.chunks(tile.size.x as usize))
-            {
-                shown.irradiance[row].copy_from_slice(light);
-            }
+            tile.put(light, &mut shown);
         }
     }
     shown

@@ -3,7 +3,9 @@
 use std::ops::Range;
 
 use glam::UVec2;
-use lumencast_light::Told;
+use lumencast_light::{Lightmap, Told};
+
+use super::tile_light::TileLight;
 
 /// A part of a page, the unit of tracks: the regions of a lightmap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,6 +34,15 @@ impl Tile {
             (page_size as usize, self.min.as_usizevec2(), self.size.as_usizevec2());
         let first = (self.page as usize * side + min.y) * side + min.x;
         (0..size.y).map(move |y| first + y * side..first + y * side + size.x)
+    }
+
+    /// Puts what was decoded of the tile to where it belongs.
+    pub fn put(self, light: TileLight, lightmap: &mut Lightmap) {
+        let rows = self.rows(lightmap.layout.page_size);
+        let (told, shown) = (light.told(self.told), lightmap.told_mut(self.told));
+        for (row, values) in rows.zip(told.chunks(self.size.x as usize)) {
+            shown[row].copy_from_slice(values);
+        }
     }
 }
 

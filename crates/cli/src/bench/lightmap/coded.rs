@@ -60,11 +60,7 @@ impl Coded {
                 let start = Instant::now();
                 let light = LumelDecoder::new(shape.coding, tile.size).decode(&frame.bytes)?;
                 decode_seconds += start.elapsed().as_secs_f64();
-                let (told, shown) = (light.told(tile.told), shown.told_mut(tile.told));
-                let rows = told.chunks(tile.size.x as usize);
-                for (row, values) in tile.rows(shape.page_size).zip(rows) {
-                    shown[row].copy_from_slice(values);
-                }
+                tile.put(light, &mut shown);
             }
         }
         let stacked = matches!(coding, LumelCoding::H264Stacked(_));
