@@ -33,15 +33,19 @@ pub(crate) fn shares(corners: [Vec2; 3], size: UVec2) -> impl Iterator<Item = Sh
     let is_flat = !(twice.abs() > 0.0 && twice.is_finite());
     let rows = if is_flat { 0..0 } else { low.y..high.y };
     rows.flat_map(move |y| (low.x..high.x).map(move |x| UVec2::new(x as u32, y as u32)))
-        .filter_map(move |lumel| share(corners, twice, lumel))
+        .filter_map(move |lumel| share(corners, lumel))
 }
 
-fn share(corners: [Vec2; 3], twice: f32, lumel: UVec2) -> Option<Share> {
-    let [a, b, c] = corners;
-    let weights = |p: Vec2| {
-        let (v, w) = ((p - a).perp_dot(c - a) / twice, (b - a).perp_dot(p - a) / twice);
-        Vec3::new(1.0 - v - w, v, w)
-    };
+/// Barycentric weights of a point of the plane, which may lie outside the triangle; not finite where the
+/// triangle is flat.
+pub fn barycentric([a, b, c]: [Vec2; 3], point: Vec2) -> Vec3 {
+    let twice = (b - a).perp_dot(c - a);
+    let (v, w) = ((point - a).perp_dot(c - a) / twice, (b - a).perp_dot(point - a) / twice);
+    Vec3::new(1.0 - v - w, v, w)
+}
+
+fn share(corners: [Vec2; 3], lumel: UVec2) -> Option<Share> {
+    let weights = |point: Vec2| barycentric(corners, point);
     let low = lumel.as_vec2();
     let (area, middle) = clipped(corners, low);
     let own = weights(low + 0.5);

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::{IVec2, IVec3, UVec2, Vec2, Vec3};
-use lumencast_charts::lumels_on_pages;
+use lumencast_charts::{barycentric, lumels_on_pages};
 use lumencast_light::{Layout, Rectangle, Surface};
 use lumencast_scene::Snapshot;
 use rayon::prelude::*;
@@ -133,10 +133,7 @@ fn about(
 fn weights(surface: &Surface, triangle: u32, at: Vec2) -> Option<Vec3> {
     let corners = surface.charts.corners(triangle)?;
     let of_page = surface.rectangles[corners[0].rectangle as usize].corner.as_vec2();
-    let [a, b, c] = corners.map(|corner| of_page + corner.at);
-    let twice = (b - a).perp_dot(c - a);
-    let (v, w) = ((at - a).perp_dot(c - a) / twice, (b - a).perp_dot(at - a) / twice);
-    Some(Vec3::new(1.0 - v - w, v, w))
+    Some(barycentric(corners.map(|corner| of_page + corner.at), at))
 }
 
 /// Points by where they lie.
