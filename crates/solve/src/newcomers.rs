@@ -40,8 +40,8 @@ impl Newcomers {
     /// which backs light can reach; `goes_on` is asked now and then.
     ///
     /// # Errors
-    /// [`lumencast_charts::ChartError::Interrupted`] where `goes_on` answers no, whatever the unwrapper finds wrong, and a
-    /// gatherer that gave up.
+    /// [`lumencast_charts::ChartError::Interrupted`] where `goes_on` answers no, whatever the unwrapper
+    /// finds wrong, and a gatherer that gave up.
     pub fn lay_out(
         &self,
         store: Option<&Store>,

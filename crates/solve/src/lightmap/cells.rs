@@ -157,20 +157,20 @@ impl Cells {
         self.blocks[block].due = least;
     }
 
-    /// Sets how noisy a sample is in the block of a cell: the standard deviation of its luminance, by the
-    /// square root of that.
-    pub(crate) fn set_noise(&mut self, cell: usize, noise: f32) {
-        let block = self.block_of(cell);
+    /// Sets how noisy a sample is in a block: the standard deviation of its luminance, by the square root
+    /// of that.
+    pub(crate) fn set_noise(&mut self, block: usize, noise: f32) {
         self.blocks[block].noise = noise;
     }
 
-    fn block_of(&self, cell: usize) -> usize {
+    /// The number of a cell's block.
+    pub(crate) fn block_of(&self, cell: usize) -> usize {
         self.blocks.partition_point(|block| block.cells.end <= cell)
     }
 
-    /// The receivers of the block of a cell.
-    pub(crate) fn receivers_about(&self, cell: usize) -> Range<usize> {
-        let Range { start, end } = self.blocks[self.block_of(cell)].cells;
+    /// The receivers of a block.
+    pub(crate) fn receivers_of_block(&self, block: usize) -> Range<usize> {
+        let Range { start, end } = self.blocks[block].cells;
         self.receivers_of(start).start..self.receivers_of(end - 1).end
     }
 

@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use crate::blend::BlendSettings;
 pub use backs::with_backs;
 use cells::{BLOCK, Block, Cells};
-use change::{Change, Prior};
+use change::{Cause, Change};
 use filter::{Noisy, REACH, filter};
 use places::{LumelPlace, lumel_places};
 use point::Point;
@@ -38,18 +38,6 @@ use sums::{Sum, noise};
 
 /// What a lumel has in place of a receiver where no surface covers it.
 const NO_RECEIVER: u32 = u32::MAX;
-
-/// Standard deviations of the ratio by which the light of a cell changes: after an edit, while something
-/// in the scene moves, and where all is still.
-const EDITED: f32 = 0.2;
-const MOVING: f32 = 0.02;
-const STILL: f32 = 0.0;
-/// What is known of a lumel weighs so many samples where the pattern of light is another now.
-const OTHER: f32 = 4.0;
-/// Of light that was scaled after an edit, so much is still wrong at a lumel, as a share of it.
-const WRONG: f32 = 0.1;
-/// A cell that is brighter or darker by this ratio is gathered at sooner than others.
-const MUCH: f32 = 0.1;
 
 /// What has moved gets lumels again once it has rested for so many seconds of scene time.
 const RESTING: f64 = 2.0;
@@ -394,17 +382,17 @@ impl LightmapSolver {
         let page_size = self.layout.page_size;
         let cell = |(receiver, _): &(usize, Sum)| self.cells.cell_of(*receiver as u32);
         let of_cells: Vec<&[(usize, Sum)]> = found.chunk_by(|a, b| cell(a) == cell(b)).collect();
+        let mut blocks = BTreeSet::new();
         for of_cell in of_cells {
             let (first, _) = of_cell[0];
             let cell = self.cells.cell_of(first as u32);
             let block = Block::of(self.lumels[first], page_size);
-            let is_expected = self.cells.count_update(cell);
-            let deviation = match is_expected {
-                true => EDITED,
-                false if self.is_moving => MOVING,
-                false => STILL,
+            let cause = match self.cells.count_update(cell) {
+                true => Cause::Edit,
+                false if self.is_moving => Cause::Motion,
+                false => Cause::Nothing,
             };
-            if self.adapt(cell, of_cell, deviation) {
+            if self.adapt(cell, of_cell, cause) {
                 self.cells.hasten(cell);
                 self.stale.extend(self.readers.get(&block).into_iter().flatten());
             }
@@ -416,32 +404,26 @@ impl LightmapSolver {
                     slopes.add(*receiver, *slope, [&before, new, sum]);
                 }
             }
-            let noise = noise(&self.sums[self.cells.receivers_about(cell)]);
-            self.cells.set_noise(cell, noise);
+            blocks.insert(self.cells.block_of(cell));
             self.news.extend(self.beside.get(&block).into_iter().flatten());
             self.news.insert(block);
+        }
+        for block in blocks {
+            let noise = noise(&self.sums[self.cells.receivers_of_block(block)]);
+            self.cells.set_noise(block, noise);
         }
     }
 
     /// Lets what is known of a cell's lumels follow what is new. Whether light has changed much.
-    fn adapt(&mut self, cell: usize, new: &[(usize, Sum)], deviation: f32) -> bool {
+    fn adapt(&mut self, cell: usize, new: &[(usize, Sum)], cause: Cause) -> bool {
         let significance = self.settings.significance;
         if significance.is_infinite() {
             return false;
         }
         let pairs = new.iter().map(|(receiver, new)| (&self.sums[*receiver], new));
-        let Change { gain, is_other } = Change::of(pairs, Prior { deviation, significance });
-        if gain != Vec3::ONE || is_other {
-            for sum in &mut self.sums[self.cells.receivers_of(cell)] {
-                sum.brighten(gain);
-                if is_other {
-                    sum.limit(OTHER);
-                } else if deviation == EDITED {
-                    sum.doubt(WRONG);
-                }
-            }
-        }
-        is_other || (gain - 1.0).abs().max_element() > MUCH
+        let change = Change::of(pairs, cause, significance);
+        change.apply(&mut self.sums[self.cells.receivers_of(cell)], cause);
+        change.is_much()
     }
 
     /// Makes light of what has been taken in since the last time: filtered on the surface where

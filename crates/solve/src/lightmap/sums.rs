@@ -11,6 +11,7 @@ const BURIED_ABOVE: f32 = 0.5;
 const LEAST: f32 = 8.0;
 /// Samples of a lumel from which on its light is shown.
 const SETTLED: f32 = 24.0;
+
 /// What has arrived at a lumel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Sum {
