@@ -211,6 +211,11 @@ export class LumencastLight {
     return this.#lumels.meshes;
   }
 
+  /** Milliseconds that lumels took of the page's thread in the last {@link update}. */
+  get lumelTime(): number {
+    return this.#lumels.time;
+  }
+
   /** What the pages show: the light, or, on white, the lumels as a checkerboard or how old each part is. */
   get look(): LumelLook {
     return this.#lumels.look;

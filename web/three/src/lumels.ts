@@ -20,6 +20,7 @@ export class Lumels {
   #pages: LumelPages | undefined;
   #light: Light | undefined;
   #layouts: readonly LightmapLight['layout'][] = [];
+  #time = 0;
 
   constructor(
     private readonly scene: Scene,
@@ -84,8 +85,20 @@ export class Lumels {
     return this.#surfaces.count;
   }
 
+  /** Milliseconds that the last {@link update} and {@link follow} took of the page's thread. */
+  get time(): number {
+    return this.#time;
+  }
+
   /** Takes over light that has changed, `now` in milliseconds; true when some had. */
   update(light: LightState, now: number): boolean {
+    const began = performance.now();
+    const isChanged = this.#update(light, now);
+    this.#time = performance.now() - began;
+    return isChanged;
+  }
+
+  #update(light: LightState, now: number): boolean {
     const pages = this.#pages;
     if (!pages) return false;
     const lightmaps = light.fields.filter(isLightmap).filter((lit) => this.#isPlanned(lit.field));
@@ -100,7 +113,9 @@ export class Lumels {
 
   /** Gives meshes lumels where they stand, and takes them from those that move; see {@link LumelSurfaces}. */
   follow(revision: number, now: number): void {
+    const began = performance.now();
     this.#surfaces.update(revision, now);
+    this.#time += performance.now() - began;
   }
 
   /** Whether light is that of a planned lightmap: until there is new light, it may be of a former shape. */

@@ -377,6 +377,16 @@ describe('lumels', () => {
     expect(pages.dispose).toHaveBeenCalledOnce();
   });
 
+  it('tell how much of the page’s time they take', () => {
+    session.tell('catalog', catalogOf(lightmap, field));
+    expect(light.lumelTime).toBe(0);
+    pages.paint.mockImplementationOnce(() => {
+      for (const begun = performance.now(); performance.now() < begun + 5;);
+    });
+    shine(4);
+    expect(light.lumelTime).toBeGreaterThanOrEqual(5);
+  });
+
   it('are weighed apart from what moves, and without them all is weighed alike', () => {
     Object.assign(light.strengths, { static: 0.5, dynamic: 3 });
     expect(factors()).toEqual([0, 0.5, 0.5, null]);

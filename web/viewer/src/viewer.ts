@@ -89,6 +89,7 @@ export class Viewer {
   #isDark = false;
   #litFrames = 0;
   #frameTime = 16;
+  #lumelTime = 0;
   #askedAt = 0;
   #clients: number | undefined;
   #metering: Promise<void> | undefined;
@@ -143,6 +144,7 @@ export class Viewer {
     this.#frameTime += (seconds * 1000 - this.#frameTime) * 0.08;
     this.#resolution.frame(seconds * 1000);
     this.draw(performance.now(), seconds);
+    this.#lumelTime += (this.light.lumelTime - this.#lumelTime) * 0.08;
     this.controls.update();
     this.#meterWhenLit();
     if (now - this.#askedAt > ASK_INTERVAL) {
@@ -263,7 +265,7 @@ export class Viewer {
     const shapes = session.catalog?.fields.filter(isLightmap).map(({ shape }) => shape) ?? [];
     if (!light.pages || shapes.length === 0) return undefined;
     const pages = shapes.reduce((sum, shape) => sum + shape.pages, 0);
-    return { pages, pageSize: shapes[0].pageSize, meshes: light.lumelMeshes };
+    return { pages, pageSize: shapes[0].pageSize, meshes: light.lumelMeshes, time: this.#lumelTime };
   }
 
   /** Who else watches stands in the server's metrics. */

@@ -1,7 +1,8 @@
 /**
  * Figures of the whole way, server and page on one machine: the delay from the end of a tick to the
- * update in the page, and the time that the page's light takes to follow a moved sun. The page does
- * not draw meanwhile: without a GPU that would take the server's processor.
+ * update in the page, the time that lumels take of the page's thread, and the time that the page's light
+ * takes to follow a moved sun. The page does not draw meanwhile: without a GPU that would take the server's
+ * processor.
  *
  *     LUMENCAST_BIN=target/release/lumencast npm run figures
  *
@@ -9,6 +10,7 @@
  */
 import { writeFileSync } from 'node:fs';
 import { cpus } from 'node:os';
+import { resolve } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
@@ -18,6 +20,8 @@ import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
 const VIEWPORT = { width: 400, height: 300 };
 /** Updates whose way is timed; the session remembers 1,000 arrivals. */
 const UPDATES_SECONDS = 38;
+/** Seconds in which the time that lumels take is measured. */
+const UPKEEP_SECONDS = 30;
 
 const program = lumencastProgram();
 const sponza = sharedScene('sponza/Sponza.glb');
@@ -67,6 +71,31 @@ describe('the delay from the end of a tick to the update in a page', () => {
   );
 });
 
+describe('the time of each picture that lumels take of the page’s thread, while a lamp moves', () => {
+  const scripts = { cornell: 'minute', door: 'minute-door', tomb: 'minute-tomb' };
+  const renderers = ['webgl', 'webgpu'];
+  it.each(
+    Object.entries(scripts).flatMap(([scene, script]) =>
+      renderers.map((renderer) => ({ scene, script, renderer })),
+    ),
+  )(
+    'in $scene by $renderer',
+    async ({ scene, script, renderer }) => {
+      const edits = resolve(import.meta.dirname, `../../../benches/${script}.jsonl`);
+      const server = await Server.start(program, scene, await freePort(), ['--edits', edits]);
+      try {
+        const page = await openPage(browser, server.address, VIEWPORT, { renderer });
+        const times = await page.evaluate(lumelTimes, UPKEEP_SECONDS);
+        figures[`lumels_ms_${scene}_${renderer}`] = { pictures: times.length, ...summary(times) };
+        await page.close();
+      } finally {
+        await server.kill();
+      }
+    },
+    240_000,
+  );
+});
+
 describe('the time from a moved sun to 95 % of its new light', () => {
   it.skipIf(!sponza)(
     'in Sponza',
@@ -99,10 +128,22 @@ function ticksEnded(log: string): Map<number, number> {
   return ended;
 }
 
-function summary(values: readonly number[]): Record<'median' | 'p99' | 'max', number> {
+function summary(values: readonly number[]): Record<'median' | 'p95' | 'p99' | 'max', number> {
   const sorted = values.toSorted((a, b) => a - b);
   const at = (q: number): number => sorted[Math.round(q * (sorted.length - 1))];
-  return { median: at(0.5), p99: at(0.99), max: at(1) };
+  return { median: at(0.5), p95: at(0.95), p99: at(0.99), max: at(1) };
+}
+
+/** In the page: what each update of the light takes for lumels, milliseconds. */
+async function lumelTimes(seconds: number): Promise<number[]> {
+  const { camera, light } = window.lumencast!;
+  const times: number[] = [];
+  for (const end = performance.now() + 1000 * seconds; performance.now() < end;) {
+    await new Promise(requestAnimationFrame);
+    light.update(camera);
+    times.push(light.lumelTime);
+  }
+  return times;
 }
 
 /**

@@ -6,8 +6,17 @@ export interface Figures extends SessionStats {
   readonly framesPerSecond: number;
   /** Pages and programs that watch; `undefined` where the server does not say. */
   readonly clients: number | undefined;
-  /** Pages of lumels that are shown, lumels along their sides and meshes that have some. */
-  readonly lumels: { readonly pages: number; readonly pageSize: number; readonly meshes: number } | undefined;
+  readonly lumels: LumelFigures | undefined;
+}
+
+export interface LumelFigures {
+  /** Pages that are shown, and lumels along their sides. */
+  readonly pages: number;
+  readonly pageSize: number;
+  /** Meshes that have some. */
+  readonly meshes: number;
+  /** Milliseconds a picture that they take of the page's thread. */
+  readonly time: number;
 }
 
 const ROWS: readonly [label: string, title: string, text: (figures: Figures) => string | undefined][] = [
@@ -36,6 +45,11 @@ const ROWS: readonly [label: string, title: string, text: (figures: Figures) => 
     ({ lumels }) => known(lumels, ({ pages, pageSize }) => `${pages} × ${pageSize}²`),
   ],
   ['lit', 'Objects that lumels light', ({ lumels }) => known(lumels, ({ meshes }) => meshes.toFixed(0))],
+  [
+    'upkeep',
+    'Time of each picture that lumels take of this page’s thread',
+    ({ lumels }) => known(lumels, ({ time }) => `${time.toFixed(1)} ms`),
+  ],
   ['clients', 'Who watches this scene', ({ clients }) => known(clients, (n) => n.toFixed(0))],
   ['frames', 'Pictures a second on this page', ({ framesPerSecond }) => `${framesPerSecond.toFixed(0)} fps`],
 ];
