@@ -354,19 +354,19 @@ impl Tick {
         self.fields_are_news = true;
     }
 
-    /// Gives lumels to what came later, once its surfaces are cut into charts.
+    /// Gives lumels to what came later, once they are placed.
     fn unwrap(&mut self, scene: &Arc<Snapshot>, outlet: &mut dyn Outlet, waits: bool) {
         if self.unwrapping.is_idle()
             && let Some(newcomers) = self.solver.newcomers(scene)
         {
             self.unwrapping.start(newcomers);
         }
-        let Some((newcomers, extended)) = self.unwrapping.poll(waits) else { return };
-        let Some(extended) = extended else { return self.solver.leave_without_lumels(&newcomers) };
+        let Some((newcomers, placed)) = self.unwrapping.poll(waits) else { return };
+        let Some(placed) = placed else { return self.solver.leave_without_lumels(&newcomers) };
         let id = newcomers.field();
         // Their lumels are numbered anew.
         self.gathering.keep(|field| field != id);
-        self.solver.extend_lightmap(scene, &newcomers, &extended.laid_out);
+        self.solver.extend_lightmap(scene, &newcomers, placed);
         self.lay_out(&[id], outlet);
     }
 

@@ -1,13 +1,13 @@
-//! Surfaces of instances that came later, cut into charts beside the ticks.
+//! Lumels of instances that came later, cut into charts and placed beside the ticks.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-use lumencast_charts::{Extended, Store};
+use lumencast_charts::Store;
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_solve::{Newcomers, SolveError};
+use lumencast_solve::{Newcomers, Placed, SolveError};
 
 /// One cutting at a time, on a thread of its own. It ends when this is dropped.
 #[derive(Default)]
@@ -19,7 +19,7 @@ pub(crate) struct Unwrapping {
 struct UnderWay {
     newcomers: Newcomers,
     goes_on: Arc<AtomicBool>,
-    thread: JoinHandle<Result<Extended, SolveError>>,
+    thread: JoinHandle<Result<Placed, SolveError>>,
 }
 
 impl Unwrapping {
@@ -37,7 +37,7 @@ impl Unwrapping {
         let work = move || {
             let options = Options { threads: NonZeroUsize::new(1), ..Options::default() };
             let mut looks = CpuPathTracer::new(options).map_err(|_| SolveError::Gather)?;
-            own.lay_out(store.as_ref(), &mut looks, &|| flag.load(Ordering::Relaxed))
+            own.place(store.as_ref(), &mut looks, &|| flag.load(Ordering::Relaxed))
         };
         match std::thread::Builder::new().name("unwrap".into()).spawn(work) {
             Ok(thread) => self.under_way = Some(UnderWay { newcomers, goes_on, thread }),
@@ -45,17 +45,17 @@ impl Unwrapping {
         }
     }
 
-    /// What was cut, once it is, or at once where that is waited for.
-    pub(crate) fn poll(&mut self, waits: bool) -> Option<(Newcomers, Option<Extended>)> {
+    /// What was placed, once it is, or at once where that is waited for.
+    pub(crate) fn poll(&mut self, waits: bool) -> Option<(Newcomers, Option<Placed>)> {
         let UnderWay { newcomers, thread, .. } =
             self.under_way.take_if(|under_way| waits || under_way.thread.is_finished())?;
-        let extended = match thread.join() {
-            Ok(Ok(extended)) => {
-                let without = extended.left_out.len();
-                if without > 0 {
-                    tracing::warn!(surfaces = without, "no room for lumels: probes light them");
+        let placed = match thread.join() {
+            Ok(Ok(placed)) => {
+                if placed.left_out > 0 {
+                    let surfaces = placed.left_out;
+                    tracing::warn!(surfaces, "no room for lumels: probes light them");
                 }
-                Some(extended)
+                Some(placed)
             }
             Ok(Err(error)) => {
                 tracing::warn!(%error, "new surfaces have no lumels");
@@ -66,7 +66,7 @@ impl Unwrapping {
                 None
             }
         };
-        Some((newcomers, extended))
+        Some((newcomers, placed))
     }
 }
 

@@ -4,31 +4,56 @@ use std::sync::Arc;
 
 use lumencast_charts::{Extended, LaidOut, Store, extended, sheets};
 use lumencast_gather::Gather;
-use lumencast_light::FieldId;
+use lumencast_light::{FieldId, Layout};
 use lumencast_scene::Snapshot;
 
+use crate::blend::BlendSettings;
 use crate::error::SolveError;
-use crate::lightmap::with_backs;
+use crate::lightmap::{LightmapSolver, with_backs};
 
-/// Still instances that rest and have no lumels yet. Cutting them into charts takes its time, and needs
-/// nothing but what is here: [`Newcomers::lay_out`] may run on any thread.
+/// Still instances that rest and have no lumels yet. Cutting them into charts and placing lumels takes
+/// its time, and needs nothing but what is here: [`Newcomers::place`] may run on any thread.
 #[derive(Clone, Debug)]
 pub struct Newcomers {
-    pub(crate) field: FieldId,
-    pub(crate) before: LaidOut,
+    /// The field that they are to have lumels of.
+    field: FieldId,
+    settings: BlendSettings,
+    directional: bool,
+    before: LaidOut,
     /// By their nodes and their numbers there.
     pub(crate) instances: Vec<(u32, u32)>,
     scene: Arc<Snapshot>,
 }
 
+/// Lumels of a layout that has room for newcomers.
+#[derive(Debug)]
+pub struct Placed {
+    /// All lumels, dark.
+    pub(crate) lumels: LightmapSolver,
+    /// Surfaces that there was no room for.
+    pub left_out: usize,
+}
+
+impl Placed {
+    /// Where surfaces lie.
+    pub fn layout(&self) -> &Layout {
+        self.lumels.layout()
+    }
+}
+
 impl Newcomers {
-    pub(crate) fn new(
-        field: FieldId,
-        before: LaidOut,
-        instances: Vec<(u32, u32)>,
-        scene: Arc<Snapshot>,
-    ) -> Self {
-        Self { field, before, instances, scene }
+    /// Those that a lightmap has by now; nothing where there are none.
+    pub(crate) fn of(lightmap: &LightmapSolver, scene: &Arc<Snapshot>) -> Option<Self> {
+        let instances = lightmap.newcomers(scene.time);
+        let (settings, directional) = lightmap.settings();
+        (!instances.is_empty()).then(|| Self {
+            field: lightmap.id(),
+            settings,
+            directional,
+            before: lightmap.laid_out(),
+            instances,
+            scene: scene.clone(),
+        })
     }
 
     /// The field that they are to have lumels of.
@@ -36,13 +61,25 @@ impl Newcomers {
         self.field
     }
 
-    /// The layout with their surfaces too, and without those of instances that are gone. `gatherer` looks
-    /// which backs light can reach; `goes_on` is asked now and then.
+    /// The lumels of a layout with their surfaces too, and without those of instances that are gone.
+    /// `gatherer` looks which backs light can reach; `goes_on` is asked now and then.
     ///
     /// # Errors
     /// [`lumencast_charts::ChartError::Interrupted`] where `goes_on` answers no, whatever the unwrapper
     /// finds wrong, and a gatherer that gave up.
-    pub fn lay_out(
+    pub fn place(
+        &self,
+        store: Option<&Store>,
+        gatherer: &mut dyn Gather,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Placed, SolveError> {
+        let Extended { laid_out, left_out } = self.lay_out(store, gatherer, goes_on)?;
+        let lumels = LightmapSolver::new(self.field, &self.scene, &laid_out, self.settings)
+            .with_slopes(self.directional);
+        Ok(Placed { lumels, left_out: left_out.len() })
+    }
+
+    fn lay_out(
         &self,
         store: Option<&Store>,
         gatherer: &mut dyn Gather,

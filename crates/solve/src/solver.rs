@@ -12,7 +12,7 @@ use crate::error::SolveError;
 use crate::field::FieldSolver;
 use crate::fit::{FitSettings, Part, fit};
 use crate::lightmap::LightmapSolver;
-use crate::newcomers::Newcomers;
+use crate::newcomers::{Newcomers, Placed};
 use crate::options::GatherOptions;
 use crate::request::{Asked, Request, Turn, What};
 use crate::surfaces::Surfaces;
@@ -190,31 +190,26 @@ impl Solver {
 
     /// Instances that came later, and rest by now, without lumels.
     pub fn newcomers(&self, scene: &Arc<Snapshot>) -> Option<Newcomers> {
-        self.fields.iter().find_map(|field| {
-            let lightmap = field.as_lightmap()?;
-            let instances = lightmap.newcomers(scene.time);
-            if instances.is_empty() {
-                return None;
-            }
-            Some(Newcomers::new(lightmap.id(), lightmap.laid_out(), instances, scene.clone()))
-        })
+        let mut lightmaps = self.fields.iter().filter_map(FieldSolver::as_lightmap);
+        lightmaps.find_map(|lightmap| Newcomers::of(lightmap, scene))
     }
 
     /// Leaves instances that came later without lumels.
     pub fn leave_without_lumels(&mut self, newcomers: &Newcomers) {
         self.each_lightmap(|lightmap, _| {
-            if lightmap.id() == newcomers.field {
+            if lightmap.id() == newcomers.field() {
                 lightmap.go_without(&newcomers.instances);
             }
         });
     }
 
-    /// Gives instances that came later the lumels of a layout, as far as it has some for them. What was
-    /// asked for at the field's lumels before must not be taken in any more.
-    pub fn extend_lightmap(&mut self, scene: &Snapshot, newcomers: &Newcomers, laid_out: &LaidOut) {
+    /// Gives instances that came later their lumels, as far as some were placed for them. What was asked
+    /// for at the field's lumels before must not be taken in any more.
+    pub fn extend_lightmap(&mut self, scene: &Snapshot, newcomers: &Newcomers, placed: Placed) {
+        let mut lumels = Some(placed.lumels);
         self.each_lightmap(|lightmap, published| {
-            if lightmap.id() == newcomers.field {
-                lightmap.extend(scene, laid_out, &newcomers.instances, published);
+            if let Some(new) = lumels.take_if(|new| new.id() == lightmap.id()) {
+                lightmap.extend(scene, new, &newcomers.instances, published);
             }
         });
     }

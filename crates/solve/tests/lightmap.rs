@@ -6,10 +6,10 @@ use glam::{Affine3A, Vec3};
 use lumencast_charts::{LaidOut, Sheet, laid_out, sheets};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Receiver, Shading};
-use lumencast_light::{FieldId, Lightmap, Place};
+use lumencast_light::{FieldId, Lightmap, Place, SurfaceId};
 use lumencast_scene::{Edit, Environment, LightmapSpec, Material, Scene, Snapshot, Transform};
 use lumencast_solve::blend::BlendSettings;
-use lumencast_solve::{GatherOptions, LightmapSolver, Solver, spread, with_backs};
+use lumencast_solve::{GatherOptions, LightmapSolver, Request, Solver, Turn, spread, with_backs};
 use lumencast_testkit::scenes::{Stage, lambert};
 use std::sync::Arc;
 
@@ -321,9 +321,9 @@ fn backs_of_what_comes_later_have_lumels() {
     solver.follow(&room(true, 1.0));
     let rested = room(true, 4.0);
     let newcomers = solver.newcomers(&rested).expect("what has come");
-    let extended = newcomers.lay_out(None, &mut tracer(), &|| true).expect("a layout");
-    assert!(extended.left_out.is_empty());
-    let surfaces = extended.laid_out.layout.surfaces();
+    let placed = newcomers.place(None, &mut tracer(), &|| true).expect("a layout");
+    assert_eq!(placed.left_out, 0);
+    let surfaces = placed.layout().surfaces();
     let sides = |node: u32| -> Vec<bool> {
         surfaces.iter().filter(|s| s.id.node == node).map(|s| s.id.back).collect()
     };
@@ -331,6 +331,67 @@ fn backs_of_what_comes_later_have_lumels() {
     let nodes: Vec<u32> = rested.instances.iter().skip(later).map(|i| i.node.0).collect();
     assert_eq!(sides(nodes[0]), [false, true]);
     assert!(nodes[1..].iter().all(|node| sides(*node) == [false]));
+}
+
+/// A plate is carried elsewhere and lit there while lumels are placed for what has come: it has none until
+/// its own are where it is.
+#[test]
+fn what_moves_while_newcomers_are_placed_waits_for_its_lumels() {
+    let room = |at: Vec3, is_furnished: bool, time: f64| {
+        let mut stage = Stage::default();
+        let wall = stage.material(lambert(Vec3::splat(0.5), Vec3::ONE));
+        stage.room(Vec3::ZERO, Vec3::splat(4.0), wall);
+        let plate = stage.snapshot().instances.len();
+        stage.quad(Vec3::ZERO, Vec3::X, Vec3::Y, wall);
+        if is_furnished {
+            stage.quad(-Vec3::Z, Vec3::X, Vec3::Y, wall);
+        }
+        let mut scene = Snapshot::clone(&stage.snapshot());
+        (scene.time, scene.version) = (time, time as u64);
+        scene.instances[plate].world_from_object = Affine3A::from_translation(at);
+        let ids = scene.instances[plate..].iter().map(|i| i.node.0);
+        let ids = ids.map(|node| SurfaceId { node, ..SurfaceId::default() }).collect::<Vec<_>>();
+        (Arc::new(scene), ids)
+    };
+    let (empty, _) = room(Vec3::ZERO, false, 0.0);
+    let mut solver = Solver::new(&[], GatherOptions::default()).expect("no volumes");
+    solver.set_lightmap(&empty, Some(&laid(&empty)));
+    let field = solver.ids().next().expect("a lightmap");
+    solver.follow(&empty);
+    solver.follow(&room(Vec3::ZERO, true, 1.0).0);
+    let (rested, plates) = room(Vec3::ZERO, true, 4.0);
+    let newcomers = solver.newcomers(&rested).expect("what has come");
+    let placed = newcomers.place(None, &mut tracer(), &|| true).expect("a layout");
+
+    let has = |solver: &Solver, plate: SurfaceId| {
+        let lightmap = solver.light().lightmaps().next().expect("a lightmap");
+        lightmap.layout.surface(plate).is_some()
+    };
+    let mut tracer = tracer();
+    let mut gather_until = |solver: &mut Solver, plate: SurfaceId, scene: &Arc<Snapshot>| {
+        for pass in 0..50 {
+            let turn = Turn { previous: None, samples: 32, lumels: Some(1 << 18), pass };
+            let Request { job, asked } = solver.job(field, scene, turn).expect("a job");
+            let ticket = tracer.submit(job);
+            solver.take(&asked, &tracer.wait(ticket).expect("light"));
+            solver.follow(scene);
+            if has(solver, plate) {
+                return;
+            }
+        }
+        panic!("the plate has no lumels after 50 jobs");
+    };
+    solver.follow(&room(Vec3::Z, true, 5.0).0);
+    assert!(!has(&solver, plates[0]));
+    let (carried, _) = room(Vec3::Z, true, 8.0);
+    solver.follow(&carried);
+    gather_until(&mut solver, plates[0], &carried);
+
+    solver.extend_lightmap(&carried, &newcomers, placed);
+    assert!(!has(&solver, plates[0]), "its lumels are where it was");
+    let (later, _) = room(Vec3::Z, true, 11.0);
+    solver.follow(&later);
+    plates.iter().for_each(|plate| gather_until(&mut solver, *plate, &later));
 }
 
 /// A lamp that moves changes the light of cells by less than the noise of their lumels: it is followed

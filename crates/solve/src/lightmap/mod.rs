@@ -160,6 +160,11 @@ impl LightmapSolver {
         self.id
     }
 
+    /// Where all surfaces lie, those of instances that have moved too.
+    pub(crate) fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
     /// What a lumel gathers as.
     fn receiver(&self, point: &Point) -> Receiver {
         point.receiver(if self.slopes.is_some() { Shading::Tilted } else { Shading::Own })
@@ -254,24 +259,27 @@ impl LightmapSolver {
         LaidOut { layout: Layout::clone(&self.layout), texel: self.texel, coarser: false }
     }
 
+    /// How updates are blended, and whether lumels tell how light depends on the normal.
+    pub(crate) fn settings(&self) -> (BlendSettings, bool) {
+        (self.settings, self.slopes.is_some())
+    }
+
     /// Instances that get no lumels.
     pub(crate) fn go_without(&mut self, instances: &[InstanceId]) {
         self.without.extend(instances);
         self.newcomers.retain(|id, _| !instances.contains(id));
     }
 
-    /// Has lumels of a layout from now on, which keeps the place of surfaces that there are. What is
-    /// known of lumels is kept. Instances that are `tried` and have none in the layout get none; those
-    /// that have some show them once they were gathered at.
+    /// Has other lumels from now on, whose layout keeps the place of surfaces that there are. What is
+    /// known of lumels is kept. Instances that are `tried` and are not among those placed get none; those
+    /// that are show their lumels once they were gathered at.
     pub(crate) fn extend(
         &mut self,
         scene: &Snapshot,
-        laid_out: &LaidOut,
+        mut new: Self,
         tried: &[InstanceId],
         shown: &mut Lightmap,
     ) {
-        let mut new =
-            Self::new(self.id(), scene, laid_out, self.settings).with_slopes(self.slopes.is_some());
         for (receiver, lumel) in new.lumels.iter().enumerate() {
             let entry = self.receiver_of.get(*lumel as usize);
             let Some(before) = entry.and_then(|entry| beyond::own(*entry)) else { continue };
@@ -283,7 +291,7 @@ impl LightmapSolver {
             }
         }
         for lumels in std::iter::once(&mut shown.irradiance).chain(&mut shown.slopes) {
-            lumels.resize(laid_out.layout.lumel_count(), Vec3::ZERO);
+            lumels.resize(new.layout.lumel_count(), Vec3::ZERO);
         }
         let (with, without): (Vec<InstanceId>, Vec<InstanceId>) =
             tried.iter().partition(|id| new.placed.contains_key(id));
@@ -302,6 +310,8 @@ impl LightmapSolver {
         }
         shown.layout = new.resting();
         *self = new;
+        // The scene may have changed since they were placed.
+        self.follow(scene, shown);
     }
 
     /// Whether an instance that is at a place now, or gone, has lumels otherwise than before.
