@@ -8,7 +8,7 @@ use lumencast_codec::Epoch;
 use lumencast_gather::Gather;
 use lumencast_light::Light;
 use lumencast_scene::{Aabb, Edit, LightKind, NodeId, NodeInfo, Scene, Transform};
-use lumencast_server::{Beat, Mail, Received, Tick, TickOptions};
+use lumencast_server::{Beat, Mail, Outlet, Received, Report, Tick, TickOptions};
 
 use super::Nobody;
 
@@ -20,9 +20,9 @@ const MOST: f32 = 0.5;
 /// A light without a place turns by so much, radians.
 const TURN: f32 = 0.26;
 
-/// A scene that is cast. Its time stands still.
+/// A scene that is cast.
 pub(super) struct Cast {
-    tick: Tick,
+    pub(super) tick: Tick,
     beat: Beat,
     start: Instant,
     seq: u64,
@@ -39,32 +39,47 @@ impl Cast {
         Ok(Self { tick, beat, start: Instant::now(), seq: 0 })
     }
 
-    /// So many seconds, which begin with edits. `seen` is given the light of each tick, and the seconds
-    /// since they began.
+    /// Seconds since the beginning.
+    pub(super) fn now(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
+    }
+
+    /// One tick at `scene_now`, and the rest of its period.
+    pub(super) fn step(
+        &mut self,
+        scene_now: f64,
+        mail: Mail,
+        outlet: &mut dyn Outlet,
+        mut seen: impl FnMut(&Light, f64),
+    ) -> Report {
+        self.beat.start(self.now());
+        let report = self.tick.step_within(scene_now, mail, outlet, PATIENCE);
+        let now = self.now();
+        seen(self.tick.light(), now);
+        std::thread::sleep(Duration::from_secs_f64(self.beat.wait(now)));
+        report
+    }
+
+    /// So many seconds of a scene whose time stands still, which begin with edits. `seen` is given the
+    /// light of each tick, and the seconds since they began.
     pub(super) fn go_on(
         &mut self,
         edits: &[Edit],
         seconds: f64,
         mut seen: impl FnMut(&Light, f64),
     ) {
-        let began = self.start.elapsed().as_secs_f64();
+        let began = self.now();
         let mut mail = Mail::default();
         for edit in edits {
             self.seq += 1;
             let (client, edit) = ("bench".into(), edit.clone());
             mail.edits.push(Received { client, seq: self.seq, edit, temporary: false });
         }
-        loop {
-            let now = self.start.elapsed().as_secs_f64();
-            if now - began > seconds {
-                return;
-            }
-            self.beat.start(now);
-            let mail = std::mem::take(&mut mail);
-            self.tick.step_within(0.0, mail, &mut Nobody { watches: true }, PATIENCE);
-            let now = self.start.elapsed().as_secs_f64();
-            seen(self.tick.light(), now - began);
-            std::thread::sleep(Duration::from_secs_f64(self.beat.wait(now)));
+        while self.now() - began <= seconds {
+            let mut all = Nobody { watches: true };
+            self.step(0.0, std::mem::take(&mut mail), &mut all, |light, now| {
+                seen(light, now - began);
+            });
         }
     }
 

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use clap::Args;
-use lumencast_codec::{Catalog, EncodedRegion, Epoch, ProbeHeader};
+use lumencast_codec::{Catalog, EncodedRegion, ProbeHeader};
 use lumencast_gather::path_trace::Levels;
 use lumencast_server::{Mail, Outlet, Report, Stage, Tick};
 use serde_json::{Value, json};
 
+use super::cast::Cast;
 use super::quantile;
 use crate::arguments::{GatherArguments, SceneArguments, TickArguments};
 use crate::output::{self, say};
@@ -18,10 +19,12 @@ use crate::output::{self, say};
 #[command(after_help = "\
 Examples:
   lumencast bench tick cornell
-  lumencast bench tick cornell --seconds 60 --edits benches/minute.jsonl --json
+  lumencast bench tick cornell --seconds 60 --edits benches/minute.jsonl --live --json
 
-One tick follows another at once; the scene's time moves by a period each. Every region counts as
-watched. Times on a machine that does other things besides are not worth much.")]
+One tick follows another at once, and waits for the light of its lumels; the scene's time moves by a
+period each. With --live the scene's time is that of the clock, as a server's is, and no tick waits for
+lumels: bytes a second are then what this machine sends. Every region counts as watched. Times on a
+machine that does other things besides are not worth much.")]
 pub(crate) struct BenchTick {
     #[command(flatten)]
     scene: SceneArguments,
@@ -32,6 +35,9 @@ pub(crate) struct BenchTick {
     seconds: f64,
     #[command(flatten)]
     tick: TickArguments,
+    /// Keeps the pace of a server.
+    #[arg(long)]
+    live: bool,
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
@@ -48,31 +54,39 @@ impl BenchTick {
         let mut gatherer = self.gather.gatherer(Levels::Two)?;
         let options = self.tick.options(&mut scene, &self.scene, &self.gather, &mut *gatherer)?;
         let period = options.period;
-        let mut tick = Tick::new(scene, gatherer, options, Epoch(0))?;
-        let ticks = SETTLING + (self.seconds * self.tick.rate).ceil().clamp(1.0, 1e7) as usize;
-        let bar = output::bar(ticks as u64, "Ticks");
-        let lightmaps = tick.light().lightmaps().map(|lightmap| lightmap.id.0).collect();
+        let mut cast = Cast::new(scene, gatherer, options)?;
+        let end = SETTLING as f64 * period + self.seconds.max(period);
+        let bar = output::bar((end / period).ceil() as u64, "Ticks");
+        let lightmaps = cast.tick.light().lightmaps().map(|lightmap| lightmap.id.0).collect();
         let mut sent = Sent { lightmaps, ..Sent::default() };
-        let mut first_half = 0;
-        let reports: Vec<Report> = (0..ticks)
-            .map(|number| {
-                bar.inc(1);
-                if number == ticks / 2 {
-                    first_half = sent.lumels;
-                }
-                tick.step(number as f64 * period, Mail::default(), &mut sent)
-            })
-            .collect();
+        let mut first_half = None;
+        let mut reports: Vec<Report> = Vec::new();
+        let mut now = 0.0;
+        // Half a period: sums of periods are not exact.
+        while now < end - 0.5 * period {
+            if now >= 0.5 * end {
+                first_half.get_or_insert(sent.lumels);
+            }
+            let mail = Mail::default();
+            reports.push(match self.live {
+                true => cast.step(now, mail, &mut sent, |_, _| ()),
+                false => cast.tick.step(now, mail, &mut sent),
+            });
+            now = if self.live { cast.now() } else { reports.len() as f64 * period };
+            bar.set_position((now / period) as u64);
+        }
         bar.finish_and_clear();
-        let mut figures = self.figures(&tick, &reports[SETTLING..], &sent, ticks as u64);
+        let tick = &cast.tick;
+        let settled = &reports[SETTLING.min(reports.len() - 1)..];
+        let mut figures = self.figures(tick, settled, &sent, reports.len() as u64);
         let lumels: usize =
             tick.light().lightmaps().map(|lightmap| lightmap.irradiance.len()).sum();
         if lumels > 0 {
-            let half = (ticks as f64 / 2.0) * period;
+            let of_second_half = sent.lumels - first_half.unwrap_or_default();
             figures["lightmap"] = json!({
                 "lumels": lumels,
-                "bytes_a_second": sent.lumels as f64 / (2.0 * half),
-                "bytes_a_second_of_second_half": (sent.lumels - first_half) as f64 / half,
+                "bytes_a_second": sent.lumels as f64 / end,
+                "bytes_a_second_of_second_half": of_second_half as f64 / (0.5 * end),
             });
         }
         if self.json {

@@ -4,8 +4,11 @@ mod coded;
 mod directional;
 mod display;
 mod edges;
+#[cfg(feature = "gpu")]
+mod handover;
 mod live;
 mod reference;
+mod report;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -22,16 +25,18 @@ use lumencast_scene::{Scene, Snapshot};
 use lumencast_server::TickOptions;
 use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{GatherOptions, LightmapSolver, sides_of_seams, spread};
-use serde_json::json;
 
 use self::coded::Coded;
 use self::directional::Directional;
+#[cfg(feature = "gpu")]
+use self::handover::Handover;
 use self::live::{Goals, Live};
 use self::reference::{Reference, psnr, white};
+use self::report::Report;
 use crate::arguments::{LightmapArguments, Materials, SceneSource};
 use crate::bench::cast::moved_light;
 use crate::charting;
-use crate::output::{self, say};
+use crate::output;
 
 /// Points of surfaces at which light is judged.
 const POINTS: usize = 4096;
@@ -82,6 +87,11 @@ pub(crate) struct BenchLightmap {
     /// Also casts the scene for 20 seconds as `serve` does, and moves a light half-way.
     #[arg(long)]
     live: bool,
+    /// Also draws the scene while all its surfaces pass from lumels to probes, as those of a thing do that
+    /// begins to move.
+    #[cfg(feature = "gpu")]
+    #[arg(long)]
+    handover: bool,
     /// Prints JSON only.
     #[arg(long)]
     json: bool,
@@ -150,79 +160,48 @@ impl BenchLightmap {
             false => None,
         };
 
+        #[cfg(feature = "gpu")]
+        let handover = match self.handover {
+            true => Some(Handover::measure(
+                self.scene.open()?,
+                &lightmap,
+                &mut tracer,
+                reference.white,
+            )?),
+            false => None,
+        };
+
         let LaidOut { layout, texel, .. } = &laid_out;
-        let judged = reference.irradiance.iter().flatten().count();
+        let report = Report {
+            scene: name,
+            pages: layout.pages,
+            page_size: layout.page_size,
+            texel: *texel,
+            surfaces: layout.surfaces().len(),
+            backs: layout.surfaces().iter().filter(|surface| surface.id.back).count(),
+            lumels: solver.lumel_count(),
+            buried: solver.buried_count(),
+            samples: self.samples,
+            bounces: self.bounces,
+            materials: self.materials,
+            as_gathered,
+            filtered,
+            coded,
+            seam_points: sides.len(),
+            seam,
+            seam_codes,
+            poison,
+            directional,
+            #[cfg(feature = "gpu")]
+            handover,
+            live,
+            reference,
+            seconds: [layout_seconds, gather_seconds, filter_seconds],
+        };
         if self.json {
-            return output::json(&json!({
-                "scene": name,
-                "pages": layout.pages,
-                "page_size": layout.page_size,
-                "texel": texel,
-                "surfaces": layout.surfaces().len(),
-                "backs": layout.surfaces().iter().filter(|surface| surface.id.back).count(),
-                "lumels": solver.lumel_count(),
-                "buried": solver.buried_count(),
-                "samples": self.samples,
-                "bounces": self.bounces,
-                "materials": self.materials.to_string(),
-                "points": judged,
-                "irradiance_db": { "gathered": as_gathered, "filtered": filtered },
-                "coded": coded.iter().map(|(coded, db)| coded.json(*db)).collect::<Vec<_>>(),
-                "seams": { "points": sides.len(), "p99": seam, "coded_codes_p99": seam_codes },
-                "poison_codes": poison,
-                "directional": directional.as_ref().map(Directional::json),
-                "live": live.as_ref().map(Live::json),
-                "reference": { "noise_db": reference.noise, "samples": reference.samples },
-                "seconds": {
-                    "layout": layout_seconds, "gather": gather_seconds, "filter": filter_seconds,
-                },
-            }));
+            return output::json(&report.json());
         }
-        say!(
-            "{}: {} × {}², a lumel every {:.1} cm, {} lumels ({} within something)",
-            name,
-            layout.pages,
-            layout.page_size,
-            100.0 * texel,
-            solver.lumel_count(),
-            solver.buried_count()
-        );
-        say!(
-            "irradiance: {filtered:.1} dB, as gathered {as_gathered:.1} dB, {} samples a lumel",
-            self.samples
-        );
-        for (coded, db) in &coded {
-            say!(
-                "coded: {db:.1} dB by {}, qp {}, keyframe {:.1} KB, {:.1} ms, decoded in {:.1} ms",
-                coded.name(),
-                coded.qp,
-                coded.bytes as f64 / 1e3,
-                1e3 * coded.encode_seconds,
-                1e3 * coded.decode_seconds
-            );
-        }
-        if let Some(seam) = seam {
-            say!(
-                "seams: both sides differ by {:.2} % in the 99th percentile, as sent by {:.1} codes",
-                100.0 * seam,
-                seam_codes.unwrap_or_default()
-            );
-        }
-        say!("light from beyond charts changes points by {poison:.1} codes at most");
-        if let Some(directional) = &directional {
-            directional.say();
-        }
-        if let Some(live) = &live {
-            live.say();
-        }
-        say!(
-            "reference: {judged} points, noise {:.1} dB after {} samples",
-            reference.noise,
-            reference.samples
-        );
-        say!(
-            "seconds: layout {layout_seconds:.1}, light {gather_seconds:.1}, filter {filter_seconds:.1}"
-        );
+        report.say();
         Ok(())
     }
 

@@ -17,6 +17,11 @@ pub(super) struct Reference {
 }
 
 impl Reference {
+    /// Points that light is judged at.
+    pub(super) fn judged(&self) -> usize {
+        self.irradiance.iter().flatten().count()
+    }
+
     /// How near light that is read comes at the points, decibels.
     pub(super) fn psnr<P>(&self, places: &[P], read: impl Fn(&P) -> Option<Vec3>) -> f64 {
         let pairs = places.iter().zip(&self.irradiance);
