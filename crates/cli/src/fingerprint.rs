@@ -7,12 +7,13 @@ use std::io;
 use anyhow::{Context, Result};
 use lumencast_scene::{FileContents, Scene};
 
-/// A hash of a scene's files and environment, and of what was `said` beside them. Where the files lie
-/// and how old they are does not count.
+/// A hash of a scene's files, its environment and the edits since it was loaded, and of what was `said`
+/// beside them. Where the files lie and how old they are does not count.
 pub(crate) fn of(scene: &Scene, said: impl Hash) -> Result<u64> {
     let mut hasher = Hashing(DefaultHasher::new());
     said.hash(&mut hasher.0);
     serde_json::to_string(scene.environment())?.hash(&mut hasher.0);
+    serde_json::to_string(&scene.edits_since_load())?.hash(&mut hasher.0);
     for file in scene.files() {
         file.name.hash(&mut hasher.0);
         let length = match &file.contents {
@@ -43,7 +44,7 @@ impl io::Write for Hashing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumencast_scene::{Edit, Environment};
+    use lumencast_scene::{Edit, Environment, NodeId, Transform};
 
     #[test]
     fn tells_scenes_apart_by_what_they_hold() {
@@ -78,6 +79,11 @@ mod tests {
         let environment = Environment::Constant { radiance: glam::Vec3::ONE };
         one.apply(&Edit::SetEnvironment { environment }).expect("an environment");
         assert_ne!(print(&one, "4 bounces"), first, "another environment");
+        let mut moved = scene("two", 0.0);
+        let translation = Some(glam::Vec3::X);
+        let transform = Transform { translation, ..Transform::default() };
+        moved.apply(&Edit::MoveNode { node: NodeId(0), transform }).expect("a node");
+        assert_ne!(print(&moved, "4 bounces"), first, "another place");
         std::fs::remove_dir_all(folder).expect("there");
         assert!(of(&one, "").is_err_and(|e| e.to_string().contains("a.gltf")), "files are gone");
     }
