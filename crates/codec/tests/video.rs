@@ -120,34 +120,6 @@ fn still_light_costs_almost_nothing() {
     assert!((1..=8 * 32).contains(&bytes), "{bytes} bytes in 8 seconds");
 }
 
-/// What changes much is told at once, in a block or at few of its lumels. What changes little is told
-/// with the next keyframe, and within ten seconds where no other light changes.
-#[test]
-fn little_changes_wait() {
-    let mut light = lightmap(64, 1, 0);
-    let mut encoder = encoder(&light, LumelCoding::H264(qp(12)));
-    let mut decoder = decoder(&light, Coding::H264, 0);
-    let mut seen = |light: &Lightmap, u: u64| {
-        let mut seen = None;
-        for frame in encode(&mut encoder, light, u) {
-            seen = Some((frame.new_group, decoder.decode(&frame.bytes).expect("light").irradiance));
-        }
-        seen
-    };
-    let (_, first) = seen(&light, 0).expect("a keyframe");
-    // Two lumels by a tenth, one by three octaves.
-    light.irradiance[5] *= 1.1;
-    light.irradiance[70] *= 0.9;
-    assert!(seen(&light, 1).is_none());
-    light.irradiance[40] *= 8.0;
-    let (is_keyframe, second) = seen(&light, 2).expect("a picture");
-    assert!(!is_keyframe && second[40].y > 4.0 * first[40].y);
-    assert_eq!(second[5], first[5], "another block");
-    let is_other = |u: &u64| seen(&light, *u).is_some_and(|(_, shown)| shown != second);
-    let others: Vec<u64> = (3..400).filter(is_other).collect();
-    assert_eq!(others.first(), Some(&252));
-}
-
 #[test]
 fn changing_light_has_a_keyframe_every_two_seconds() {
     let light = lightmap(64, 1, 0);
@@ -179,7 +151,7 @@ fn groups_begin_where_they_must() {
         frames.first().map(|frame| frame.new_group)
     };
     assert_eq!(begins(&light, 0, true), Some(true));
-    light.irradiance[..16].iter_mut().for_each(|value| *value *= 1.5);
+    light.irradiance[7] *= 1.1;
     assert_eq!(begins(&light, 1, true), Some(false));
     light.irradiance.iter_mut().for_each(|value| *value *= 30.0);
     assert_eq!(begins(&light, 2, true), Some(true));

@@ -4,7 +4,7 @@ use lumencast_light::{Lightmap, Told};
 use lumencast_video::{H264Encoder, PictureEncoder, Qp, VideoError};
 
 use super::mapping::{CodeTable, Mapping};
-use super::planes::{Followed, Packing, Planes, Take};
+use super::planes::{Packing, Planes};
 use super::slope_codes::{self, as_light};
 use super::tiles::Tile;
 use super::video_frame::VideoHead;
@@ -16,8 +16,6 @@ const GROUP_PICTURES: u32 = 50;
 const GROUP_SECONDS: f64 = 2.0;
 /// A group has so many frames at most, those without a picture among them.
 const GROUP_FRAMES: u32 = 250;
-/// Where light changes little, a picture goes out every so many updates.
-const LITTLE_UPDATES: u64 = 250;
 /// Where nothing changes, a frame without a picture goes out every so many updates: it tells that the
 /// light is still that of now.
 const IDLE_UPDATES: u64 = 25;
@@ -38,8 +36,6 @@ pub(crate) struct PageEncoder {
 #[derive(Clone, Copy, Debug)]
 struct Group {
     newest: u64,
-    /// The update of its last picture.
-    pictured: u64,
     /// Scene time of its first picture.
     began: f64,
     pictures: u32,
@@ -61,8 +57,7 @@ impl PageEncoder {
         self.group = None;
     }
 
-    /// The frame of an update; none where nothing is to be told. Blocks that change little wait for a
-    /// keyframe, whose bits they do not add to, or for a while.
+    /// The frame of an update; none where nothing is to be told.
     pub(crate) fn encode(
         &mut self,
         lightmap: &Lightmap,
@@ -86,42 +81,28 @@ impl PageEncoder {
         let kept = self.table.take().filter(|(known, _)| *known == mapping);
         let (_, table) =
             self.table.insert(kept.unwrap_or_else(|| (mapping, CodeTable::new(mapping))));
-        let take = if group.is_none() { Take::Anew } else { Take::Much };
-        let Followed { changed, waits } = self.planes.follow(page, table, take);
-        let has_waited = |group: Group| info.update - group.pictured >= LITTLE_UPDATES;
-        let draws = changed || (waits && group.is_some_and(has_waited));
+        let changed = self.planes.follow(page, table, group.is_none());
         let group = group.filter(|group| {
             let is_long = group.pictures >= GROUP_PICTURES
                 || !(0.0..GROUP_SECONDS).contains(&(info.time - group.began));
-            !(draws && is_long) && group.frames < GROUP_FRAMES
+            !(changed && is_long) && group.frames < GROUP_FRAMES
         });
-        if let Some(group) = group.filter(|_| !draws)
+        if let Some(group) = group.filter(|_| !changed)
             && info.update - group.newest < IDLE_UPDATES
         {
             return Ok(None);
         }
-        let draws = draws || group.is_none();
-        if waits && draws && (group.is_none() || !changed) {
-            self.planes.follow(page, table, Take::All);
-        }
         let base = group.map(|group| group.newest);
         let mut bytes = Vec::with_capacity(64);
         VideoHead { info, base, mapping }.write(&mut bytes);
-        if draws {
+        if changed || group.is_none() {
             bytes.extend(self.picture(group.is_none())?);
         }
-        let before = group.unwrap_or(Group {
-            newest: 0,
-            pictured: 0,
-            began: info.time,
-            pictures: 0,
-            frames: 0,
-        });
+        let before = group.unwrap_or(Group { newest: 0, began: info.time, pictures: 0, frames: 0 });
         self.group = Some(Group {
             newest: info.update,
-            pictured: if draws { info.update } else { before.pictured },
             began: before.began,
-            pictures: before.pictures + u32::from(draws),
+            pictures: before.pictures + u32::from(changed),
             frames: before.frames + 1,
         });
         let (region, new_group) = (self.tile.id, group.is_none());

@@ -22,9 +22,6 @@ const BLOCK: u32 = 16;
 /// A code stays as it was while the light is no farther from it than so much, in 1/256. Light that
 /// hardly changes costs no bits, and its noise is not seen.
 const DEAD_ZONE: i32 = 192;
-/// A block changes much where the squares of its codes' changes sum up to this: half a code at every
-/// lumel, or eight codes at one.
-const MUCH: i32 = 64;
 
 /// A page as codes, which change where its light does.
 #[derive(Clone, Debug)]
@@ -33,34 +30,6 @@ pub(crate) struct Planes {
     page_size: usize,
     /// Rows and columns beyond the page repeat its last.
     picture: Picture,
-}
-
-/// Which codes follow their light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Take {
-    /// All, as near as can be.
-    Anew,
-    /// All from which light is farther than the dead zone.
-    All,
-    /// Those of them that lie in blocks which change much.
-    Much,
-}
-
-/// What became of codes that were to follow their light.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Followed {
-    /// Some have changed.
-    pub(crate) changed: bool,
-    /// Some would have changed, but that their block changes little.
-    pub(crate) waits: bool,
-}
-
-/// Codes of a block that are to change: their places in a plane, and what they become.
-#[derive(Default)]
-struct Changes {
-    luma: Vec<(usize, u8)>,
-    chroma: [Vec<(usize, u8)>; 2],
-    squares: i32,
 }
 
 impl Packing {
@@ -86,95 +55,51 @@ impl Planes {
         &self.picture
     }
 
-    /// Follows a page's light, row after row.
-    pub(crate) fn follow(&mut self, page: &[Vec3], table: &CodeTable, take: Take) -> Followed {
-        let side = self.picture.width;
-        let block = BLOCK as usize;
-        let mut followed = Followed::default();
-        let mut changes = Changes::default();
-        for y in (0..side as usize).step_by(block) {
-            for x in (0..side as usize).step_by(block) {
-                self.compare((x, y), page, table, take, &mut changes);
-                let is_taken = take != Take::Much || changes.squares >= MUCH;
-                let is_any = changes.squares > 0;
-                followed.changed |= is_any && is_taken;
-                followed.waits |= is_any && !is_taken;
-                changes.drain(is_taken.then_some(&mut self.picture));
-            }
-        }
-        followed
-    }
-
-    /// Finds the codes of a block that are to change.
-    fn compare(
-        &self,
-        (left, top): (usize, usize),
-        page: &[Vec3],
-        table: &CodeTable,
-        take: Take,
-        changes: &mut Changes,
-    ) {
-        let dead_zone = if take == Take::Anew { 0 } else { DEAD_ZONE };
-        let (width, last) = (self.picture.width as usize, self.page_size - 1);
-        let codes =
-            |x: usize, y: usize| ycocg(page[y.min(last) * self.page_size + x.min(last)], table);
-        let mut squares = 0;
-        let mut compare = |plane: &[u8], changed: &mut Vec<(usize, u8)>, at: usize, code: i32| {
-            let before = i32::from(plane[at]);
-            let nearest = ((code + 128) >> 8).clamp(0, 255);
-            if (code - 256 * before).abs() > dead_zone && nearest != before {
-                squares += (nearest - before).pow(2);
-                changed.push((at, nearest as u8));
+    /// Follows a page's light, row after row; whether any code has changed. `anew` takes each code as
+    /// near as can be.
+    pub(crate) fn follow(&mut self, page: &[Vec3], table: &CodeTable, anew: bool) -> bool {
+        let dead_zone = if anew { 0 } else { DEAD_ZONE };
+        let (page_size, width) = (self.page_size, self.picture.width as usize);
+        let last = page_size - 1;
+        let mut changed = false;
+        let mut settle = |place: &mut u8, code: i32| {
+            if (code - 256 * i32::from(*place)).abs() > dead_zone {
+                let nearest = ((code + 128) >> 8).clamp(0, 255) as u8;
+                changed |= *place != nearest;
+                *place = nearest;
             }
         };
-        let Picture { luma, chroma, .. } = &self.picture;
-        let [xs, ys] = [left..left + BLOCK as usize, top..top + BLOCK as usize];
+        let codes = |x: usize, y: usize| ycocg(page[y.min(last) * page_size + x.min(last)], table);
         match self.packing {
             Packing::Subsampled => {
-                for y in ys.step_by(2) {
-                    for x in xs.clone().step_by(2) {
+                let [co, cg] = &mut self.picture.chroma;
+                for y in (0..self.picture.height as usize).step_by(2) {
+                    for x in (0..width).step_by(2) {
                         let quad = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
                         let quad = quad.map(|(x, y)| (y * width + x, codes(x, y)));
-                        for (at, [code, ..]) in quad {
-                            compare(luma, &mut changes.luma, at, code);
+                        for (at, [luma, ..]) in quad {
+                            settle(&mut self.picture.luma[at], luma);
                         }
                         let mean =
                             |k: usize| quad.iter().map(|(_, code)| code[k]).sum::<i32>() >> 2;
                         let at = y / 2 * (width / 2) + x / 2;
-                        for (k, plane) in chroma.iter().enumerate() {
-                            compare(plane, &mut changes.chroma[k], at, mean(1 + k));
-                        }
+                        settle(&mut co[at], mean(1));
+                        settle(&mut cg[at], mean(2));
                     }
                 }
             }
             Packing::Stacked => {
                 let plane = width * width;
-                for y in ys {
-                    for x in xs.clone() {
+                for y in 0..width {
+                    for x in 0..width {
                         for (k, code) in codes(x, y).into_iter().enumerate() {
-                            compare(luma, &mut changes.luma, k * plane + y * width + x, code);
+                            settle(&mut self.picture.luma[k * plane + y * width + x], code);
                         }
                     }
                 }
             }
         }
-        changes.squares = squares;
-    }
-}
-
-impl Changes {
-    /// Makes the changes in a picture, if there is one, and forgets them.
-    fn drain(&mut self, picture: Option<&mut Picture>) {
-        if let Some(Picture { luma, chroma, .. }) = picture {
-            let [co, cg] = chroma;
-            let planes = [(luma, &self.luma), (co, &self.chroma[0]), (cg, &self.chroma[1])];
-            for (plane, changes) in planes {
-                changes.iter().for_each(|(at, code)| plane[*at] = *code);
-            }
-        }
-        self.luma.clear();
-        self.chroma.iter_mut().for_each(Vec::clear);
-        self.squares = 0;
+        changed
     }
 }
 
