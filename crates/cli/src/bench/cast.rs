@@ -44,20 +44,15 @@ impl Cast {
         self.start.elapsed().as_secs_f64()
     }
 
-    /// One tick at `scene_now`, and the rest of its period.
-    pub(super) fn step(
-        &mut self,
-        scene_now: f64,
-        mail: Mail,
-        outlet: &mut dyn Outlet,
-        mut seen: impl FnMut(&Light, f64),
-    ) -> Report {
+    /// One tick at `scene_now`.
+    pub(super) fn step(&mut self, scene_now: f64, mail: Mail, outlet: &mut dyn Outlet) -> Report {
         self.beat.start(self.now());
-        let report = self.tick.step_within(scene_now, mail, outlet, PATIENCE);
-        let now = self.now();
-        seen(self.tick.light(), now);
-        std::thread::sleep(Duration::from_secs_f64(self.beat.wait(now)));
-        report
+        self.tick.step_within(scene_now, mail, outlet, PATIENCE)
+    }
+
+    /// Waits until the next tick is due.
+    pub(super) fn rest(&self) {
+        std::thread::sleep(Duration::from_secs_f64(self.beat.wait(self.now())));
     }
 
     /// So many seconds of a scene whose time stands still, which begin with edits. `seen` is given the
@@ -76,16 +71,10 @@ impl Cast {
             mail.edits.push(Received { client, seq: self.seq, edit, temporary: false });
         }
         while self.now() - began <= seconds {
-            let mut all = Nobody { watches: true };
-            self.step(0.0, std::mem::take(&mut mail), &mut all, |light, now| {
-                seen(light, now - began);
-            });
+            self.step(0.0, std::mem::take(&mut mail), &mut Nobody { watches: true });
+            seen(self.tick.light(), self.now() - began);
+            self.rest();
         }
-    }
-
-    /// The light as it was last published.
-    pub(super) fn light(&self) -> &Light {
-        self.tick.light()
     }
 }
 

@@ -68,11 +68,14 @@ impl BenchTick {
                 first_half.get_or_insert(sent.lumels);
             }
             let mail = Mail::default();
-            reports.push(match self.live {
-                true => cast.step(now, mail, &mut sent, |_, _| ()),
-                false => cast.tick.step(now, mail, &mut sent),
-            });
-            now = if self.live { cast.now() } else { reports.len() as f64 * period };
+            if self.live {
+                reports.push(cast.step(now, mail, &mut sent));
+                cast.rest();
+                now = cast.now();
+            } else {
+                reports.push(cast.tick.step(now, mail, &mut sent));
+                now = reports.len() as f64 * period;
+            }
             bar.set_position((now / period) as u64);
         }
         bar.finish_and_clear();

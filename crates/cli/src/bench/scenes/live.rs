@@ -70,7 +70,7 @@ impl Live<'_> {
         };
         let mut part = |edits: &[Edit]| {
             cast.go_on(edits, seconds, |_, _| {});
-            let fields: Vec<Field> = cast.light().fields().to_vec();
+            let fields: Vec<Field> = cast.tick.light().fields().to_vec();
             draw_light(renderer, fields, subject.view, settings)
         };
         add("as served, converged".to_owned(), &still, judge)?;
