@@ -537,7 +537,9 @@ describe('a page without a server', () => {
       // Neither figures that nobody knows nor what only a server can do.
       await page.waitForTimeout(300);
       await draw(page);
-      expect(await page.innerText('.stats')).toMatch(/^pages\s+1 × \d+²\s+lit\s+\d+\s+upkeep\s+[\d.]+ ms\s+frames\s+\d+ fps$/);
+      expect(await page.innerText('.stats')).toMatch(
+        /^pages\s+1 × \d+²\s+lit\s+\d+\s+upkeep\s+[\d.]+ ms\s+frames\s+\d+ fps$/,
+      );
       expect(await page.isVisible('[title^="Take the flashlight"]')).toBe(false);
       const [direct, both] = await looks(page, ['direct', 'both']);
       expect(brightness(both)).toBeGreaterThan(1.1 * brightness(direct));
