@@ -35,8 +35,8 @@ pub struct Job {
     /// Asks for [`crate::SumsAt::surfaces`].
     pub surfaces: bool,
     /// Rotates the lattice of directions and seeds the sampler; each tick takes another seed.
-    /// Results depend on it and on the receivers' indices. They do not depend on which other
-    /// receivers a job has, nor on the number of threads.
+    /// Results depend on it and on the receivers' indices, but where a budget has a seed of its
+    /// own. They do not depend on which other receivers a job has, nor on the number of threads.
     pub seed: u64,
 }
 
@@ -45,7 +45,7 @@ impl Job {
     /// [`Job::with_budgets`].
     pub fn new(scene: Arc<Snapshot>, receivers: impl Into<Arc<[Receiver]>>, samples: u32) -> Self {
         let receivers = receivers.into();
-        let budget = |receiver| Budget { receiver, samples };
+        let budget = |receiver| Budget { receiver, samples, seed: None };
         let budgets = (0..receivers.len() as u32).map(budget).collect();
         Self::with_budgets(scene, receivers, budgets)
     }
@@ -84,6 +84,9 @@ pub struct Budget {
     pub receiver: u32,
     /// Number of directions to sample; with 0 the sums are empty.
     pub samples: u32,
+    /// A seed of its own in place of the job's. With it, a receiver draws the same samples in all jobs
+    /// and at all indices: what it finds differs by what has changed in the scene alone.
+    pub seed: Option<u64>,
 }
 
 /// A place that light arrives at.

@@ -58,8 +58,10 @@ fn neighbours_change_nothing() {
     };
     let counts = [1, 5, 0, 63, 1, 64, 2, 130, 0, 7, 1, 1, 300, 3];
     let receivers: Arc<[Receiver]> = (0..counts.len() as u8).map(receiver).collect();
-    let budgets: Vec<Budget> =
-        (0..).zip(counts).map(|(receiver, samples)| Budget { receiver, samples }).collect();
+    let budgets: Vec<Budget> = (0..)
+        .zip(counts)
+        .map(|(receiver, samples)| Budget { receiver, samples, seed: None })
+        .collect();
     let job = |budgets: &[Budget]| {
         let job = Job::with_budgets(scene.clone(), receivers.clone(), budgets.to_vec());
         Job { surfaces: true, ..job }

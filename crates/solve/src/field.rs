@@ -13,8 +13,8 @@ use crate::volume::VolumeSolver;
 /// A field, by its kind.
 #[derive(Clone)]
 pub(crate) enum FieldSolver {
-    Volume(VolumeSolver),
-    Lightmap(LightmapSolver),
+    Volume(Box<VolumeSolver>),
+    Lightmap(Box<LightmapSolver>),
 }
 
 impl FieldSolver {

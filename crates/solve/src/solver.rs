@@ -65,7 +65,11 @@ impl Solver {
             let is_same = |field: &FieldSolver| field.as_volume().is_some_and(|v| v.spec() == spec);
             let same = before.iter().position(is_same).map(|at| before.remove(at));
             let field = same.unwrap_or_else(|| {
-                FieldSolver::Volume(VolumeSolver::new(self.next_id(), spec, &self.options))
+                FieldSolver::Volume(Box::new(VolumeSolver::new(
+                    self.next_id(),
+                    spec,
+                    &self.options,
+                )))
             });
             self.fields.push(field);
         }
@@ -83,7 +87,7 @@ impl Solver {
             let GatherOptions { blend, directional, .. } = self.options;
             let lightmap = LightmapSolver::new(self.next_id(), scene, laid_out, blend)
                 .with_slopes(directional);
-            self.fields.push(FieldSolver::Lightmap(lightmap));
+            self.fields.push(FieldSolver::Lightmap(Box::new(lightmap)));
         }
         self.list_light();
     }

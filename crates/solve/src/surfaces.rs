@@ -107,7 +107,7 @@ impl Surfaces {
         (turn..around.points().len())
             .step_by(turns as usize)
             .filter(|point| around.counts(*point))
-            .map(move |point| Budget { receiver: point as u32, samples: each })
+            .map(move |point| Budget { receiver: point as u32, samples: each, seed: None })
     }
 
     /// The scene was edited: light may be another from now on.

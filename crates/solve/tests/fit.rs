@@ -40,7 +40,8 @@ fn look(scene: &Arc<Snapshot>, grid: Grid, bounces: u32) -> (ProbeVolume, Surrou
 fn known(scene: &Arc<Snapshot>, around: &Surroundings, bounces: u32) -> Vec<Option<Vec3>> {
     let receivers: Vec<Receiver> = around.receivers().collect();
     let counting = (0..receivers.len() as u32).filter(|point| around.counts(*point as usize));
-    let budgets: Vec<Budget> = counting.map(|receiver| Budget { receiver, samples: 256 }).collect();
+    let budgets: Vec<Budget> =
+        counting.map(|receiver| Budget { receiver, samples: 256, seed: None }).collect();
     let job = Job::with_budgets(scene.clone(), receivers, budgets.clone());
     let lit = gather(Job { bounces, ..job });
     let mut known = vec![None; around.points().len()];

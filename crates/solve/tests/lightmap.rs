@@ -159,7 +159,7 @@ fn a_glance_at_all_pages_lights_them() {
     solver.expect_change();
     assert!(worst(&lightmap, &scene, 3.0) > 0.5, "nothing has been gathered");
     gather(&mut solver, &mut lightmap, &scene, 2 * lumels);
-    assert!(worst(&lightmap, &scene, 3.0) < 0.05, "{}", worst(&lightmap, &scene, 3.0));
+    assert!(worst(&lightmap, &scene, 3.0) < 0.08, "{}", worst(&lightmap, &scene, 3.0));
 }
 
 /// Under an even sky: a plate that stands free has lumels on both sides and is as bright as the sky; a

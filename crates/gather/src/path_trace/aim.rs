@@ -60,9 +60,11 @@ impl Aim {
     /// Surfaces are known to some ulps of their largest coordinate, receivers to an ulp of their
     /// world position.
     pub(super) fn new(job: &Job, budget: Budget, world: &World) -> Self {
-        let Budget { receiver, samples } = budget;
-        let (seed, extent, origin) = (job.seed, world.extent(), world.origin());
-        let place = match job.receivers[receiver as usize] {
+        let Budget { receiver, samples, seed } = budget;
+        let (extent, origin) = (world.extent(), world.origin());
+        let asked = job.receivers[receiver as usize];
+        let (seed, receiver) = seed.map_or((job.seed, receiver), |own| (own, 0));
+        let place = match asked {
             Receiver::Probe { position } => {
                 let (position, turn) = (position - origin, lattice::turn(seed, receiver));
                 Prepared::Probe { order: job.order, position, turn }

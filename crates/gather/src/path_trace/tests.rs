@@ -272,7 +272,7 @@ fn shading_normals_make_no_light() {
 fn job(scene: &Arc<Snapshot>, seed: u64) -> Job {
     let probe = |k: u8| Receiver::probe(Vec3::new(0.1 * f32::from(k), 0.5, 0.0));
     let receivers: Vec<_> = (0..9).map(probe).collect();
-    let budget = |receiver| Budget { receiver, samples: 1 + 40 * receiver };
+    let budget = |receiver| Budget { receiver, samples: 1 + 40 * receiver, seed: None };
     let job = Job::with_budgets(scene.clone(), receivers, (0..9).map(budget).collect());
     Job { order: Order::L3, bounces: 2, seed, ..job }
 }
@@ -414,12 +414,32 @@ fn a_subset_draws_the_samples_of_the_whole() {
     assert_ne!(gather(vec![other]).at(0), found.at(1), "another place");
 }
 
+/// A budget with a seed of its own draws the same samples in every job, at every index.
+#[test]
+fn seeds_of_budgets_outlast_jobs() {
+    let scene = lit_room();
+    let place = Receiver::probe(Vec3::new(0.3, 0.5, 0.0));
+    let gather = |receivers: Vec<Receiver>, own: Option<u64>, seed: u64| {
+        let last = receivers.len() as u32 - 1;
+        let budgets = vec![Budget { receiver: last, samples: 100, seed: own }];
+        let job = Job { seed, ..Job::with_budgets(scene.clone(), receivers, budgets) };
+        let mut tracer = tracer(2);
+        let ticket = tracer.submit(job);
+        tracer.wait(ticket).unwrap().sums
+    };
+    let elsewhere = Receiver::probe(Vec3::ZERO);
+    let found = gather(vec![place], Some(3), 1);
+    assert_eq!(found, gather(vec![elsewhere, place], Some(3), 2));
+    assert_ne!(found, gather(vec![place], Some(4), 1), "another seed");
+    assert_ne!(found, gather(vec![place], None, 1), "the job's");
+}
+
 #[test]
 fn jobs_run_beside_each_other_and_can_be_given_up() {
     let scene = lit_room();
     let mut tracer = tracer(2);
     let mut huge = job(&scene, 1);
-    huge.budgets = vec![Budget { receiver: 0, samples: 20_000_000 }];
+    huge.budgets = vec![Budget { receiver: 0, samples: 20_000_000, seed: None }];
     let endless = tracer.submit(huge.clone());
     let queued = tracer.submit(job(&scene, 2));
     let wanted = tracer.submit(job(&scene, 3));

@@ -1,15 +1,19 @@
 //! Which lumels are gathered at next, where light is live.
 //!
 //! Lumels lie in *cells* of 16 × 16 of a page, and cells in *blocks*, which are solved together. A
-//! *glance* gathers at about every sixteenth lumel of a cell. Whenever the scene is another one, all
-//! cells get a glance first: a coarse picture of every page. Then blocks take turns, all lumels of each,
-//! so that little has to be solved anew. Blocks whose light has changed come first; noisy ones come more
-//! often (stride scheduling, Waldspurger and Weihl 1995).
+//! *glance* takes the same samples of about every sixteenth lumel of a cell each time, to tell what has
+//! changed there ([`super::change`]). First of all, and whenever the scene was edited, all cells get a
+//! glance: a coarse picture of every page. While the scene is another one with every job, cells whose
+//! light changes get one with every job, and others get one now and then. The other samples are taken by
+//! blocks in turn, all lumels of each, so that little has to be solved anew. Blocks whose light has changed
+//! come first; noisy ones come more often (stride scheduling, Waldspurger and Weihl 1995). A block's first
+//! turns take one of about four lumels: the filter makes more of these than of as many samples at all.
 
-use std::collections::{BTreeSet, HashSet, VecDeque};
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 use std::ops::Range;
 
-use glam::{UVec2, Vec3};
+use glam::{IVec2, UVec2, Vec3};
 use lumencast_gather::Budget;
 
 use super::places::LumelPlace;
@@ -22,26 +26,32 @@ const CELLS: u32 = 4;
 pub(crate) const BLOCK: u32 = CELL * CELLS;
 /// Lumels a side of a square of which a glance takes one, of each surface and direction.
 const GLANCE: u32 = 4;
+/// The same in the first turns of a block, and how many turns these are.
+const FIRST: u32 = 2;
+const FIRST_TURNS: u8 = 2;
 /// Samples of a lumel in a glance, and in a turn.
 const GLANCE_SAMPLES: u32 = 16;
 const TURN_SAMPLES: u32 = 8;
 /// The same in a turn that was hurried.
 const HURRIED_SAMPLES: u32 = 32;
-/// Updates of a cell for which a change is expected.
-const EXPECTING: u8 = 3;
+/// So many samples are taken in turns for each one of glances where light is changing, and where it was
+/// not.
+const CHANGES: u64 = 3;
+const CALM: u64 = 8;
+/// So many glances at a cell and at those about it are to find no change.
+const CHANGING: u8 = 4;
 /// Share of turns that all blocks have alike, however noisy they are.
 const EVEN: f32 = 0.5;
 
 /// A square of lumels that are gathered at together.
 #[derive(Clone, Debug, PartialEq)]
 struct Cell {
-    /// Its lumels' receivers. The first ones are those of a glance.
+    /// Its lumels' receivers. The first ones are those of a glance, and those of the block's first turns.
     receivers: Range<u32>,
     glance: u32,
+    first_turns: u32,
     /// The version of the scene at which it had its last glance.
     seen: Option<u64>,
-    /// For so many updates its light may be another, since the scene was edited.
-    expecting: u8,
 }
 
 /// The turns of a block.
@@ -52,6 +62,8 @@ struct Turns {
     due: f64,
     /// The number of its last turn.
     last: u64,
+    /// How many turns it has had.
+    count: u8,
     /// How noisy a sample is there: the standard deviation of its luminance, by the square root of that.
     noise: f32,
 }
@@ -95,16 +107,24 @@ impl Block {
 pub(crate) struct Cells {
     /// Block by block.
     cells: Vec<Cell>,
+    /// Cells whose light is changing, for so many more glances that find no change.
+    changing: BTreeMap<usize, u8>,
+    /// Where the next glance at any cell, and at one that is changing, is looked for from.
     next_glance: usize,
+    next_changing: usize,
     blocks: Vec<Turns>,
     /// Cells that have not been gathered at in the turn that is under way.
     turn: Range<usize>,
+    is_one_of_first: bool,
     /// Number of turns until now.
     turns: u64,
     /// Cells whose turn comes before all others.
     hurried: VecDeque<usize>,
     /// Glances that come before all turns.
     first: usize,
+    /// Where cells lie: their page, column and row.
+    places: Vec<(u32, IVec2)>,
+    cell_at: HashMap<(u32, IVec2), usize>,
 }
 
 impl Cells {
@@ -124,29 +144,26 @@ impl Cells {
         for block in places.chunk_by_mut(|a, b| key(a).0 == key(b).0) {
             let start = cells.len();
             for cell in block.chunk_by_mut(|a, b| key(a) == key(b)) {
-                let glance = glanced(cell, page_size);
+                let [glance, first_turns] = sorted(cell, page_size);
                 let receivers = first..first + cell.len() as u32;
                 first = receivers.end;
-                cells.push(Cell { receivers, glance, seen: None, expecting: 0 });
+                cells.push(Cell { receivers, glance, first_turns, seen: None });
             }
             blocks.push(Turns { cells: start..cells.len(), ..Turns::default() });
         }
-        Self { first: cells.len(), cells, blocks, ..Self::default() }
+        let place = |cell: &Cell| {
+            let (page, at) = on_page(places[cell.receivers.start as usize].lumel, page_size);
+            (page, (at / CELL).as_ivec2())
+        };
+        let places: Vec<(u32, IVec2)> = cells.iter().map(place).collect();
+        let cell_at = places.iter().copied().zip(0..).collect();
+        Self { first: cells.len(), cells, blocks, places, cell_at, ..Self::default() }
     }
 
     /// Light may be another: all cells get a glance before any has its turn. Those that wait for
     /// one already are not put off.
     pub(crate) fn expect_change(&mut self) {
         self.first = self.cells.len();
-        self.cells.iter_mut().for_each(|cell| cell.expecting = EXPECTING);
-    }
-
-    /// Counts an update of a cell; whether its light may be another since the scene was edited.
-    pub(crate) fn count_update(&mut self, cell: usize) -> bool {
-        let expecting = &mut self.cells[cell].expecting;
-        let is_expected = *expecting > 0;
-        *expecting = expecting.saturating_sub(1);
-        is_expected
     }
 
     /// Lets the block of a cell, whose light is another now, have its turn before those where nothing
@@ -174,8 +191,8 @@ impl Cells {
         self.receivers_of(start).start..self.receivers_of(end - 1).end
     }
 
-    /// The next cell in turn.
-    fn next_turn(&mut self) -> Option<usize> {
+    /// The receivers of the next cell in turn.
+    fn next_turn(&mut self) -> Option<Range<u32>> {
         if self.turn.is_empty() {
             let all: f32 = self.blocks.iter().map(|block| block.noise).sum();
             let mean = all / self.blocks.len() as f32;
@@ -184,12 +201,16 @@ impl Cells {
                 .iter_mut()
                 .min_by(|a, b| a.due.total_cmp(&b.due).then_with(|| a.last.cmp(&b.last)))?;
             self.turns += 1;
+            self.is_one_of_first = next.count < FIRST_TURNS;
+            next.count = next.count.saturating_add(1);
             self.turn = next.cells.clone();
             next.last = self.turns;
             let share = if mean > 0.0 { next.noise / mean } else { 1.0 };
             next.due += 1.0 / f64::from(EVEN + (1.0 - EVEN) * share);
         }
-        self.turn.next()
+        let Cell { receivers, first_turns, .. } = &self.cells[self.turn.next()?];
+        let end = if self.is_one_of_first { receivers.start + first_turns } else { receivers.end };
+        Some(receivers.start..end)
     }
 
     /// Lets the cells of these receivers have their turn next.
@@ -198,42 +219,51 @@ impl Cells {
         self.hurried.extend(cells);
     }
 
-    /// What to gather next, about so many samples in all.
-    pub(crate) fn budgets(&mut self, samples: u64, version: u64) -> Vec<Budget> {
+    /// Counts a glance at a cell; whether light has changed there. What changes it goes on to the cells
+    /// about it.
+    pub(crate) fn count_glance(&mut self, cell: usize, has_changed: bool) {
+        if has_changed {
+            let about: Vec<usize> = self.about(cell).collect();
+            self.changing.extend(about.into_iter().map(|cell| (cell, CHANGING)));
+        } else if let Entry::Occupied(mut glances) = self.changing.entry(cell) {
+            *glances.get_mut() -= 1;
+            if *glances.get() == 0 {
+                glances.remove();
+            }
+        }
+    }
+
+    /// What to gather next, about so many samples in all. `lumels` are those of receivers: what a glance
+    /// takes depends on them alone.
+    pub(crate) fn budgets(&mut self, samples: u64, version: u64, lumels: &[u32]) -> Vec<Budget> {
         let mut budgets = Vec::new();
-        let (mut glances, mut turns) = (0, 0);
+        let (mut glances, mut calm, mut turns) = (0, 0, 0);
         while turns < samples
             && let Some(cell) = self.hurried.pop_front()
         {
-            let each = HURRIED_SAMPLES;
             let receivers = self.cells[cell].receivers.clone();
-            turns += receivers.len() as u64 * u64::from(each);
-            budgets.extend(receivers.map(|receiver| Budget { receiver, samples: each }));
+            turns += taken(&mut budgets, receivers, HURRIED_SAMPLES, |_| None);
         }
-        while glances + turns < samples && !self.cells.is_empty() {
-            let is_first = self.first > 0;
-            self.first = self.first.saturating_sub(1);
-            let glance =
-                (is_first || glances <= turns).then(|| self.next_glance(version)).flatten();
-            let (cell, count, each) = match glance {
-                Some(cell) => (cell, self.cells[cell].glance, GLANCE_SAMPLES),
-                None if is_first => {
-                    self.first = 0;
-                    continue;
+        let same = |receiver: u32| Some(u64::from(lumels[receiver as usize]));
+        while glances + calm + turns < samples && !self.cells.is_empty() {
+            if self.first > 0 {
+                self.first -= 1;
+                match self.next_glance(version) {
+                    Some(cell) => {
+                        glances += taken(&mut budgets, self.glanced(cell), GLANCE_SAMPLES, same)
+                    }
+                    None => self.first = 0,
                 }
-                None => {
-                    let Some(cell) = self.next_turn() else { break };
-                    (cell, self.cells[cell].receivers.len() as u32, TURN_SAMPLES)
-                }
-            };
-            let Range { start, .. } = self.cells[cell].receivers;
-            let receivers = start..start + count;
-            budgets.extend(receivers.map(|receiver| Budget { receiver, samples: each }));
-            let spent = u64::from(count * each);
-            if glance.is_some() {
-                glances += spent
-            } else {
-                turns += spent
+            } else if CHANGES * glances <= turns
+                && let Some(cell) = self.next_changing(version)
+            {
+                glances += taken(&mut budgets, self.glanced(cell), GLANCE_SAMPLES, same);
+            } else if CALM * calm <= turns
+                && let Some(cell) = self.next_glance(version)
+            {
+                calm += taken(&mut budgets, self.glanced(cell), GLANCE_SAMPLES, same);
+            } else if let Some(receivers) = self.next_turn() {
+                turns += taken(&mut budgets, receivers, TURN_SAMPLES, |_| None);
             }
             // However many samples there are, a job asks for no more than all lumels.
             if budgets.len() >= self.receivers() {
@@ -254,6 +284,30 @@ impl Cells {
         Some(cell)
     }
 
+    /// The same among those whose light is changing.
+    fn next_changing(&mut self, version: u64) -> Option<usize> {
+        let after = self.changing.range(self.next_changing..);
+        let all = after.chain(self.changing.range(..self.next_changing));
+        let is_due = |cell: &usize| self.cells[*cell].seen != Some(version);
+        let cell = all.map(|(cell, _)| *cell).find(is_due)?;
+        self.cells[cell].seen = Some(version);
+        self.next_changing = cell + 1;
+        Some(cell)
+    }
+
+    /// The receivers of a cell that a glance takes.
+    fn glanced(&self, cell: usize) -> Range<u32> {
+        let Cell { receivers, glance, .. } = &self.cells[cell];
+        receivers.start..receivers.start + glance
+    }
+
+    /// The cells about a cell on its page, and itself.
+    pub(crate) fn about(&self, cell: usize) -> impl Iterator<Item = usize> + '_ {
+        let (page, at) = self.places[cell];
+        let about = (0..9).map(move |k| (page, at + IVec2::new(k % 3 - 1, k / 3 - 1)));
+        about.filter_map(|place| self.cell_at.get(&place).copied())
+    }
+
     /// The cell of a receiver.
     pub(crate) fn cell_of(&self, receiver: u32) -> usize {
         self.cells.partition_point(|cell| cell.receivers.end <= receiver)
@@ -265,33 +319,62 @@ impl Cells {
         start as usize..end as usize
     }
 
+    /// The receivers of a cell that a glance takes.
+    pub(crate) fn glanced_of(&self, cell: usize) -> Range<usize> {
+        let Range { start, end } = self.glanced(cell);
+        start as usize..end as usize
+    }
+
     fn receivers(&self) -> usize {
         self.cells.last().map_or(0, |cell| cell.receivers.end as usize)
     }
 }
 
+/// Adds receivers of so many samples each to what is gathered, and counts the samples.
+fn taken(
+    budgets: &mut Vec<Budget>,
+    receivers: Range<u32>,
+    samples: u32,
+    seed: impl Fn(u32) -> Option<u64>,
+) -> u64 {
+    let count = u64::from(receivers.end - receivers.start);
+    budgets.extend(receivers.map(|receiver| Budget { receiver, samples, seed: seed(receiver) }));
+    count * u64::from(samples)
+}
+
 /// The page of a lumel, and its place there.
-fn on_page(lumel: u32, page_size: u32) -> (u32, UVec2) {
+pub(crate) fn on_page(lumel: u32, page_size: u32) -> (u32, UVec2) {
     let (page, at) = (lumel / (page_size * page_size), lumel % (page_size * page_size));
     (page, UVec2::new(at % page_size, at / page_size))
 }
 
-/// Puts those lumels of a cell first that a glance takes, and counts them: of each square one of every
-/// main direction of surfaces, so that thin charts are not passed over.
-fn glanced(cell: &mut [LumelPlace], page_size: u32) -> u32 {
-    let mut taken = HashSet::new();
-    let is_glanced: Vec<bool> = cell
-        .iter()
-        .map(|place| {
-            let (_, at) = on_page(place.lumel, page_size);
-            taken.insert((at / GLANCE, main_direction(place.normal)))
-        })
-        .collect();
+/// Puts those lumels of a cell first that a glance takes, then those of a block's first turns, and counts
+/// both.
+fn sorted(cell: &mut [LumelPlace], page_size: u32) -> [u32; 2] {
+    let [glance, first] = [GLANCE, FIRST].map(|side| spread_over(cell, side, page_size));
+    let rank = |k: &usize| match (glance[*k], first[*k]) {
+        (true, _) => 0,
+        (false, true) => 1,
+        (false, false) => 2,
+    };
     let mut order: Vec<usize> = (0..cell.len()).collect();
-    order.sort_by_key(|k| !is_glanced[*k]);
+    order.sort_by_key(rank);
+    let counts = [0, 1].map(|most| order.iter().filter(|k| rank(k) <= most).count() as u32);
     let sorted: Vec<LumelPlace> = order.into_iter().map(|k| cell[k]).collect();
     cell.copy_from_slice(&sorted);
-    taken.len() as u32
+    counts
+}
+
+/// Which lumels of a cell are the first of a square of so many a side: one of every main direction of
+/// surfaces, so that thin charts are not passed over.
+fn spread_over(cell: &[LumelPlace], side: u32, page_size: u32) -> Vec<bool> {
+    let mut taken = HashSet::new();
+    cell.iter()
+        .map(|place| {
+            let (_, at) = on_page(place.lumel, page_size);
+            taken.insert((at / side, main_direction(place.normal)))
+        })
+        .collect()
 }
 
 /// The axis that a direction is nearest to, and its sign.
@@ -318,63 +401,101 @@ mod tests {
         (places, cells)
     }
 
+    fn all(places: &[LumelPlace]) -> Vec<u32> {
+        places.iter().map(|place| place.lumel).collect()
+    }
+
     fn lumels(places: &[LumelPlace], budgets: &[Budget]) -> HashSet<u32> {
         budgets.iter().map(|budget| places[budget.receiver as usize].lumel).collect()
+    }
+
+    /// Share of samples that glances take.
+    fn share(budgets: &[Budget]) -> f32 {
+        let samples = |b: &Budget| u64::from(b.samples);
+        let of_glances = budgets.iter().filter(|b| b.seed.is_some()).map(samples).sum::<u64>();
+        of_glances as f32 / budgets.iter().map(samples).sum::<u64>() as f32
     }
 
     #[test]
     fn a_coarse_picture_comes_first() {
         let (places, mut cells) = cells();
+        let all = all(&places);
         let mut seen = HashSet::new();
         // A sixteenth of the lumels.
         let glances = u64::from(PAGE * PAGE / 16 * GLANCE_SAMPLES);
         for _ in 0..8 {
-            let budgets = cells.budgets(glances / 8, 1);
-            assert!(budgets.iter().all(|budget| budget.samples == GLANCE_SAMPLES));
+            let budgets = cells.budgets(glances / 8, 1, &all);
+            assert_eq!(share(&budgets), 1.0);
             seen.extend(lumels(&places, &budgets));
         }
         assert_eq!(seen.len(), (PAGE * PAGE / 16) as usize);
         let squares: HashSet<UVec2> =
             seen.iter().map(|lumel| on_page(*lumel, PAGE).1 / GLANCE).collect();
         assert_eq!(squares.len(), seen.len(), "one of each square");
-        // Then all of them, in turns.
+        // Then one of four, and all of them.
         let turns = u64::from(PAGE * PAGE * TURN_SAMPLES);
-        let all: HashSet<u32> =
-            (0..4).flat_map(|_| lumels(&places, &cells.budgets(turns / 4, 1))).collect();
-        assert_eq!(all.len(), (PAGE * PAGE) as usize);
+        for count in [4, 4, 1] {
+            let turn = |_| lumels(&places, &cells.budgets(turns / 4 / count, 1, &all));
+            let turned: HashSet<u32> = (0..4).flat_map(turn).collect();
+            assert_eq!(turned.len(), PAGE as usize * PAGE as usize / count as usize);
+        }
     }
 
-    /// A scene that changes all the time takes half the samples for glances; an edit all, until every
-    /// cell had one.
+    /// Cells whose light changes, and those about them, have glances with each job, up to a quarter of the
+    /// samples; others one now and then; an edit takes all samples, until every cell had one.
     #[test]
     fn changes_are_glanced_at() {
-        let (_, mut cells) = cells();
-        let all = u64::from(PAGE * PAGE);
-        let share = |budgets: &[Budget]| {
-            let of = |samples: u32| -> u64 {
-                budgets
-                    .iter()
-                    .map(|b| u64::from(b.samples))
-                    .filter(|s| *s == u64::from(samples))
-                    .sum()
-            };
-            of(GLANCE_SAMPLES) as f32 / (of(GLANCE_SAMPLES) + of(TURN_SAMPLES)) as f32
+        let (places, mut cells) = cells();
+        let all = all(&places);
+        let samples = u64::from(PAGE * PAGE);
+        let cells_of = |cells: &Cells, budgets: &[Budget]| -> BTreeSet<usize> {
+            let glances = budgets.iter().filter(|b| b.seed.is_some());
+            glances.map(|b| cells.cell_of(b.receiver)).collect()
         };
-        assert_eq!(share(&cells.budgets(all, 1)), 1.0);
-        for version in 2..20 {
-            let half = share(&cells.budgets(all / 4, version));
-            assert!((0.4..0.7).contains(&half), "{half}");
+        let coarse = cells.budgets(samples, 1, &all);
+        assert_eq!((share(&coarse), cells_of(&cells, &coarse).len()), (1.0, 64));
+        assert_eq!(share(&cells.budgets(samples, 1, &all)), 0.0, "nothing is another");
+        let calm = share(&cells.budgets(samples, 2, &all));
+        assert!((0.05..0.2).contains(&calm), "{calm}");
+        cells.count_glance(9, true);
+        let about: BTreeSet<usize> = cells.about(9).collect();
+        assert!((4..=9).contains(&about.len()));
+        for version in 3..6 {
+            let budgets = cells.budgets(samples, version, &all);
+            let glanced = cells_of(&cells, &budgets);
+            assert!(about.is_subset(&glanced) && glanced.len() < 24, "{glanced:?}");
         }
-        cells.budgets(4 * all, 19);
-        assert_eq!(share(&cells.budgets(all, 19)), 0.0, "nothing has changed");
+        (0..64).for_each(|cell| cells.count_glance(cell, true));
+        let quarter = share(&cells.budgets(samples, 6, &all));
+        assert!((0.25..0.4).contains(&quarter), "{quarter}");
+        for _ in 0..CHANGING {
+            (0..64).for_each(|cell| cells.count_glance(cell, false));
+        }
+        assert!(share(&cells.budgets(samples, 7, &all)) < 0.2, "light is calm again");
         cells.expect_change();
-        assert_eq!(share(&cells.budgets(all / 2, 20)), 1.0);
+        assert_eq!(share(&cells.budgets(samples / 2, 8, &all)), 1.0);
+    }
+
+    /// Glances at a lumel are the same in all jobs.
+    #[test]
+    fn glances_take_the_same_samples() {
+        let (places, mut cells) = cells();
+        let all = all(&places);
+        let mut seeds = HashMap::new();
+        for version in 1..20 {
+            cells.expect_change();
+            for budget in cells.budgets(u64::from(PAGE * PAGE), version, &all) {
+                let known = seeds.entry(budget.receiver).or_insert(budget.seed);
+                assert_eq!(budget.seed, *known);
+            }
+        }
+        assert_eq!(seeds.values().collect::<HashSet<_>>().len(), seeds.len());
     }
 
     #[test]
     fn no_lumels_are_no_trouble() {
         let mut cells = Cells::new(&mut [], PAGE);
         cells.expect_change();
-        assert!(cells.budgets(1000, 1).is_empty());
+        assert!(cells.budgets(1000, 1, &[]).is_empty());
     }
 }

@@ -1,195 +1,157 @@
-//! How the light of a cell has changed since it was gathered.
+//! How the light of lumels has changed.
 //!
-//! Light mostly changes smoothly over a surface: a lamp that moves makes a cell brighter or darker as a
-//! whole, and noise that lumels have each on their own hides it. So what is new at a cell's lumels is
-//! compared with what is known there by their sums. What is known is multiplied by the ratio of both, as
-//! far as noise lets it be trusted: the gain of a Kalman filter. Its pattern stays. Where the pattern is
-//! another by more than chance explains, what was known weighs little from then on.
+//! A glance takes the same samples of a lumel each time (common random numbers; Schied et al. 2018 take
+//! such gradients of pictures). So two glances differ by what has changed in the scene: noise that both
+//! have cancels. What has changed at the lumels of glances is spread over those about them on the surface,
+//! by weights that never change, and what is known there follows. Thus errors do not add up from glance to
+//! glance: what a lumel shows is the mean of what arrived beyond glances, and the glances of now.
+//!
+//! Where glances nearby disagree about how light has changed since what is known was gathered, its
+//! pattern is another. The more they disagree, the less what is known weighs.
 
-use glam::Vec3;
-use lumencast_light::luminance;
+use glam::{IVec2, Vec3};
 
-use super::sums::Sum;
+use super::point::Point;
 
-/// By how much the squares of noise scatter more than those of a normal distribution do.
-const TAILS: f32 = 1.5;
-/// Light of a cell changes by this ratio at most at once, up or down.
-const MOST: f32 = 4.0;
+/// A glance tells of lumels so far off on the page, or a little less far: no farther than the next cell.
+const REACH: f32 = 10.0;
+/// It tells next to nothing of a lumel that is more than so many times as far in the world as on the page.
+const STRETCH: f32 = 1.5;
+const ELSEWHERE: f32 = 1e-4;
+/// Power of the cosine between normals.
+const NORMAL_POWER: i32 = 8;
+/// What is known weighs as many samples as leave the square of this share of the glances' disagreement as
+/// variance: the filter takes noise from lumels that stays where their pattern is wrong.
+const DISAGREEMENT: f32 = 2.0;
+/// Glances may agree by chance: they disagree by this share of the change at least.
+const LEAST: f32 = 0.25;
 
-/// What is known of a lumel weighs so many samples where the pattern of light is another now.
-const OTHER: f32 = 4.0;
-/// Of light that was scaled after an edit, so much is still wrong at a lumel, as a share of it.
-const WRONG: f32 = 0.1;
-/// A cell that is brighter or darker by this ratio has changed much.
-const MUCH: f32 = 0.1;
-
-/// What speaks for a change of light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Cause {
-    /// The scene was edited.
-    Edit,
-    /// Something in the scene moves.
-    Motion,
-    /// Nothing does: all is still.
-    Nothing,
-}
-
-impl Cause {
-    /// Standard deviation of the ratio by which light changes from update to update.
-    fn deviation(self) -> f32 {
-        match self {
-            Self::Edit => 0.2,
-            Self::Motion => 0.02,
-            Self::Nothing => 0.0,
-        }
-    }
-}
-
-/// What is known about a change.
+/// A lumel, and what a glance has found there.
 #[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Glanced {
+    /// Place on the page.
+    pub(crate) at: IVec2,
+    /// World, metres.
+    pub(crate) position: Vec3,
+    /// World, unit.
+    pub(crate) normal: Vec3,
+    /// By how much its irradiance has changed since the last glance, lux.
+    pub(crate) change: Vec3,
+    /// By how much its luminance has changed since what is known was gathered.
+    pub(crate) since: f32,
+}
+
+/// How the light of a lumel has changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Change {
-    /// How much brighter the cell is.
-    pub(crate) gain: Vec3,
-    /// Whether its light has another pattern.
-    pub(crate) is_other: bool,
+    /// By how much irradiance has, lux.
+    pub(crate) by: Vec3,
+    /// The variance of luminance beyond which what is known tells nothing more.
+    pub(crate) variance: f32,
 }
 
 impl Change {
-    /// How lumels differ from what is known of them. From so many standard deviations of noise on,
-    /// `significance`, a difference is a change in any case.
+    /// The change of a lumel at a place of a page, and in the world, among all lumels about it that
+    /// glances take. Lumels are `texel` metres large.
     pub(crate) fn of<'a>(
-        known_and_new: impl Iterator<Item = (&'a Sum, &'a Sum)> + Clone,
-        cause: Cause,
-        significance: f32,
+        at: IVec2,
+        point: &Point,
+        glances: impl Iterator<Item = &'a Glanced>,
+        texel: f32,
     ) -> Self {
-        let none = Self { gain: Vec3::ONE, is_other: false };
-        let pairs = known_and_new.filter(|(known, _)| known.samples() > 0.0);
-        let (mut before, mut now, mut variance) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-        for (known, new) in pairs.clone() {
-            (before, now) = (before + known.mean(), now + new.mean());
-            variance += chance(known, new, 1.0);
-        }
-        let level = luminance(before);
-        let drift = (luminance(now) - level).abs();
-        let is_significant = drift > significance * variance.sqrt();
-        if level <= 0.0 {
-            return Self { is_other: is_significant, ..none };
-        }
-        let likely = (cause.deviation() * level).powi(2);
-        let trust = if is_significant { 1.0 } else { likely / (likely + variance).max(1e-30) };
-        let ratio = (now / before.max(Vec3::splat(1e-30)))
-            .clamp(Vec3::splat(1.0 / MOST), Vec3::splat(MOST));
-        let ratio = Vec3::select(before.cmpgt(Vec3::ZERO), ratio, Vec3::ONE);
-        let gain = 1.0 + trust * (ratio - 1.0);
-
-        let brighter = luminance(gain * before) / level;
-        let (mut squares, mut expected, mut count) = (0.0, 0.0, 0.0);
-        for (known, new) in pairs {
-            squares += luminance(new.mean() - gain * known.mean()).powi(2);
-            expected += chance(known, new, brighter);
-            count += 1.0f32;
-        }
-        let most = 1.0 + significance * TAILS * (2.0 / count).sqrt();
-        Self { gain, is_other: squares > most * expected }
-    }
-
-    /// Lets what is known of a cell's lumels follow.
-    pub(crate) fn apply(&self, known: &mut [Sum], cause: Cause) {
-        if self.gain == Vec3::ONE && !self.is_other {
-            return;
-        }
-        for sum in known {
-            sum.brighten(self.gain);
-            if self.is_other {
-                sum.limit(OTHER);
-            } else if cause == Cause::Edit {
-                sum.doubt(WRONG);
+        let normal = point.normal();
+        let (mut weights, mut by, mut since, mut squares) = (0.0, Vec3::ZERO, 0.0, 0.0);
+        for glance in glances {
+            let off = (glance.at - at).as_vec2().length_squared();
+            let near = 1.0 - off / (REACH * REACH);
+            if near <= 0.0 {
+                continue;
             }
+            let apart = glance.position.distance_squared(point.position);
+            let is_beside = apart <= (STRETCH * texel).powi(2) * off.max(1.0);
+            let facing = glance.normal.dot(normal).max(0.0).powi(NORMAL_POWER);
+            let weight = near * near * if is_beside { facing.max(ELSEWHERE) } else { ELSEWHERE };
+            weights += weight;
+            by += weight * glance.change;
+            since += weight * glance.since;
+            squares += weight * glance.since.powi(2);
         }
+        if weights == 0.0 {
+            return Self::default();
+        }
+        let square = (since / weights).powi(2);
+        let apart = (squares / weights - square).max(0.0) + LEAST * LEAST * square;
+        Self { by: by / weights, variance: DISAGREEMENT * DISAGREEMENT * apart }
     }
-
-    /// Whether the cell is to be gathered at sooner than others.
-    pub(crate) fn is_much(&self) -> bool {
-        self.is_other || (self.gain - 1.0).abs().max_element() > MUCH
-    }
-}
-
-/// The variance of a difference that noise alone makes, where what is known is so much brighter now. Few
-/// samples tell little of how they scatter: those of both together tell more.
-fn chance(known: &Sum, new: &Sum, brighter: f32) -> f32 {
-    let (n, m) = (known.samples(), new.samples());
-    let scatter = (n * brighter.powi(2) * known.scatter() + m * new.scatter()) / (n + m);
-    scatter * (1.0 / n + 1.0 / m)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::{mix, unit};
 
-    /// Sums of so many samples of a level, each with noise of a standard deviation.
-    fn sum(level: f32, noise: f32, samples: u32, seed: u64) -> Sum {
-        let values = (0..samples).map(|sample| {
-            let random = unit((mix(seed << 32 | u64::from(sample)) >> 32) as u32);
-            level + noise * 12.0f32.sqrt() * (random - 0.5)
-        });
-        Sum::of_samples(values)
+    /// Glances at every fourth lumel of a floor whose lumels are 0.1 m large.
+    fn floor(change: impl Fn(IVec2) -> f32) -> Vec<Glanced> {
+        let glanced = |k: i32| {
+            let at = 4 * IVec2::new(k % 12, k / 12);
+            let change = change(at);
+            Glanced {
+                at,
+                position: 0.1 * Vec3::new(at.x as f32, 0.0, at.y as f32),
+                normal: Vec3::Y,
+                change: Vec3::splat(change),
+                since: change,
+            }
+        };
+        (0..144).map(glanced).collect()
     }
 
-    const SIGNIFICANCE: f32 = 3.5;
-
-    /// Sixteen lumels, known by 64 samples and new by 16; `now` gives the level of each.
-    fn change(cause: Cause, seed: u64, now: impl Fn(u64) -> f32) -> Change {
-        let pairs: Vec<(Sum, Sum)> = (0..16)
-            .map(|k| {
-                let seed = 2 * (16 * seed + k);
-                (sum(2.0, 1.0, 64, seed), sum(now(k), 1.0, 16, seed + 1))
-            })
-            .collect();
-        Change::of(pairs.iter().map(|(a, b)| (a, b)), cause, SIGNIFICANCE)
-    }
-
-    #[test]
-    fn patterns_are_told_from_noise() {
-        let is_other = |seed, now: fn(u64) -> f32| change(Cause::Nothing, seed, now).is_other;
-        let false_alarms = (0..500).filter(|seed| is_other(*seed, |_| 2.0)).count();
-        assert!(false_alarms <= 5, "{false_alarms} of 500");
-        let stripes = |k: u64| if k.is_multiple_of(2) { 1.0 } else { 3.0 };
-        let found = (0..500).filter(|seed| is_other(*seed, stripes)).count();
-        assert!(found > 450, "{found} of 500");
+    fn of(at: IVec2, normal: Vec3, glances: &[Glanced]) -> Change {
+        let position = 0.1 * Vec3::new(at.x as f32, 0.0, at.y as f32);
+        Change::of(at, &Point::new(position, normal), glances.iter(), 0.1)
     }
 
     #[test]
-    fn brighter_light_keeps_its_pattern() {
-        for seed in 0..100 {
-            let Change { gain, is_other } = change(Cause::Nothing, seed, |_| 4.0);
-            assert!(!is_other && (gain.y - 2.0).abs() < 0.15, "{gain} {is_other}");
+    fn changes_are_spread_smoothly() {
+        let even = floor(|_| 2.0);
+        let slope = floor(|at| at.x as f32);
+        for x in 10..34 {
+            let at = IVec2::new(x, 21);
+            assert!((of(at, Vec3::Y, &even).by - 2.0).abs().max_element() < 1e-5);
+            let by = of(at, Vec3::Y, &slope).by.x;
+            assert!((by - x as f32).abs() < 0.5, "{by} at {x}");
+        }
+        assert_eq!(of(IVec2::splat(99), Vec3::Y, &even), Change::default(), "far off");
+    }
+
+    /// A change that is told cell by cell is the same in the end as one that is told at once.
+    #[test]
+    fn parts_add_up() {
+        let whole = |at: IVec2| (at.x * at.y) as f32;
+        let left = floor(|at| if at.x < 20 { whole(at) } else { 0.0 });
+        let right = floor(|at| if at.x < 20 { 0.0 } else { whole(at) });
+        for x in 12..30 {
+            let by = |glances: &[Glanced]| of(IVec2::new(x, 20), Vec3::Y, glances).by.x;
+            let (parts, all) = (by(&left) + by(&right), by(&floor(whole)));
+            assert!((parts / all - 1.0).abs() < 1e-5, "{parts}, {all}");
         }
     }
 
-    /// A change that noise would hide is followed where one is expected, and else is not.
     #[test]
-    fn small_changes_are_followed_where_they_are_likely() {
-        let mean = |cause, level: f32| {
-            (0..200).map(|seed| change(cause, seed, |_| level).gain.y).sum::<f32>() / 200.0
-        };
-        assert!((mean(Cause::Edit, 2.2) - 1.1).abs() < 0.02, "{}", mean(Cause::Edit, 2.2));
-        let still: Vec<f32> =
-            (0..200).map(|seed| change(Cause::Nothing, seed, |_| 2.0).gain.y).collect();
-        assert!(still.iter().filter(|gain| **gain != 1.0).count() <= 2);
+    fn glances_at_other_surfaces_hardly_count() {
+        let mut two = floor(|at| if at.x < 20 { 1.0 } else { 5.0 });
+        let wall = two.iter_mut().filter(|glanced| glanced.at.x >= 20);
+        wall.for_each(|glanced| glanced.normal = Vec3::X);
+        let by = of(IVec2::new(19, 20), Vec3::Y, &two).by.x;
+        assert!((by - 1.0).abs() < 0.01, "{by}");
     }
 
+    /// What is known weighs less where a shadow's edge has come than where all has become as dark.
     #[test]
-    fn little_that_is_known_tells_nothing() {
-        let (nothing, new) = (Sum::default(), sum(1.0, 0.1, 16, 1));
-        let of = |known: &Sum, cause, significance| {
-            Change::of(std::iter::repeat_n((known, &new), 16), cause, significance)
-        };
-        let none = Change { gain: Vec3::ONE, is_other: false };
-        assert_eq!(of(&nothing, Cause::Edit, SIGNIFICANCE), none);
-        let dark = sum(0.0, 0.0, 16, 2);
-        assert!(of(&dark, Cause::Nothing, SIGNIFICANCE).is_other);
-        let bright = sum(9.0, 0.1, 16, 2);
-        assert_eq!(of(&bright, Cause::Nothing, f32::INFINITY), none);
+    fn patterns_that_are_others_are_doubted() {
+        let at = IVec2::splat(20);
+        let even = of(at, Vec3::Y, &floor(|_| -1.0)).variance;
+        let edge = of(at, Vec3::Y, &floor(|at| if at.x < 20 { 0.0 } else { -1.0 })).variance;
+        assert!(even > 0.0 && edge > 3.0 * even, "{even}, {edge}");
+        assert_eq!(of(at, Vec3::Y, &floor(|_| 0.0)), Change::default());
     }
 }

@@ -6,6 +6,7 @@ mod cells;
 mod change;
 mod fill;
 mod filter;
+mod glances;
 mod places;
 mod point;
 mod points;
@@ -18,16 +19,17 @@ use std::sync::Arc;
 
 use glam::{Affine3A, UVec2, Vec3};
 use lumencast_charts::{LaidOut, lumels_on_pages};
-use lumencast_gather::{Budget, Gathered, Job, Receiver, Shading};
+use lumencast_gather::{Budget, Gathered, Job, Receiver, Shading, SumsAt};
 use lumencast_light::{Field, FieldId, Layout, Light, Lightmap, Surface, luminance, slope};
 use lumencast_scene::Snapshot;
 use rayon::prelude::*;
 
 use crate::blend::BlendSettings;
 pub use backs::with_backs;
-use cells::{BLOCK, Block, Cells};
-use change::{Cause, Change};
+use cells::{BLOCK, Block, Cells, on_page};
+use change::{Change, Glanced};
 use filter::{Noisy, REACH, filter};
+use glances::Glances;
 use places::{LumelPlace, lumel_places};
 use point::Point;
 pub use points::spread;
@@ -44,6 +46,11 @@ const RESTING: f64 = 2.0;
 
 /// Blocks that are solved at a time since what they had read of others is another now.
 const STALE_AT_ONCE: usize = 8;
+
+/// Light is changing where glances differ by this share of it.
+const CHANGING: f32 = 0.02;
+/// A cell that is brighter or darker by this share of its light is gathered at sooner than others.
+const MUCH: f32 = 0.1;
 
 /// An instance, by its node and its number there.
 type InstanceId = (u32, u32);
@@ -77,6 +84,7 @@ pub struct LightmapSolver {
     /// The receivers of the lumels of all pages; about charts, those that lie there ([`beyond`]).
     receiver_of: Arc<[u32]>,
     sums: Vec<Sum>,
+    glances: Glances,
     /// Where lumels tell how light depends on the normal.
     slopes: Option<Slopes>,
     seams: Arc<Seams>,
@@ -100,9 +108,6 @@ pub struct LightmapSolver {
     without: BTreeSet<InstanceId>,
     /// The version of the scene that was followed last.
     followed: Option<u64>,
-    /// The version of the scene that was gathered last, and whether it was another one before.
-    gathered: Option<u64>,
-    is_moving: bool,
 }
 
 impl LightmapSolver {
@@ -132,6 +137,7 @@ impl LightmapSolver {
             points,
             receiver_of: receiver_of.into(),
             sums: vec![Sum::default(); places.len()],
+            glances: Glances::default(),
             slopes: None,
             seams: Arc::new(Seams::new(scene, &layout)),
             news: BTreeSet::new(),
@@ -143,8 +149,6 @@ impl LightmapSolver {
             moved: BTreeMap::new(),
             newcomers: BTreeMap::new(),
             followed: None,
-            gathered: None,
-            is_moving: false,
             layout,
         }
     }
@@ -191,8 +195,10 @@ impl LightmapSolver {
     /// it is. The job has these alone; the budgets that come with it tell which they are, for
     /// [`Self::take`].
     pub fn next_job(&mut self, scene: Arc<Snapshot>, samples: u64) -> (Job, Vec<Budget>) {
-        self.is_moving = self.gathered.replace(scene.version) != Some(scene.version);
-        let budgets = self.cells.budgets(samples, scene.version);
+        let mut budgets = self.cells.budgets(samples, scene.version, &self.lumels);
+        if self.settings.significance.is_infinite() {
+            budgets.iter_mut().for_each(|budget| budget.seed = None);
+        }
         let point = |budget: &Budget| self.receiver(&self.points[budget.receiver as usize]);
         let receivers: Vec<Receiver> = budgets.iter().map(point).collect();
         let own = (0..).zip(&budgets).map(|(receiver, of)| Budget { receiver, ..*of });
@@ -285,6 +291,7 @@ impl LightmapSolver {
             let Some(before) = entry.and_then(|entry| beyond::own(*entry)) else { continue };
             if self.points[before as usize] == new.points[receiver] {
                 new.sums[receiver] = self.sums[before as usize];
+                new.glances.keep(receiver as u32, &self.glances, before);
                 if let Some((new, old)) = new.slopes.as_mut().zip(self.slopes.as_ref()) {
                     new.keep(receiver, old, before as usize);
                 }
@@ -355,6 +362,7 @@ impl LightmapSolver {
             let receiver = self.receiver_of[lumel as usize] as usize;
             points[receiver] = Point::new(position, normal);
             self.sums[receiver] = Sum::default();
+            self.glances.forget(receiver as u32);
         }
         self.points = points.into();
         self.hurry(id);
@@ -379,61 +387,105 @@ impl LightmapSolver {
     }
 
     /// Adds what was gathered; `budgets` tell at which lumels. What is not finite does not count. What is
-    /// known of a cell follows what its lumels together tell.
+    /// known follows what glances have found, but for those that were the first at their lumel: these are
+    /// as good as any samples.
     pub fn take(&mut self, gathered: &Gathered, budgets: &[Budget]) {
-        let (found, of_slopes): (Vec<(usize, Sum)>, Vec<Vec3>) = budgets
-            .iter()
-            .zip(gathered.sums.iter())
-            .filter_map(|(budget, found)| {
-                Some(((budget.receiver as usize, Sum::of(&found)?), slopes::sum_of(&found)))
-            })
-            .unzip();
-        let mut of_slopes = of_slopes.iter();
-        let page_size = self.layout.page_size;
-        let cell = |(receiver, _): &(usize, Sum)| self.cells.cell_of(*receiver as u32);
-        let of_cells: Vec<&[(usize, Sum)]> = found.chunk_by(|a, b| cell(a) == cell(b)).collect();
-        let mut blocks = BTreeSet::new();
-        for of_cell in of_cells {
-            let (first, _) = of_cell[0];
-            let cell = self.cells.cell_of(first as u32);
-            let block = Block::of(self.lumels[first], page_size);
-            let cause = match self.cells.count_update(cell) {
-                true => Cause::Edit,
-                false if self.is_moving => Cause::Motion,
-                false => Cause::Nothing,
-            };
-            if self.adapt(cell, of_cell, cause) {
-                self.cells.hasten(cell);
-                self.stale.extend(self.readers.get(&block).into_iter().flatten());
+        let found = budgets.iter().zip(gathered.sums.iter());
+        let found = found.filter_map(|(budget, found)| Some((budget, Sum::of(&found)?, found)));
+        let found: Vec<(&Budget, Sum, SumsAt<'_>)> = found.collect();
+        let mut changes = HashMap::new();
+        let mut samples = Vec::new();
+        for (budget, new, found) in &found {
+            let is_glance = budget.seed.is_some();
+            match is_glance.then(|| self.glances.look(budget.receiver, new.mean())).flatten() {
+                Some(change) => drop(changes.insert(budget.receiver, change)),
+                None => samples.push((budget.receiver, new, slopes::sum_of(found))),
             }
-            for ((receiver, new), slope) in of_cell.iter().zip(&mut of_slopes) {
-                let sum = &mut self.sums[*receiver];
-                let before = *sum;
-                sum.add(new, self.settings.ratio);
-                if let Some(slopes) = &mut self.slopes {
-                    slopes.add(*receiver, *slope, [&before, new, sum]);
-                }
-            }
-            blocks.insert(self.cells.block_of(cell));
-            self.news.extend(self.beside.get(&block).into_iter().flatten());
-            self.news.insert(block);
         }
+        self.follow_changes(&changes);
+        let mut cells = BTreeSet::new();
+        for (receiver, new, slope) in samples {
+            let sum = &mut self.sums[receiver as usize];
+            let before = *sum;
+            sum.add(new, self.settings.ratio);
+            self.glances.add(receiver, new.samples() / sum.samples());
+            if let Some(slopes) = &mut self.slopes {
+                slopes.add(receiver as usize, slope, [&before, new, sum]);
+            }
+            cells.insert(self.cells.cell_of(receiver));
+        }
+        let blocks: BTreeSet<usize> = cells.iter().map(|cell| self.cells.block_of(*cell)).collect();
         for block in blocks {
             let noise = noise(&self.sums[self.cells.receivers_of_block(block)]);
             self.cells.set_noise(block, noise);
         }
+        for cell in cells {
+            self.renew(cell);
+        }
     }
 
-    /// Lets what is known of a cell's lumels follow what is new. Whether light has changed much.
-    fn adapt(&mut self, cell: usize, new: &[(usize, Sum)], cause: Cause) -> bool {
-        let significance = self.settings.significance;
-        if significance.is_infinite() {
-            return false;
+    /// Lets what is known follow what glances have found at receivers.
+    fn follow_changes(&mut self, changes: &HashMap<u32, Vec3>) {
+        let mut glanced = BTreeMap::<usize, [f32; 2]>::new();
+        for (receiver, change) in changes {
+            let [by, level] = glanced.entry(self.cells.cell_of(*receiver)).or_default();
+            *by += luminance(change.abs());
+            *level += luminance(self.sums[*receiver as usize].mean());
         }
-        let pairs = new.iter().map(|(receiver, new)| (&self.sums[*receiver], new));
-        let change = Change::of(pairs, cause, significance);
-        change.apply(&mut self.sums[self.cells.receivers_of(cell)], cause);
-        change.is_much()
+        for (cell, [by, level]) in &glanced {
+            self.cells.count_glance(*cell, *by > CHANGING * level);
+        }
+        let changed = glanced.iter().filter(|(_, [by, _])| *by > 0.0);
+        let about: BTreeSet<usize> =
+            changed.flat_map(|(cell, _)| self.cells.about(*cell)).collect();
+        let about: Vec<usize> = about.into_iter().collect();
+        let found: Vec<Vec<Change>> =
+            about.par_iter().map(|cell| self.changes_of(*cell, changes)).collect();
+        for (cell, changes) in about.into_iter().zip(found) {
+            let sums = &mut self.sums[self.cells.receivers_of(cell)];
+            let (mut by, mut level) = (0.0, 0.0);
+            for (sum, change) in sums.iter_mut().zip(changes) {
+                by += luminance(change.by.abs());
+                level += luminance(sum.mean());
+                sum.follow(&change);
+            }
+            let block = self.renew(cell);
+            if by > MUCH * level {
+                self.cells.hasten(cell);
+                self.stale.extend(self.readers.get(&block).into_iter().flatten());
+            }
+        }
+    }
+
+    /// How the light of a cell's lumels has changed, by what glances have found at receivers.
+    fn changes_of(&self, cell: usize, changes: &HashMap<u32, Vec3>) -> Vec<Change> {
+        let place =
+            |receiver: usize| on_page(self.lumels[receiver], self.layout.page_size).1.as_ivec2();
+        let glanced = |receiver: usize| {
+            let Point { position, .. } = self.points[receiver];
+            Glanced {
+                at: place(receiver),
+                position,
+                normal: self.points[receiver].normal(),
+                change: changes.get(&(receiver as u32)).copied().unwrap_or_default(),
+                since: self.glances.since(receiver as u32),
+            }
+        };
+        let about = self.cells.about(cell).flat_map(|about| self.cells.glanced_of(about));
+        let glances: Vec<Glanced> = about.map(glanced).collect();
+        let change = |receiver: usize| {
+            Change::of(place(receiver), &self.points[receiver], glances.iter(), self.texel)
+        };
+        self.cells.receivers_of(cell).map(change).collect()
+    }
+
+    /// More is known of a cell than is solved of its block, which is told.
+    fn renew(&mut self, cell: usize) -> Block {
+        let first = self.cells.receivers_of(cell).start;
+        let block = Block::of(self.lumels[first], self.layout.page_size);
+        self.news.extend(self.beside.get(&block).into_iter().flatten());
+        self.news.insert(block);
+        block
     }
 
     /// Makes light of what has been taken in since the last time: filtered on the surface where

@@ -4,11 +4,15 @@ use glam::Vec3;
 use lumencast_gather::SumsAt;
 use lumencast_light::luminance;
 
+use super::change::Change;
+
 /// Share of backs, by winding, above which a lumel lies within something: its light is that of the
 /// lumels about it.
 const BURIED_ABOVE: f32 = 0.5;
-/// What is doubted weighs as many samples as that, at least.
-const LEAST: f32 = 8.0;
+/// What was known of light that has changed weighs as many samples, at least.
+const LEAST: f32 = 4.0;
+/// Noise grows with light that becomes brighter up to that.
+const BRIGHTER: f32 = 4.0;
 /// Samples of a lumel from which on its light is shown.
 const SETTLED: f32 = 24.0;
 
@@ -66,20 +70,21 @@ impl Sum {
         }
     }
 
-    /// Lets what is known weigh no more than samples that leave this share of it as noise.
-    pub(crate) fn doubt(&mut self, share: f32) {
-        let wrong = (share * luminance(self.mean())).powi(2);
-        if wrong > 0.0 {
-            self.limit((self.scatter() / wrong).max(LEAST));
+    /// Follows a change of light. Its noise is thought to grow and shrink with it.
+    pub(crate) fn follow(&mut self, change: &Change) {
+        if self.samples == 0.0 || *change == Change::default() {
+            return;
         }
-    }
-
-    /// Makes light so much brighter.
-    pub(crate) fn brighten(&mut self, gain: Vec3) {
-        let before = luminance(self.sum);
-        self.sum *= gain;
-        let brighter = if before > 0.0 { luminance(self.sum) / before } else { 1.0 };
-        self.squares *= brighter * brighter;
+        let (before, scatter) = (self.mean(), self.scatter());
+        let now = (before + change.by).max(Vec3::ZERO);
+        let level = luminance(before);
+        let brighter = if level > 0.0 { (luminance(now) / level).min(BRIGHTER) } else { 1.0 };
+        let scatter = scatter * brighter * brighter;
+        self.sum = self.samples * now;
+        self.squares = self.samples * (scatter + luminance(now).powi(2));
+        if change.variance > 0.0 {
+            self.limit((scatter / change.variance).max(LEAST));
+        }
     }
 
     pub(crate) fn samples(&self) -> f32 {
@@ -146,5 +151,26 @@ mod tests {
         all.add(&level(2.0), 0.1);
         let (mean, _) = all.known().expect("light");
         assert!((mean.x - 1.1).abs() < 1e-4, "{mean}");
+    }
+
+    /// What is known follows changes, and weighs as much as they leave of it.
+    #[test]
+    fn changes_are_followed() {
+        let known = Sum::of_samples((0..64).map(|k| if k % 2 == 0 { 1.0 } else { 3.0 }));
+        let after = |by: f32, variance: f32| {
+            let mut sum = known;
+            sum.follow(&Change { by: Vec3::splat(by), variance });
+            sum
+        };
+        assert_eq!(after(0.0, 0.0), known);
+        let brighter = after(2.0, 0.0);
+        assert!((brighter.mean() - 4.0).abs().max_element() < 1e-5);
+        assert!((brighter.scatter() - 4.0).abs() < 1e-4 && brighter.samples() == 64.0);
+        assert!((after(2.0, 0.25).samples() - 16.0).abs() < 1e-3);
+        let dark = after(-9.0, 1.0);
+        assert_eq!((dark.mean(), dark.samples()), (Vec3::ZERO, LEAST));
+        let mut nothing = Sum::default();
+        nothing.follow(&Change { by: Vec3::ONE, variance: 1.0 });
+        assert_eq!(nothing, Sum::default());
     }
 }
