@@ -5,9 +5,10 @@
 //! Who is a neighbour, position and normal decide. Whose light counts, the noise decides: what differs
 //! by more than noise explains is detail, and stays. Lumels that are known well are left alone.
 
-use glam::{IVec2, Vec3};
+use std::ops::Range;
+
+use glam::Vec3;
 use lumencast_light::luminance;
-use rayon::prelude::*;
 
 /// Passes; steps are 1, 2, 4.
 const PASSES: u32 = 3;
@@ -19,8 +20,6 @@ const KERNEL: [f32; 5] = [1.0 / 16.0, 1.0 / 4.0, 3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.
 const DEVIATIONS: f32 = 2.0;
 /// A neighbour is at most so many times as far as it is on the page.
 const STRETCH: f32 = 1.5;
-/// Power of the cosine between normals.
-const NORMAL_POWER: i32 = 32;
 
 /// A lumel that is filtered. One that nothing is known of has an infinite variance: it takes the light
 /// of those about it, and gives none.
@@ -37,69 +36,179 @@ pub(crate) struct Noisy {
     pub(crate) variance: f32,
 }
 
-/// Filters a page of lumels, `side` a side, a lumel every `texel` metres. Lumels that are not there
-/// take no part.
-pub(crate) fn filter(page: &mut Vec<Option<Noisy>>, side: u32, texel: f32) {
+/// Filters a window of a page, `side` a side, a lumel every `texel` metres. Lumels that are not there
+/// take no part. Those within `margin` of its border are not wanted, and filtered in part.
+pub(crate) fn filter(window: &mut [Option<Noisy>], side: u32, texel: f32, margin: u32) {
+    let mut columns = Columns::new(window, side as usize);
     for pass in 0..PASSES {
         let step = 1 << pass;
-        let near = STRETCH * step as f32 * texel;
-        let before = &*page;
-        *page = (0..before.len() as u32)
-            .into_par_iter()
-            .map(|number| {
-                let own = before[number as usize]?;
-                let at = IVec2::new((number % side) as i32, (number / side) as i32);
-                Some(filtered(&own, neighbours(before, side, at, step), near))
-            })
-            .collect();
+        // What later passes read: two of their steps beyond what is wanted.
+        let later: u32 = (pass + 1..PASSES).map(|pass| 2 << pass).sum();
+        let margin = margin.saturating_sub(later) as usize;
+        columns = columns.filtered(step, STRETCH * step as f32 * texel, margin);
+    }
+    for (number, lumel) in window.iter_mut().enumerate() {
+        if let Some(lumel) = lumel {
+            columns.put(number, lumel);
+        }
     }
 }
 
-/// The 5 × 5 lumels about one, with the kernel's weight and their distance on the page in steps.
-fn neighbours(
-    page: &[Option<Noisy>],
-    side: u32,
-    at: IVec2,
-    step: i32,
-) -> impl Iterator<Item = (Noisy, f32, f32)> {
-    (0..25).filter_map(move |k| {
-        let (x, y) = (k % 5, k / 5);
-        let off = IVec2::new(x - 2, y - 2);
-        let beside = at + step * off;
-        if beside.min_element() < 0 || beside.max_element() >= side as i32 {
-            return None;
-        }
-        let lumel = page[(beside.y as u32 * side + beside.x as u32) as usize]?;
-        Some((lumel, KERNEL[x as usize] * KERNEL[y as usize], off.as_vec2().length()))
-    })
+/// Lumels as columns of numbers, row after row of a window: what is done to many of them at a time is
+/// done by vectors.
+#[derive(Clone)]
+struct Columns {
+    side: usize,
+    position: [Vec<f32>; 3],
+    /// Zero where there is no lumel: nothing faces as it does.
+    normal: [Vec<f32>; 3],
+    /// Irradiance, and the slope where any lumel has one.
+    values: Vec<Vec<f32>>,
+    luminance: Vec<f32>,
+    variance: Vec<f32>,
+    /// 1 where something is known, 0 elsewhere.
+    known: Vec<f32>,
 }
 
-fn filtered(own: &Noisy, about: impl Iterator<Item = (Noisy, f32, f32)>, near: f32) -> Noisy {
-    let y = luminance(own.irradiance);
-    let (mut sum, mut slope, mut variance, mut weights) = (Vec3::ZERO, Vec3::ZERO, 0.0, 0.0);
-    for (lumel, kernel, steps) in about {
-        let apart = lumel.position.distance(own.position);
-        let facing = lumel.normal.dot(own.normal).max(0.0).powi(NORMAL_POWER);
-        if apart > near * steps || facing == 0.0 || lumel.variance == f32::INFINITY {
-            continue;
+impl Columns {
+    fn new(window: &[Option<Noisy>], side: usize) -> Self {
+        let column = |of: &dyn Fn(&Noisy) -> f32| -> Vec<f32> {
+            window.iter().map(|lumel| lumel.as_ref().map_or(0.0, of)).collect()
+        };
+        let three = |of: &dyn Fn(&Noisy) -> Vec3| [0, 1, 2].map(|k| column(&|lumel| of(lumel)[k]));
+        let mut values: Vec<Vec<f32>> = three(&|lumel| lumel.irradiance).into();
+        if window.iter().flatten().any(|lumel| lumel.slope != Vec3::ZERO) {
+            values.extend(three(&|lumel| lumel.slope));
         }
-        let spread = DEVIATIONS * (own.variance + lumel.variance).max(0.0).sqrt();
-        let differs = (luminance(lumel.irradiance) - y).abs();
-        let alike = if differs == 0.0 { 1.0 } else { (-differs / spread.max(1e-30)).exp() };
-        let weight = kernel * facing * alike;
-        sum += weight * lumel.irradiance;
-        slope += weight * lumel.slope;
-        variance += weight * weight * lumel.variance;
-        weights += weight;
+        Self {
+            side,
+            position: three(&|lumel| lumel.position),
+            normal: three(&|lumel| lumel.normal),
+            values,
+            luminance: column(&|lumel| luminance(lumel.irradiance)),
+            variance: column(&|lumel| lumel.variance),
+            known: column(&|lumel| f32::from(lumel.variance < f32::INFINITY)),
+        }
     }
-    if weights == 0.0 {
-        return *own;
+
+    /// One pass over all but a margin: neighbours are so many lumels apart on the page, and at most so
+    /// many times as `near`, metres, as they are steps apart.
+    fn filtered(&self, step: i32, near: f32, margin: usize) -> Self {
+        let mut after = self.clone();
+        let mut weights = vec![0.0; self.side];
+        for y in margin..self.side - margin {
+            let own = y * self.side + margin..(y + 1) * self.side - margin;
+            let width = own.len();
+            let mut sums = vec![vec![0.0; width]; self.values.len()];
+            let (mut variance, mut total) = (vec![0.0; width], vec![0.0; width]);
+            for k in 0..25 {
+                let (dx, dy) = (step * (k % 5 - 2), step * (k / 5 - 2));
+                let Some(row) = y.checked_add_signed(dy as isize).filter(|y| *y < self.side) else {
+                    continue;
+                };
+                // Which of the row's lumels have a neighbour there.
+                let low = margin.max((-dx).max(0) as usize);
+                let high = (self.side - margin).min(self.side - dx.max(0) as usize);
+                let inner = low - margin..high - margin;
+                let here = y * self.side + low..y * self.side + high;
+                let first = (row * self.side + low).wrapping_add_signed(dx as isize);
+                let there = first..first + here.len();
+                let steps = ((k % 5 - 2).pow(2) + (k / 5 - 2).pow(2)) as f32;
+                let kernel = KERNEL[(k % 5) as usize] * KERNEL[(k / 5) as usize];
+                let weights = &mut weights[..here.len()];
+                self.weigh(here, there.clone(), near * near * steps, kernel, weights);
+                for (sum, value) in sums.iter_mut().zip(&self.values) {
+                    add(&mut sum[inner.clone()], &value[there.clone()], weights);
+                }
+                add_up(&mut total[inner.clone()], weights);
+                let known = &self.known[there.clone()];
+                add_squared(&mut variance[inner], &self.variance[there], known, weights);
+            }
+            for (at, (total, variance)) in own.zip(total.iter().zip(&variance)) {
+                if *total > 0.0 {
+                    let x = at - y * self.side - margin;
+                    for (value, sum) in after.values.iter_mut().zip(&sums) {
+                        value[at] = sum[x] / total;
+                    }
+                    after.variance[at] = variance / (total * total);
+                    after.known[at] = 1.0;
+                    let irradiance = Vec3::from_array([0, 1, 2].map(|k| after.values[k][at]));
+                    after.luminance[at] = luminance(irradiance);
+                }
+            }
+        }
+        after
     }
-    Noisy {
-        irradiance: sum / weights,
-        slope: slope / weights,
-        variance: variance / (weights * weights),
-        ..*own
+
+    /// What neighbours weigh: those `there` for those `here`.
+    fn weigh(
+        &self,
+        here: Range<usize>,
+        there: Range<usize>,
+        near_squared: f32,
+        kernel: f32,
+        weights: &mut [f32],
+    ) {
+        let count = here.len();
+        let ([px, py, pz], [qx, qy, qz]) =
+            [&here, &there].map(|of| part(&self.position, of)).into();
+        let ([nx, ny, nz], [mx, my, mz]) = [&here, &there].map(|of| part(&self.normal, of)).into();
+        let (y, z) = (&self.luminance[here.clone()], &self.luminance[there.clone()]);
+        let (v, w) = (&self.variance[here], &self.variance[there.clone()]);
+        let known = &self.known[there];
+        let columns = [px, py, pz, qx, qy, qz, nx, ny, nz, mx, my, mz, y, z, v, w, known];
+        assert!(columns.iter().all(|column| column.len() == count) && weights.len() == count);
+        for i in 0..count {
+            let apart = squared(px[i] - qx[i]) + squared(py[i] - qy[i]) + squared(pz[i] - qz[i]);
+            let facing = (nx[i] * mx[i] + ny[i] * my[i] + nz[i] * mz[i]).max(0.0);
+            let spread = DEVIATIONS * (v[i] + w[i]).max(0.0).sqrt();
+            let differs = (y[i] - z[i]).abs() / spread.max(1e-30);
+            // e^−x, but for its tail.
+            let alike = power_32((1.0 - differs / 32.0).max(0.0));
+            let weight = kernel * known[i] * power_32(facing) * alike;
+            weights[i] = if apart <= near_squared { weight } else { 0.0 };
+        }
+    }
+
+    /// Puts what is known of a lumel there.
+    fn put(&self, number: usize, lumel: &mut Noisy) {
+        let three = |first: usize| {
+            let values = self.values.get(first..first + 3)?;
+            Some(Vec3::from_array([0, 1, 2].map(|k| values[k][number])))
+        };
+        lumel.irradiance = three(0).unwrap_or_default();
+        lumel.slope = three(3).unwrap_or_default();
+        lumel.variance = self.variance[number];
+    }
+}
+
+fn part<'a>(columns: &'a [Vec<f32>; 3], range: &Range<usize>) -> [&'a [f32]; 3] {
+    [0, 1, 2].map(|k| &columns[k][range.clone()])
+}
+
+fn squared(x: f32) -> f32 {
+    x * x
+}
+
+fn power_32(x: f32) -> f32 {
+    squared(squared(squared(squared(squared(x)))))
+}
+
+fn add(sums: &mut [f32], values: &[f32], weights: &[f32]) {
+    for ((sum, value), weight) in sums.iter_mut().zip(values).zip(weights) {
+        *sum += weight * value;
+    }
+}
+
+fn add_up(sums: &mut [f32], weights: &[f32]) {
+    sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight);
+}
+
+/// Adds variances of what is known.
+fn add_squared(sums: &mut [f32], variances: &[f32], known: &[f32], weights: &[f32]) {
+    for (((sum, variance), known), weight) in sums.iter_mut().zip(variances).zip(known).zip(weights)
+    {
+        *sum += if *known > 0.0 { weight * weight * variance } else { 0.0 };
     }
 }
 
@@ -139,17 +248,17 @@ mod tests {
     fn noise_goes_and_what_it_does_not_explain_stays() {
         let flat = |_| 10.0;
         let mut even = page(flat, 1.0);
-        filter(&mut even, SIDE, 0.1);
+        filter(&mut even, SIDE, 0.1, 0);
         assert!(error(&even, flat) < 0.25, "{}", error(&even, flat));
         // A shadow's edge, twenty standard deviations high.
         let edge = |number: u32| if number % SIDE < SIDE / 2 { 10.0 } else { 30.0 };
         let mut shadow = page(edge, 1.0);
-        filter(&mut shadow, SIDE, 0.1);
+        filter(&mut shadow, SIDE, 0.1, 0);
         assert!(error(&shadow, edge) < 0.3, "{}", error(&shadow, edge));
         // Without noise nothing changes.
         let slope = |number: u32| number as f32;
         let mut clean = page(slope, 0.0);
-        filter(&mut clean, SIDE, 0.1);
+        filter(&mut clean, SIDE, 0.1, 0);
         assert!(error(&clean, slope) < 1e-3, "{}", error(&clean, slope));
     }
 
@@ -163,12 +272,12 @@ mod tests {
                 (lumel.irradiance, lumel.variance) = (Vec3::splat(1e4), f32::INFINITY);
             }
         }
-        filter(&mut sparse, SIDE, 0.1);
+        filter(&mut sparse, SIDE, 0.1, 0);
         assert!(sparse.iter().flatten().all(|lumel| lumel.variance.is_finite()));
         assert!(error(&sparse, slope) < 0.5, "{}", error(&sparse, slope));
         let mut unknown = page(slope, 0.1);
         unknown.iter_mut().flatten().for_each(|lumel| lumel.variance = f32::INFINITY);
-        filter(&mut unknown, SIDE, 0.1);
+        filter(&mut unknown, SIDE, 0.1, 0);
         assert!(unknown.iter().flatten().all(|lumel| lumel.variance == f32::INFINITY));
     }
 
@@ -189,7 +298,7 @@ mod tests {
                     }
                 }
             }
-            filter(&mut two, SIDE, 0.1);
+            filter(&mut two, SIDE, 0.1, 0);
             let is_mixed = error(&two, edge) > 0.05;
             assert_eq!(is_mixed, fault == "none", "{fault}: {}", error(&two, edge));
         }

@@ -10,6 +10,7 @@ mod glances;
 mod places;
 mod point;
 mod points;
+mod ripening;
 mod seams;
 mod slopes;
 mod sums;
@@ -33,6 +34,7 @@ use glances::Glances;
 use places::{LumelPlace, lumel_places};
 use point::Point;
 pub use points::spread;
+use ripening::Ripening;
 use seams::Seams;
 pub use seams::sides_of_seams;
 use slopes::Slopes;
@@ -44,8 +46,8 @@ const NO_RECEIVER: u32 = u32::MAX;
 /// What has moved gets lumels again once it has rested for so many seconds of scene time.
 const RESTING: f64 = 2.0;
 
-/// Blocks that are solved at a time since what they had read of others is another now.
-const STALE_AT_ONCE: usize = 8;
+/// So many blocks are solved at a time, beside those that cannot wait.
+const DUE_AT_ONCE: usize = 4;
 
 /// Light is changing where glances differ by this share of it.
 const CHANGING: f32 = 0.02;
@@ -88,14 +90,17 @@ pub struct LightmapSolver {
     /// Where lumels tell how light depends on the normal.
     slopes: Option<Slopes>,
     seams: Arc<Seams>,
-    /// Blocks of which more is known than is solved.
+    /// Whether lumels are gathered at in turns: light is live.
+    in_turns: bool,
+    /// Blocks that are solved next.
     news: BTreeSet<Block>,
+    /// Blocks that are solved by and by: much more is known of them, or of what they read of others.
+    due: BTreeSet<Block>,
+    ripening: Ripening,
     /// Blocks without surfaces beside those that have some: they are solved with these.
     beside: Arc<BTreeMap<Block, Vec<Block>>>,
     /// Blocks that read light of a block when they are filtered.
     readers: Arc<BTreeMap<Block, Vec<Block>>>,
-    /// Blocks that have read light that is another now.
-    stale: BTreeSet<Block>,
     /// Where all surfaces lie, those of instances that have moved too.
     layout: Arc<Layout>,
     /// The instances, and where they were when their lumels were placed.
@@ -140,9 +145,11 @@ impl LightmapSolver {
             glances: Glances::default(),
             slopes: None,
             seams: Arc::new(Seams::new(scene, &layout)),
+            in_turns: false,
             news: BTreeSet::new(),
+            due: BTreeSet::new(),
+            ripening: Ripening::default(),
             readers: Arc::new(readers),
-            stale: BTreeSet::new(),
             beside: Arc::new(empty_beside(&places, layout.page_size)),
             without: ids.filter(|id| !placed.contains_key(id)).collect(),
             placed,
@@ -195,6 +202,7 @@ impl LightmapSolver {
     /// it is. The job has these alone; the budgets that come with it tell which they are, for
     /// [`Self::take`].
     pub fn next_job(&mut self, scene: Arc<Snapshot>, samples: u64) -> (Job, Vec<Budget>) {
+        self.in_turns = true;
         let mut budgets = self.cells.budgets(samples, scene.version, &self.lumels);
         if self.settings.significance.is_infinite() {
             budgets.iter_mut().for_each(|budget| budget.seed = None);
@@ -363,6 +371,7 @@ impl LightmapSolver {
             points[receiver] = Point::new(position, normal);
             self.sums[receiver] = Sum::default();
             self.glances.forget(receiver as u32);
+            self.ripening.forget(&Block::of(lumel, page_size));
         }
         self.points = points.into();
         self.hurry(id);
@@ -403,7 +412,7 @@ impl LightmapSolver {
             }
         }
         self.follow_changes(&changes);
-        let mut cells = BTreeSet::new();
+        let mut blocks = BTreeMap::<usize, f32>::new();
         for (receiver, new, slope) in samples {
             let sum = &mut self.sums[receiver as usize];
             let before = *sum;
@@ -412,16 +421,18 @@ impl LightmapSolver {
             if let Some(slopes) = &mut self.slopes {
                 slopes.add(receiver as usize, slope, [&before, new, sum]);
             }
-            cells.insert(self.cells.cell_of(receiver));
+            let block = self.cells.block_of(self.cells.cell_of(receiver));
+            *blocks.entry(block).or_default() += new.samples();
         }
-        let blocks: BTreeSet<usize> = cells.iter().map(|cell| self.cells.block_of(*cell)).collect();
-        for block in blocks {
-            let noise = noise(&self.sums[self.cells.receivers_of_block(block)]);
-            self.cells.set_noise(block, noise);
+        for (number, new) in blocks {
+            let receivers = self.cells.receivers_of_block(number);
+            let block = self.block_of(receivers.start);
+            let sums = &self.sums[receivers];
+            self.cells.set_noise(number, noise(sums));
+            let known: f32 = sums.iter().map(Sum::samples).sum();
+            self.ripen(block, new / known, 0.0);
         }
-        for cell in cells {
-            self.renew(cell);
-        }
+        self.due.extend(self.ripening.ripe());
     }
 
     /// Lets what is known follow what glances have found at receivers.
@@ -441,19 +452,26 @@ impl LightmapSolver {
         let about: Vec<usize> = about.into_iter().collect();
         let found: Vec<Vec<Change>> =
             about.par_iter().map(|cell| self.changes_of(*cell, changes)).collect();
+        let mut blocks = BTreeMap::<Block, f32>::new();
         for (cell, changes) in about.into_iter().zip(found) {
-            let sums = &mut self.sums[self.cells.receivers_of(cell)];
+            let receivers = self.cells.receivers_of(cell);
+            let block = self.block_of(receivers.start);
+            let sums = &mut self.sums[receivers];
             let (mut by, mut level) = (0.0, 0.0);
             for (sum, change) in sums.iter_mut().zip(changes) {
                 by += luminance(change.by.abs());
                 level += luminance(sum.mean());
                 sum.follow(&change);
             }
-            let block = self.renew(cell);
+            let most = blocks.entry(block).or_default();
+            *most = most.max(if level > 0.0 { by / level } else { by });
             if by > MUCH * level {
                 self.cells.hasten(cell);
-                self.stale.extend(self.readers.get(&block).into_iter().flatten());
+                self.due.extend(self.readers.get(&block).into_iter().flatten());
             }
+        }
+        for (block, change) in blocks {
+            self.ripen(block, 0.0, change);
         }
     }
 
@@ -479,24 +497,34 @@ impl LightmapSolver {
         self.cells.receivers_of(cell).map(change).collect()
     }
 
-    /// More is known of a cell than is solved of its block, which is told.
-    fn renew(&mut self, cell: usize) -> Block {
-        let first = self.cells.receivers_of(cell).start;
-        let block = Block::of(self.lumels[first], self.layout.page_size);
-        self.news.extend(self.beside.get(&block).into_iter().flatten());
-        self.news.insert(block);
-        block
+    /// More is known of a block than is solved: new samples are this share of what is known, or its light
+    /// has changed by a share of it.
+    fn ripen(&mut self, block: Block, samples: f32, change: f32) {
+        let at_once = self.ripening.add(block, samples, change);
+        if at_once || !self.in_turns {
+            self.news.insert(block);
+        }
+    }
+
+    /// The block of a receiver.
+    fn block_of(&self, receiver: usize) -> Block {
+        Block::of(self.lumels[receiver], self.layout.page_size)
     }
 
     /// Makes light of what has been taken in since the last time: filtered on the surface where
     /// `filtered`, spread to where nothing is known, and the same on both sides of seams. `shown` is what
     /// [`Self::dark`] made, with all that has been solved since.
     pub fn solve(&mut self, filtered: bool, shown: &mut Lightmap) {
-        self.stale.retain(|block| !self.news.contains(block));
-        for _ in 0..STALE_AT_ONCE {
-            self.news.extend(self.stale.pop_first());
+        let mut news = std::mem::take(&mut self.news);
+        self.due.retain(|block| !news.contains(block));
+        for _ in 0..DUE_AT_ONCE {
+            news.extend(self.due.pop_first());
         }
-        let news: Vec<Block> = std::mem::take(&mut self.news).into_iter().collect();
+        news.iter().for_each(|block| self.ripening.solved(*block));
+        let beside = news.iter().filter_map(|block| self.beside.get(block)).flatten();
+        let beside: Vec<Block> = beside.copied().collect();
+        news.extend(beside);
+        let news: Vec<Block> = news.into_iter().collect();
         let solved: Vec<Solved> =
             news.par_iter().map(|block| self.solved(block, filtered)).collect();
         let size = self.layout.page_size;
@@ -542,7 +570,7 @@ impl LightmapSolver {
         let noisy = |entry: &u32| self.known(beyond::receiver(*entry)?);
         let mut window: Vec<Option<Noisy>> = entries.iter().map(noisy).collect();
         if filtered {
-            filter(&mut window, side, self.texel);
+            filter(&mut window, side, self.texel, REACH);
         }
         let known: Vec<Option<Noisy>> = entries
             .iter()
