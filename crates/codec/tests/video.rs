@@ -170,11 +170,19 @@ fn groups_begin_where_they_must() {
 fn many_pages_take_turns() {
     let light = lightmap(1024, 3, 0);
     let mut encoder = encoder(&light, LumelCoding::H264(qp(30)));
-    let turns: Vec<u32> = (0..6)
-        .flat_map(|u| encode(&mut encoder, &lightmap(1024, 3, u), u.into()))
-        .map(|frame| frame.region)
+    let turns: Vec<(u32, u32)> = (0..10)
+        .flat_map(|u| {
+            encode(&mut encoder, &lightmap(1024, 3, u), u.into()).into_iter().map(move |f| (u, f))
+        })
+        .map(|(update, frame)| (update, frame.region))
         .collect();
-    assert_eq!(turns, [0, 1, 2, 0, 1, 2]);
+    assert_eq!(turns, [(0, 0), (2, 1), (4, 2), (6, 0), (8, 1)]);
+    let light = lightmap(512, 2, 0);
+    let mut small = self::encoder(&light, LumelCoding::H264(qp(30)));
+    for update in 0..4 {
+        let frames = encode(&mut small, &lightmap(512, 2, update), update.into());
+        assert_eq!(frames.len(), 2, "update {update}");
+    }
 }
 
 /// What is lost or late is waited for, and a keyframe mends all.

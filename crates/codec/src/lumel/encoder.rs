@@ -25,11 +25,15 @@ enum Regions {
         encoders: Vec<PageEncoder>,
         /// The page whose turn is next.
         next: usize,
+        /// How many lumels may become pictures now.
+        room: usize,
     },
 }
 
-/// So many lumels become pictures in an update; further pages have their turn in those that follow.
-const LUMELS_AN_UPDATE: usize = 1 << 20;
+/// So many lumels become pictures in an update, so that large pages cost half the bits, at half the rate.
+const LUMELS_AN_UPDATE: usize = 1 << 19;
+/// Each page has its turn within so many updates, however many there are.
+const LONGEST_TURN: usize = 8;
 
 impl LumelEncoder {
     /// For lightmaps of a shape, whose coding is that of `coding`.
@@ -42,7 +46,9 @@ impl LumelEncoder {
             None => Regions::Tiles(shape.tiles().map(TileEncoder::new).collect()),
             Some((packing, qp)) => {
                 let encoder = |tile| PageEncoder::new(tile, packing, qp);
-                Regions::Pages { encoders: shape.tiles().map(encoder).collect(), next: 0 }
+                let encoders: Vec<PageEncoder> = shape.tiles().map(encoder).collect();
+                let [_, room] = rooms(&encoders);
+                Regions::Pages { encoders, next: 0, room }
             }
         };
         Self { shape, scale: ScaleRule::default(), regions }
@@ -98,25 +104,33 @@ impl LumelEncoder {
                     }
                 }
             }
-            Regions::Pages { encoders, next } => {
-                let mut room = LUMELS_AN_UPDATE;
+            Regions::Pages { encoders, next, room } => {
                 for _ in 0..encoders.len() {
                     let encoder = &mut encoders[*next];
                     let lumels = encoder.tile().lumel_count();
                     if !watched(encoder.tile().id) {
                         encoder.rest();
-                    } else if lumels <= room || room == LUMELS_AN_UPDATE {
-                        room = room.saturating_sub(lumels);
+                    } else if lumels <= *room {
+                        *room -= lumels;
                         frames.extend(encoder.encode(lightmap, info, scale_log2)?);
                     } else {
                         break;
                     }
                     *next = (*next + 1) % encoders.len();
                 }
+                let [more, most] = rooms(encoders);
+                *room = (*room + more).min(most);
             }
         }
         Ok(frames)
     }
+}
+
+/// How many lumels more may become pictures with each update, and how many at most.
+fn rooms(pages: &[PageEncoder]) -> [usize; 2] {
+    let lumels = || pages.iter().map(|page| page.tile().lumel_count());
+    let more = LUMELS_AN_UPDATE.max(lumels().sum::<usize>().div_ceil(LONGEST_TURN));
+    [more, more.max(lumels().max().unwrap_or(0))]
 }
 
 impl std::fmt::Debug for LumelEncoder {
