@@ -14,16 +14,22 @@ pub(crate) struct Handover {
     /// The newest layout.
     newest: Option<Arc<Layout>>,
     passing: BTreeMap<SurfaceId, Passing>,
-    /// When shares were looked at last.
+    /// When they were looked at last.
     seen: f64,
+}
+
+/// How much of a surface's light its lumels make where it has come so far from probes to lumels: slowly
+/// at both ends. Where a display's codes are dense, in the dark, an even passage would be seen to jump.
+pub fn shown_share(way: f32) -> f32 {
+    way * way * (3.0 - 2.0 * way)
 }
 
 /// A surface on its way.
 #[derive(Clone, Debug)]
 struct Passing {
     surface: Surface,
-    /// How much of its light its lumels make.
-    share: f64,
+    /// How far it has come from probes to lumels.
+    way: f64,
     /// Whether it gets lumels, or loses them.
     comes: bool,
 }
@@ -35,9 +41,9 @@ impl Handover {
         let step = (now - self.seen).max(0.0) / SECONDS;
         self.seen = now;
         for passing in self.passing.values_mut() {
-            passing.share += if passing.comes { step } else { -step };
+            passing.way += if passing.comes { step } else { -step };
         }
-        self.passing.retain(|_, passing| (0.0..1.0).contains(&passing.share));
+        self.passing.retain(|_, passing| (0.0..1.0).contains(&passing.way));
         if !self.newest.as_ref().is_some_and(|known| Arc::ptr_eq(known, newest)) {
             self.turn_to(newest);
         }
@@ -47,7 +53,8 @@ impl Handover {
         let leaving = self.passing.values().filter(|passing| !passing.comes);
         let leaving = leaving.map(|passing| passing.surface.clone());
         let surfaces = newest.surfaces().iter().cloned().chain(leaving).collect();
-        let shares = self.passing.iter().map(|(id, passing)| (*id, passing.share as f32));
+        let shares =
+            self.passing.iter().map(|(id, passing)| (*id, shown_share(passing.way as f32)));
         let layout = Layout::new(newest.page_size, newest.pages, surfaces);
         Arc::new(layout.with_shares(shares.collect()))
     }
@@ -74,11 +81,10 @@ impl Handover {
 
     /// Lets a surface come or leave, from where it is on its way.
     fn turn(&mut self, surface: &Surface, comes: bool) {
-        let share =
-            self.passing.get(&surface.id).map_or(if comes { 0.0 } else { 1.0 }, |p| p.share);
+        let way = self.passing.get(&surface.id).map_or(if comes { 0.0 } else { 1.0 }, |p| p.way);
         // 1 is no longer on its way.
-        let share = share.min(1.0 - 1e-6);
-        self.passing.insert(surface.id, Passing { surface: surface.clone(), share, comes });
+        let way = way.min(1.0 - 1e-6);
+        self.passing.insert(surface.id, Passing { surface: surface.clone(), way, comes });
     }
 }
 
@@ -116,15 +122,17 @@ mod tests {
         // It leaves, comes back half-way, and leaves again.
         assert_eq!(shares(&handover.show(&one, 8.0))[0], Some(1.0));
         let mut last = 1.0;
-        for frame in 1..=15 {
+        for frame in 1..=15u8 {
             let shown = handover.show(&one, 8.0 + f64::from(frame) / 60.0);
             let [Some(1.0), Some(share)] = shares(&shown) else { panic!("{:?}", shares(&shown)) };
-            assert!((last - share - 1.0 / 30.0).abs() < 1e-4, "{last}, then {share}");
+            let right = shown_share(1.0 - f32::from(frame) / 30.0);
+            assert!((share - right).abs() < 1e-4 && share < last, "{share} for {right}");
             last = share;
         }
+        assert!((last - 0.5).abs() < 1e-4, "half-way");
         let back = handover.show(&both, 8.25);
         assert!((back.share(id(2)) - last).abs() < 1e-4, "it turns where it is");
-        assert!((handover.show(&both, 8.35).share(id(2)) - 0.7).abs() < 1e-3);
+        assert!((handover.show(&both, 8.35).share(id(2)) - shown_share(0.7)).abs() < 1e-3);
         assert!(Arc::ptr_eq(&handover.show(&both, 8.6), &both));
         handover.show(&one, 9.0);
         assert_eq!(shares(&handover.show(&one, 9.51)), [Some(1.0), None]);

@@ -2,10 +2,18 @@
 const PASSAGE = 500;
 
 /**
- * How much of a surface's light its lumels make, so many milliseconds later on its way to all or nothing.
+ * How far a surface has come on its way from probes to lumels, so many milliseconds later.
  * Twin: crates/cache/src/handover.rs.
  */
 export function laterShare(share: number, comes: boolean, milliseconds: number): number {
   const step = Math.max(milliseconds, 0) / PASSAGE;
   return comes ? Math.min(share + step, 1) : Math.max(share - step, 0);
+}
+
+/**
+ * How much of a surface's light its lumels make where it has come so far: slowly at both ends. Where a
+ * display's codes are dense, in the dark, an even passage would be seen to jump.
+ */
+export function shownShare(share: number): number {
+  return share * share * (3 - 2 * share);
 }

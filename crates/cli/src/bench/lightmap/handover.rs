@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, ensure};
 use glam::Vec3;
+use lumencast_cache::shown_share;
 use lumencast_gather::path_trace::CpuPathTracer;
 use lumencast_light::{Field, FieldId, Layout, Light, Lightmap};
 use lumencast_picture::Picture;
@@ -98,8 +99,9 @@ impl Handover {
     }
 }
 
-/// A layout all of whose surfaces have so much of their light from lumels.
-fn passing(layout: &Layout, share: f32) -> Arc<Layout> {
+/// A layout all of whose surfaces have come so far from probes to lumels.
+fn passing(layout: &Layout, way: f32) -> Arc<Layout> {
+    let share = shown_share(way);
     let shares = layout.surfaces().iter().map(|surface| (surface.id, share)).collect();
     Arc::new(layout.clone().with_shares(shares))
 }
