@@ -11,12 +11,12 @@
 
 use glam::{IVec2, Vec3};
 
+use super::filter::STRETCH;
 use super::point::Point;
 
 /// A glance tells of lumels so far off on the page, or a little less far: no farther than the next cell.
 const REACH: f32 = 10.0;
-/// It tells next to nothing of a lumel that is more than so many times as far in the world as on the page.
-const STRETCH: f32 = 1.5;
+/// What it weighs for a lumel of another surface: next to nothing.
 const ELSEWHERE: f32 = 1e-4;
 /// Power of the cosine between normals.
 const NORMAL_POWER: i32 = 8;

@@ -18,8 +18,8 @@ pub(crate) const REACH: u32 = 16;
 const KERNEL: [f32; 5] = [1.0 / 16.0, 1.0 / 4.0, 3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 /// Standard deviations by which light may differ.
 const DEVIATIONS: f32 = 2.0;
-/// A neighbour is at most so many times as far as it is on the page.
-const STRETCH: f32 = 1.5;
+/// A neighbour on the surface is at most so many times as far in the world as on the page.
+pub(crate) const STRETCH: f32 = 1.5;
 
 /// A lumel that is filtered. One that nothing is known of has an infinite variance: it takes the light
 /// of those about it, and gives none.
