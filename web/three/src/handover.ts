@@ -5,15 +5,15 @@ const PASSAGE = 500;
  * How far a surface has come on its way from probes to lumels, so many milliseconds later.
  * Twin: crates/cache/src/handover.rs.
  */
-export function laterShare(share: number, comes: boolean, milliseconds: number): number {
+export function laterWay(way: number, comes: boolean, milliseconds: number): number {
   const step = Math.max(milliseconds, 0) / PASSAGE;
-  return comes ? Math.min(share + step, 1) : Math.max(share - step, 0);
+  return comes ? Math.min(way + step, 1) : Math.max(way - step, 0);
 }
 
 /**
  * How much of a surface's light its lumels make where it has come so far: slowly at both ends. Where a
  * display's codes are dense, in the dark, an even passage would be seen to jump.
  */
-export function shownShare(share: number): number {
-  return share * share * (3 - 2 * share);
+export function shownShare(way: number): number {
+  return way * way * (3 - 2 * way);
 }

@@ -12,7 +12,7 @@ import {
   withoutCharts,
 } from './charted.js';
 import type { Content } from './content.js';
-import { laterShare, shownShare } from './handover.js';
+import { laterWay, shownShare } from './handover.js';
 import { type Copies, lumelsOfCopies } from './lumel-copies.js';
 import { isSame, type Placed, type PlacedLayout, type Wanted, wantedBy } from './lumel-wanted.js';
 import { materialsOf } from './patch.js';
@@ -35,8 +35,8 @@ interface Lit {
   readonly kept: Kept;
   /** Where the mesh stood when it got its lumels: elsewhere they do not show its light. */
   readonly worldFromObject: Matrix4;
-  /** How much of its light lumels make. At 0 it shows its own geometry. */
-  share: number;
+  /** How far it has come from probes to lumels. At 0 it shows its own geometry. */
+  way: number;
   /** Whether that grows, or falls. */
   comes: boolean;
 }
@@ -60,7 +60,7 @@ export class LumelSurfaces {
   #wanted: ReadonlyMap<string, Wanted> = new Map();
   readonly #lit = new Map<string, Lit>();
   readonly #lumelsOf = new WeakMap<Mesh, Lit>();
-  /** Those whose geometry is to be made, and the share of lumels that those begin with that have none. */
+  /** Those whose geometry is to be made, and how far on their way those begin that have none. */
   readonly #waiting = new Map<string, number>();
   /** Those whose mesh is not here yet. */
   readonly #missing = new Set<string>();
@@ -87,7 +87,7 @@ export class LumelSurfaces {
   setLayouts(layouts: readonly PlacedLayout[]): void {
     const former = this.#wanted;
     this.#wanted = wantedBy(layouts);
-    const share = this.#hasLayouts ? 0 : 1;
+    const way = this.#hasLayouts ? 0 : 1;
     this.#hasLayouts ||= layouts.length > 0;
     for (const keys of [this.#waiting, this.#missing]) {
       for (const key of keys.keys()) if (!this.#wanted.has(key)) keys.delete(key);
@@ -97,7 +97,7 @@ export class LumelSurfaces {
       // It rests again, wherever it was before.
       if (lit && !former.has(key)) place(lit);
       const known = lit?.wanted ?? former.get(key);
-      if (!known || !isSame(wanted, known)) this.#waiting.set(key, this.#waiting.get(key) ?? share);
+      if (!known || !isSame(wanted, known)) this.#waiting.set(key, this.#waiting.get(key) ?? way);
     }
   }
 
@@ -119,7 +119,7 @@ export class LumelSurfaces {
     const elapsed = now - this.#updatedAt;
     this.#updatedAt = now;
     if (this.#wanted.size === 0 && this.#lit.size === 0) return;
-    for (const lit of this.#lit.values()) lit.share = laterShare(lit.share, lit.comes, elapsed);
+    for (const lit of this.#lit.values()) lit.way = laterWay(lit.way, lit.comes, elapsed);
     if (elapsed > GAP) for (const lit of this.#lit.values()) place(lit);
     if (revision !== this.#revision) {
       this.#revision = revision;
@@ -135,14 +135,14 @@ export class LumelSurfaces {
   #make(budget: number): void {
     if (this.#waiting.size === 0) return;
     const end = performance.now() + budget;
-    for (const [key, share] of this.#waiting) {
+    for (const [key, way] of this.#waiting) {
       this.#waiting.delete(key);
-      if (this.#light(key, this.#wanted.get(key)!, share) && performance.now() >= end) return;
+      if (this.#light(key, this.#wanted.get(key)!, way) && performance.now() >= end) return;
     }
   }
 
-  /** Gives a mesh its lumels, with a share if it has none yet; whether a geometry had to be made. */
-  #light(key: string, wanted: Wanted, firstShare: number): boolean {
+  /** Gives a mesh its lumels, so far on its way if it has none yet; whether a geometry had to be made. */
+  #light(key: string, wanted: Wanted, firstWay: number): boolean {
     const before = this.#lit.get(key);
     const mesh = this.#meshOf(wanted);
     if (before) this.#release(key, before);
@@ -163,10 +163,10 @@ export class LumelSurfaces {
     kept.users++;
     const lumels = lumelsAttribute(kept.parted, of.sides, of.corners);
     const known = before?.mesh === mesh ? before : undefined;
-    const share = known?.share ?? firstShare;
-    const charted = chartedGeometry(original, kept.parted, lumels, shownShare(share), of.each);
+    const way = known?.way ?? firstWay;
+    const charted = chartedGeometry(original, kept.parted, lumels, shownShare(way), of.each);
     const worldFromObject = new Matrix4();
-    const lit = { wanted, mesh, original, charted, kept, worldFromObject, share, comes: true };
+    const lit = { wanted, mesh, original, charted, kept, worldFromObject, way, comes: true };
     if (known) worldFromObject.copy(known.worldFromObject);
     else place(lit);
     this.#lit.set(key, lit);
@@ -192,13 +192,13 @@ export class LumelSurfaces {
 
   /** Lumels show a mesh's light only where they were gathered at. */
   #follow(key: string, lit: Lit): void {
-    const { mesh, original, charted, share, worldFromObject } = lit;
+    const { mesh, original, charted, way, worldFromObject } = lit;
     if (mesh.geometry !== original && mesh.geometry !== charted) return this.#leave(key, lit);
     const isWanted = this.#wanted.has(key);
     lit.comes = isWanted && isSamePlace(mesh.matrixWorld, worldFromObject);
-    if (share === 0 && !isWanted) return this.#release(key, lit);
-    mesh.geometry = share > 0 || lit.comes ? charted : original;
-    setLumelShare(charted, shownShare(share));
+    if (way === 0 && !isWanted) return this.#release(key, lit);
+    mesh.geometry = way > 0 || lit.comes ? charted : original;
+    setLumelShare(charted, shownShare(way));
   }
 
   /** A copy that the program has made of a mesh with lumels has none of its own. */
