@@ -35,8 +35,8 @@ pub struct Job {
     /// Asks for [`crate::SumsAt::surfaces`].
     pub surfaces: bool,
     /// Rotates the lattice of directions and seeds the sampler; each tick takes another seed.
-    /// Results depend on it and on the receivers' indices, but where a budget has a seed of its
-    /// own. They do not depend on which other receivers a job has, nor on the number of threads.
+    /// Results depend on it and on the receivers' indices, but where [`Draws`] say otherwise. They
+    /// do not depend on which other receivers a job has, nor on the number of threads.
     pub seed: u64,
 }
 
@@ -45,7 +45,7 @@ impl Job {
     /// [`Job::with_budgets`].
     pub fn new(scene: Arc<Snapshot>, receivers: impl Into<Arc<[Receiver]>>, samples: u32) -> Self {
         let receivers = receivers.into();
-        let budget = |receiver| Budget { receiver, samples, seed: None };
+        let budget = |receiver| Budget { receiver, samples, draws: Draws::Own };
         let budgets = (0..receivers.len() as u32).map(budget).collect();
         Self::with_budgets(scene, receivers, budgets)
     }
@@ -79,14 +79,37 @@ impl Job {
 /// The number of samples that a receiver takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
-    /// Index into [`Job::receivers`]. A receiver draws the same samples whatever other budgets a
-    /// job has.
+    /// Index into [`Job::receivers`].
     pub receiver: u32,
     /// Number of directions to sample; with 0 the sums are empty.
     pub samples: u32,
-    /// A seed of its own in place of the job's. With it, a receiver draws the same samples in all jobs
-    /// and at all indices: what it finds differs by what has changed in the scene alone.
-    pub seed: Option<u64>,
+    /// The random numbers of its samples.
+    pub draws: Draws,
+}
+
+/// The random numbers that a receiver's samples draw. All are Owen-scrambled Sobol sequences.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Draws {
+    /// A sequence of its own, chosen by the job's seed and the receiver's index.
+    #[default]
+    Own,
+    /// A part of a sequence that receivers share, chosen by the job's seed. Receivers that draw parts
+    /// beside each other are well sampled together: of a mean over them, more noise goes than they
+    /// have alike (Ahmed and Wonka 2020, "Screen-space blue-noise diffusion of Monte Carlo sampling
+    /// error via hierarchical ordering of pixels").
+    Shared {
+        /// Number of the sequence.
+        sequence: u32,
+        /// Index of the receiver's first sample.
+        first: u32,
+    },
+    /// The same numbers in all jobs: what a lumel finds differs by what has changed in the scene alone.
+    Same {
+        /// Number of the sequence.
+        sequence: u32,
+        /// Index of the receiver's first sample.
+        first: u32,
+    },
 }
 
 /// A place that light arrives at.

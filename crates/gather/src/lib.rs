@@ -19,6 +19,6 @@ mod surface;
 mod world;
 
 pub use gatherer::{Gather, Gathered, Progress, Ticket};
-pub use job::{Budget, Job, Receiver, Shading};
+pub use job::{Budget, Draws, Job, Receiver, Shading};
 pub use sums::{Sums, SumsAt, SurfacePoint};
 pub use surface::shading_normal;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_gather::{Budget, Gather, Job, Receiver, Shading, Sums, SumsAt};
+use lumencast_gather::{Budget, Draws, Gather, Job, Receiver, Shading, Sums, SumsAt};
 use lumencast_light::{FieldId, Grid, Light, Order, Place, ProbeVolume, slope_by};
 use lumencast_scene::{Environment, LightKind, Material, PunctualLight, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
@@ -60,7 +60,7 @@ fn neighbours_change_nothing() {
     let receivers: Arc<[Receiver]> = (0..counts.len() as u8).map(receiver).collect();
     let budgets: Vec<Budget> = (0..)
         .zip(counts)
-        .map(|(receiver, samples)| Budget { receiver, samples, seed: None })
+        .map(|(receiver, samples)| Budget { receiver, samples, draws: Draws::Own })
         .collect();
     let job = |budgets: &[Budget]| {
         let job = Job::with_budgets(scene.clone(), receivers.clone(), budgets.to_vec());

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{IVec3, Vec3};
-use lumencast_gather::{Budget, Job, Receiver, Sums, SumsAt, SurfacePoint};
+use lumencast_gather::{Budget, Draws, Job, Receiver, Sums, SumsAt, SurfacePoint};
 use lumencast_light::{Grid, Place};
 use lumencast_scene::Snapshot;
 
@@ -107,7 +107,7 @@ impl Surfaces {
         (turn..around.points().len())
             .step_by(turns as usize)
             .filter(|point| around.counts(*point))
-            .map(move |point| Budget { receiver: point as u32, samples: each, seed: None })
+            .map(move |point| Budget { receiver: point as u32, samples: each, draws: Draws::Own })
     }
 
     /// The scene was edited: light may be another from now on.

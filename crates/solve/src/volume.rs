@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumencast_gather::{Budget, Gathered, Job, Receiver};
+use lumencast_gather::{Budget, Draws, Gathered, Job, Receiver};
 use lumencast_light::{FieldId, Light, Place, ProbeVolume};
 use lumencast_scene::{Snapshot, VolumeSpec};
 
@@ -105,7 +105,7 @@ impl VolumeSolver {
     /// What to gather for every probe and, where they are fitted, for the surfaces about them.
     pub(crate) fn job(&mut self, scene: Arc<Snapshot>, samples: u32) -> Job {
         let probes = self.probe_count() as u32;
-        let at_probes = (0..probes).map(|receiver| Budget { receiver, samples, seed: None });
+        let at_probes = (0..probes).map(|receiver| Budget { receiver, samples, draws: Draws::Own });
         let at_points = self.surfaces.iter_mut().flat_map(|surfaces| surfaces.budgets(samples));
         let at_points = at_points.map(|b| Budget { receiver: probes + b.receiver, ..b });
         let budgets = at_probes.chain(at_points).collect();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{Quat, UVec3, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
-use lumencast_gather::{Budget, Gather, Job, Receiver, Sums, SumsAt};
+use lumencast_gather::{Budget, Draws, Gather, Job, Receiver, Sums, SumsAt};
 use lumencast_light::{FieldId, Grid, Light, Offset, Order, ProbeVolume};
 use lumencast_scene::{Environment, LightKind, Material, PunctualLight, Snapshot};
 use lumencast_solve::fit::{FitSettings, Part, Surroundings, fit};
@@ -41,7 +41,7 @@ fn known(scene: &Arc<Snapshot>, around: &Surroundings, bounces: u32) -> Vec<Opti
     let receivers: Vec<Receiver> = around.receivers().collect();
     let counting = (0..receivers.len() as u32).filter(|point| around.counts(*point as usize));
     let budgets: Vec<Budget> =
-        counting.map(|receiver| Budget { receiver, samples: 256, seed: None }).collect();
+        counting.map(|receiver| Budget { receiver, samples: 256, draws: Draws::Own }).collect();
     let job = Job::with_budgets(scene.clone(), receivers, budgets.clone());
     let lit = gather(Job { bounces, ..job });
     let mut known = vec![None; around.points().len()];

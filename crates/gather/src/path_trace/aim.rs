@@ -15,7 +15,7 @@ use crate::bsdf::frame;
 use crate::sampling::{Sampler, cosine_hemisphere, lattice, power_heuristic, tilted_hemisphere};
 use crate::surface::gamma;
 use crate::world::{Passing, World};
-use crate::{Budget, Job, Receiver, Shading};
+use crate::{Budget, Draws, Job, Receiver, Shading};
 
 /// Distance of samples' origins from the surface, as a share of the lumel's size.
 const LIFT: f32 = 1e-3;
@@ -24,10 +24,37 @@ const LIFT: f32 = 1e-3;
 pub(super) struct Aim {
     place: Prepared,
     samples: u32,
-    seed: u64,
-    receiver: u32,
+    draws: Sequence,
     /// Whether there are sources to reach for.
     reaches: bool,
+}
+
+/// The random numbers of a receiver's samples.
+struct Sequence {
+    seed: u64,
+    number: u32,
+    /// Index of the first sample.
+    first: u32,
+}
+
+impl Sequence {
+    fn new(job: &Job, Budget { receiver, draws, .. }: Budget) -> Self {
+        /// Keeps sequences that receivers share apart from their own.
+        const SHARED: u64 = 0x0f_5e9e_4ce5;
+        /// In place of a job's seed.
+        const SAME: u64 = 0x5a3e;
+        let (seed, number, first) = match draws {
+            Draws::Own => (job.seed, receiver, 0),
+            Draws::Shared { sequence, first } => (job.seed ^ SHARED, sequence, first),
+            Draws::Same { sequence, first } => (SAME, sequence, first),
+        };
+        Self { seed, number, first }
+    }
+
+    /// The numbers of a sample; `apart` ones have nothing in common with others.
+    fn sampler(&self, sample: u32, apart: u64) -> Sampler {
+        Sampler::new(self.seed ^ apart, self.number, self.first.wrapping_add(sample))
+    }
 }
 
 /// A source that a sample reaches for.
@@ -60,13 +87,13 @@ impl Aim {
     /// Surfaces are known to some ulps of their largest coordinate, receivers to an ulp of their
     /// world position.
     pub(super) fn new(job: &Job, budget: Budget, world: &World) -> Self {
-        let Budget { receiver, samples, seed } = budget;
+        let Budget { receiver, samples, .. } = budget;
+        let draws = Sequence::new(job, budget);
         let (extent, origin) = (world.extent(), world.origin());
         let asked = job.receivers[receiver as usize];
-        let (seed, receiver) = seed.map_or((job.seed, receiver), |own| (own, 0));
         let place = match asked {
             Receiver::Probe { position } => {
-                let (position, turn) = (position - origin, lattice::turn(seed, receiver));
+                let (position, turn) = (position - origin, lattice::turn(draws.seed, draws.number));
                 Prepared::Probe { order: job.order, position, turn }
             }
             Receiver::Lumel { position, normal, footprint, shading } => {
@@ -84,11 +111,11 @@ impl Aim {
                 }
             }
         };
-        Self { place, samples, seed, receiver, reaches: world.lights.are_sampled() }
+        Self { place, samples, draws, reaches: world.lights.are_sampled() }
     }
 
     pub(super) fn look(&self, sample: u32) -> Look {
-        let mut sampler = Sampler::new(self.seed, self.receiver, sample);
+        let mut sampler = self.draws.sampler(sample, 0);
         let (origin, direction) = match &self.place {
             Prepared::Probe { position, turn, .. } => (*position, self.towards(turn, sample)),
             Prepared::Lumel { position, footprint: [a, b], frame, shading } => {
@@ -113,7 +140,7 @@ impl Aim {
             return None;
         }
         let origin = self.look(sample).origin;
-        let mut sampler = Sampler::new(self.seed ^ APART, self.receiver, sample);
+        let mut sampler = self.draws.sampler(sample, APART);
         let source = world.source(origin, sampler.number(), sampler.square())?;
         let weight = power_heuristic(source.pdf, self.density(source.ray.direction)) / source.pdf;
         let light = source.radiance * weight;

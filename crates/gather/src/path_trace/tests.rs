@@ -13,8 +13,8 @@ use super::group::LOST;
 use super::integrator::Integrator;
 use super::paths::{Look, Paths};
 use super::*;
-use crate::sampling::Sampler;
-use crate::{Budget, Receiver};
+use crate::sampling::{Sampler, luminance};
+use crate::{Budget, Draws, Receiver};
 
 const BLACK: Vec3 = Vec3::ZERO;
 
@@ -272,7 +272,7 @@ fn shading_normals_make_no_light() {
 fn job(scene: &Arc<Snapshot>, seed: u64) -> Job {
     let probe = |k: u8| Receiver::probe(Vec3::new(0.1 * f32::from(k), 0.5, 0.0));
     let receivers: Vec<_> = (0..9).map(probe).collect();
-    let budget = |receiver| Budget { receiver, samples: 1 + 40 * receiver, seed: None };
+    let budget = |receiver| Budget { receiver, samples: 1 + 40 * receiver, draws: Draws::Own };
     let job = Job::with_budgets(scene.clone(), receivers, (0..9).map(budget).collect());
     Job { order: Order::L3, bounces: 2, seed, ..job }
 }
@@ -414,24 +414,62 @@ fn a_subset_draws_the_samples_of_the_whole() {
     assert_ne!(gather(vec![other]).at(0), found.at(1), "another place");
 }
 
-/// A budget with a seed of its own draws the same samples in every job, at every index.
+/// A budget that always draws the same does so in every job, at every index.
 #[test]
-fn seeds_of_budgets_outlast_jobs() {
+fn the_same_draws_outlast_jobs() {
     let scene = lit_room();
-    let place = Receiver::probe(Vec3::new(0.3, 0.5, 0.0));
-    let gather = |receivers: Vec<Receiver>, own: Option<u64>, seed: u64| {
+    let place = Receiver::point(Vec3::new(0.3, 0.5, 0.0), Vec3::Y);
+    let gather = |receivers: Vec<Receiver>, draws: Draws, seed: u64| {
         let last = receivers.len() as u32 - 1;
-        let budgets = vec![Budget { receiver: last, samples: 100, seed: own }];
+        let budgets = vec![Budget { receiver: last, samples: 100, draws }];
         let job = Job { seed, ..Job::with_budgets(scene.clone(), receivers, budgets) };
         let mut tracer = tracer(2);
         let ticket = tracer.submit(job);
         tracer.wait(ticket).unwrap().sums
     };
     let elsewhere = Receiver::probe(Vec3::ZERO);
-    let found = gather(vec![place], Some(3), 1);
-    assert_eq!(found, gather(vec![elsewhere, place], Some(3), 2));
-    assert_ne!(found, gather(vec![place], Some(4), 1), "another seed");
-    assert_ne!(found, gather(vec![place], None, 1), "the job's");
+    let same = |sequence, first| Draws::Same { sequence, first };
+    let found = gather(vec![place], same(3, 0), 1);
+    assert_eq!(found, gather(vec![elsewhere, place], same(3, 0), 2));
+    assert_ne!(found, gather(vec![place], same(4, 0), 1), "another sequence");
+    assert_ne!(found, gather(vec![place], same(3, 100), 1), "another part");
+    assert_ne!(found, gather(vec![place], Draws::Own, 1), "the job's");
+}
+
+/// Parts of a shared sequence leave less noise in a mean over receivers than sequences of their own;
+/// what a receiver finds alone is as noisy.
+#[test]
+fn receivers_that_share_a_sequence_are_sampled_well_together() {
+    let scene = lit_room();
+    let receivers = vec![Receiver::point(Vec3::new(0.3, 0.5, 0.0), Vec3::Y); 64];
+    let samples = 4;
+    let deviations = |shares: bool| {
+        let budget = |receiver| {
+            let draws = Draws::Shared { sequence: 5, first: samples * receiver };
+            Budget { receiver, samples, draws: if shares { draws } else { Draws::Own } }
+        };
+        let budgets: Vec<Budget> = (0..64).map(budget).collect();
+        let mut tracer = tracer(2);
+        let mut found = Vec::new();
+        for seed in 0..32 {
+            let job = Job::with_budgets(scene.clone(), receivers.clone(), budgets.clone());
+            let ticket = tracer.submit(Job { seed, bounces: 1, ..job });
+            let sums = tracer.wait(ticket).unwrap().sums;
+            found.push(sums.iter().map(|s| luminance(s.sum[0]) / s.count as f32).collect());
+        }
+        let alone = deviation(found.iter().map(|all: &Vec<f32>| all[7]));
+        (alone, deviation(found.iter().map(|all| all.iter().sum::<f32>() / 64.0)))
+    };
+    let (own, shared) = (deviations(false), deviations(true));
+    assert!(shared.1 < 0.5 * own.1, "{own:?}, {shared:?}");
+    assert!((0.5..2.0).contains(&(shared.0 / own.0)), "{own:?}, {shared:?}");
+}
+
+/// Standard deviation.
+fn deviation(values: impl Iterator<Item = f32> + Clone) -> f32 {
+    let count = values.clone().count() as f32;
+    let mean = values.clone().sum::<f32>() / count;
+    (values.map(|value| (value - mean).powi(2)).sum::<f32>() / count).sqrt()
 }
 
 #[test]

@@ -16,6 +16,7 @@ use std::ops::Range;
 use glam::{IVec2, UVec2, Vec3};
 use lumencast_gather::Budget;
 
+use super::draws::Part;
 use super::places::LumelPlace;
 
 /// Lumels a side of a cell.
@@ -105,6 +106,7 @@ impl Block {
 /// The cells of all pages, and whose turn it is.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cells {
+    page_size: u32,
     /// Block by block.
     cells: Vec<Cell>,
     /// Cells whose light is changing, for so many more glances that find no change.
@@ -157,7 +159,7 @@ impl Cells {
         };
         let places: Vec<(u32, IVec2)> = cells.iter().map(place).collect();
         let cell_at = places.iter().copied().zip(0..).collect();
-        Self { first: cells.len(), cells, blocks, places, cell_at, ..Self::default() }
+        Self { page_size, first: cells.len(), cells, blocks, places, cell_at, ..Self::default() }
     }
 
     /// Light may be another: all cells get a glance before any has its turn. Those that wait for
@@ -238,32 +240,35 @@ impl Cells {
     pub(crate) fn budgets(&mut self, samples: u64, version: u64, lumels: &[u32]) -> Vec<Budget> {
         let mut budgets = Vec::new();
         let (mut glances, mut calm, mut turns) = (0, 0, 0);
+        if !self.hurried.is_empty() {
+            self.turns += 1;
+        }
         while turns < samples
             && let Some(cell) = self.hurried.pop_front()
         {
             let receivers = self.cells[cell].receivers.clone();
-            turns += taken(&mut budgets, receivers, HURRIED_SAMPLES, |_| None);
+            let part = Part { spacing: 1, samples: HURRIED_SAMPLES };
+            turns += self.take(receivers, part, Some(self.turns), lumels, &mut budgets);
         }
-        let same = |receiver: u32| Some(u64::from(lumels[receiver as usize]));
         while glances + calm + turns < samples && !self.cells.is_empty() {
             if self.first > 0 {
                 self.first -= 1;
                 match self.next_glance(version) {
-                    Some(cell) => {
-                        glances += taken(&mut budgets, self.glanced(cell), GLANCE_SAMPLES, same)
-                    }
+                    Some(cell) => glances += self.glance_at(cell, lumels, &mut budgets),
                     None => self.first = 0,
                 }
             } else if CHANGES * glances <= turns
                 && let Some(cell) = self.next_changing(version)
             {
-                glances += taken(&mut budgets, self.glanced(cell), GLANCE_SAMPLES, same);
+                glances += self.glance_at(cell, lumels, &mut budgets);
             } else if CALM * calm <= turns
                 && let Some(cell) = self.next_glance(version)
             {
-                calm += taken(&mut budgets, self.glanced(cell), GLANCE_SAMPLES, same);
+                calm += self.glance_at(cell, lumels, &mut budgets);
             } else if let Some(receivers) = self.next_turn() {
-                turns += taken(&mut budgets, receivers, TURN_SAMPLES, |_| None);
+                let spacing = if self.is_one_of_first { FIRST } else { 1 };
+                let part = Part { spacing, samples: TURN_SAMPLES };
+                turns += self.take(receivers, part, Some(self.turns), lumels, &mut budgets);
             }
             // However many samples there are, a job asks for no more than all lumels.
             if budgets.len() >= self.receivers() {
@@ -271,6 +276,34 @@ impl Cells {
             }
         }
         budgets
+    }
+
+    /// Lets receivers take their part of samples, in a turn or, without one, in a glance. Counts the
+    /// samples.
+    fn take(
+        &self,
+        receivers: Range<u32>,
+        part: Part,
+        turn: Option<u64>,
+        lumels: &[u32],
+        budgets: &mut Vec<Budget>,
+    ) -> u64 {
+        let count = u64::from(receivers.end - receivers.start);
+        budgets.extend(receivers.map(|receiver| {
+            let lumel = lumels[receiver as usize];
+            let draws = match turn {
+                Some(turn) => part.of_turn(turn, lumel, self.page_size),
+                None => part.of_glance(lumel, self.page_size),
+            };
+            Budget { receiver, samples: part.samples, draws }
+        }));
+        count * u64::from(part.samples)
+    }
+
+    /// The same for a glance at a cell.
+    fn glance_at(&self, cell: usize, lumels: &[u32], budgets: &mut Vec<Budget>) -> u64 {
+        let part = Part { spacing: GLANCE, samples: GLANCE_SAMPLES };
+        self.take(self.glanced(cell), part, None, lumels, budgets)
     }
 
     /// The next cell that had no glance at this version of the scene.
@@ -330,18 +363,6 @@ impl Cells {
     }
 }
 
-/// Adds receivers of so many samples each to what is gathered, and counts the samples.
-fn taken(
-    budgets: &mut Vec<Budget>,
-    receivers: Range<u32>,
-    samples: u32,
-    seed: impl Fn(u32) -> Option<u64>,
-) -> u64 {
-    let count = u64::from(receivers.end - receivers.start);
-    budgets.extend(receivers.map(|receiver| Budget { receiver, samples, seed: seed(receiver) }));
-    count * u64::from(samples)
-}
-
 /// The page of a lumel, and its place there.
 pub(crate) fn on_page(lumel: u32, page_size: u32) -> (u32, UVec2) {
     let (page, at) = (lumel / (page_size * page_size), lumel % (page_size * page_size));
@@ -385,6 +406,7 @@ fn main_direction(direction: Vec3) -> (usize, bool) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::draws::is_glance;
     use super::*;
 
     const PAGE: u32 = 128;
@@ -412,7 +434,7 @@ mod tests {
     /// Share of samples that glances take.
     fn share(budgets: &[Budget]) -> f32 {
         let samples = |b: &Budget| u64::from(b.samples);
-        let of_glances = budgets.iter().filter(|b| b.seed.is_some()).map(samples).sum::<u64>();
+        let of_glances = budgets.iter().filter(|b| is_glance(b)).map(samples).sum::<u64>();
         of_glances as f32 / budgets.iter().map(samples).sum::<u64>() as f32
     }
 
@@ -449,7 +471,7 @@ mod tests {
         let all = all(&places);
         let samples = u64::from(PAGE * PAGE);
         let cells_of = |cells: &Cells, budgets: &[Budget]| -> BTreeSet<usize> {
-            let glances = budgets.iter().filter(|b| b.seed.is_some());
+            let glances = budgets.iter().filter(|b| is_glance(b));
             glances.map(|b| cells.cell_of(b.receiver)).collect()
         };
         let coarse = cells.budgets(samples, 1, &all);
@@ -481,15 +503,16 @@ mod tests {
     fn glances_take_the_same_samples() {
         let (places, mut cells) = cells();
         let all = all(&places);
-        let mut seeds = HashMap::new();
+        let mut seen = HashMap::new();
         for version in 1..20 {
             cells.expect_change();
             for budget in cells.budgets(u64::from(PAGE * PAGE), version, &all) {
-                let known = seeds.entry(budget.receiver).or_insert(budget.seed);
-                assert_eq!(budget.seed, *known);
+                let known = seen.entry(budget.receiver).or_insert(budget.draws);
+                assert_eq!(budget.draws, *known);
             }
         }
-        assert_eq!(seeds.values().collect::<HashSet<_>>().len(), seeds.len());
+        let others: HashSet<String> = seen.values().map(|draws| format!("{draws:?}")).collect();
+        assert_eq!(others.len(), seen.len());
     }
 
     #[test]

@@ -4,6 +4,7 @@ mod backs;
 mod beyond;
 mod cells;
 mod change;
+mod draws;
 mod fill;
 mod filter;
 mod glances;
@@ -23,13 +24,14 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
 use lumencast_charts::LaidOut;
-use lumencast_gather::{Budget, Job, Receiver, Shading};
+use lumencast_gather::{Budget, Draws, Job, Receiver, Shading};
 use lumencast_light::{Field, FieldId, Layout, Light, Lightmap, Surface};
 use lumencast_scene::Snapshot;
 
 use crate::blend::BlendSettings;
 pub use backs::with_backs;
 use cells::{Block, Cells};
+use draws::Part;
 use glances::Glances;
 use places::{LumelPlace, lumel_places};
 use point::Point;
@@ -178,7 +180,13 @@ impl LightmapSolver {
     pub fn job(&self, scene: Arc<Snapshot>, samples: u32) -> Job {
         let receivers: Vec<Receiver> =
             self.points.iter().map(|point| self.receiver(point)).collect();
-        Job::new(scene, receivers, samples)
+        let part = Part { spacing: 1, samples };
+        let budget = |(lumel, receiver): (&u32, u32)| {
+            let draws = part.of_page(*lumel, self.layout.page_size);
+            Budget { receiver, samples, draws }
+        };
+        let budgets = self.lumels.iter().zip(0..).map(budget).collect();
+        Job::with_budgets(scene, receivers, budgets)
     }
 
     /// What to gather next where light is live: about so many samples in all, of those lumels whose turn
@@ -188,7 +196,7 @@ impl LightmapSolver {
         self.in_turns = true;
         let mut budgets = self.cells.budgets(samples, scene.version, &self.lumels);
         if self.settings.significance.is_infinite() {
-            budgets.iter_mut().for_each(|budget| budget.seed = None);
+            budgets.iter_mut().for_each(|budget| budget.draws = Draws::Own);
         }
         let point = |budget: &Budget| self.receiver(&self.points[budget.receiver as usize]);
         let receivers: Vec<Receiver> = budgets.iter().map(point).collect();

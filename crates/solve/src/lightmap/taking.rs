@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::LightmapSolver;
 use super::cells::{Block, on_page};
 use super::change::{Change, Glanced};
+use super::draws::is_glance;
 use super::point::Point;
 use super::slopes;
 use super::sums::{Sum, noise};
@@ -30,7 +31,7 @@ impl LightmapSolver {
         let mut changes = HashMap::new();
         let mut samples = Vec::new();
         for (budget, new, found) in &found {
-            let is_glance = budget.seed.is_some();
+            let is_glance = is_glance(budget);
             match is_glance.then(|| self.glances.look(budget.receiver, new.mean())).flatten() {
                 Some(change) => drop(changes.insert(budget.receiver, change)),
                 None => samples.push((budget.receiver, new, slopes::sum_of(found))),
