@@ -16,9 +16,11 @@ pub mod reference;
 mod sampling;
 mod sums;
 mod surface;
+mod vectors;
 mod world;
 
 pub use gatherer::{Gather, Gathered, Progress, Ticket};
 pub use job::{Budget, Draws, Job, Receiver, Shading};
 pub use sums::{Sums, SumsAt, SurfacePoint};
 pub use surface::shading_normal;
+pub use vectors::by_vectors;

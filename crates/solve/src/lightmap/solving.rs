@@ -43,7 +43,7 @@ impl LightmapSolver {
         }
         let seams = self.seams.about(|lumel| news.binary_search(&Block::of(lumel, size)).is_ok());
         let of = |lumel: &u32| self.known(beyond::own(self.receiver_of[*lumel as usize])?);
-        let is_known = |lumel: &u32| of(lumel).is_some_and(|l| l.variance < f32::INFINITY);
+        let is_known = |lumel: &u32| of(lumel).is_some_and(|lumel| lumel.is_known());
         let known: Vec<bool> = seams.lumels().iter().map(is_known).collect();
         seams.apply(&mut shown.irradiance, &known);
         if let Some(slopes) = &mut shown.slopes {
@@ -82,9 +82,7 @@ impl LightmapSolver {
         let known: Vec<Option<Noisy>> = entries
             .iter()
             .zip(window)
-            .map(|(entry, lumel)| {
-                beyond::own(*entry).and(lumel).filter(|lumel| lumel.variance < f32::INFINITY)
-            })
+            .map(|(entry, lumel)| beyond::own(*entry).and(lumel).filter(Noisy::is_known))
             .collect();
         let filled = |of: &dyn Fn(&Noisy) -> Vec3| -> Vec<Vec3> {
             let mut light: Vec<Vec3> =
@@ -107,6 +105,7 @@ impl LightmapSolver {
         let (irradiance, variance) = self.sums[receiver].known()?;
         let slope = self.slopes.as_ref().map(|slopes| slopes.at(receiver) * luminance(irradiance));
         let (position, normal, slope) = (point.position, point.normal(), slope.unwrap_or_default());
-        Some(Noisy { position, normal, irradiance, slope, variance })
+        let samples = self.sums[receiver].samples();
+        Some(Noisy { position, normal, irradiance, slope, variance, samples })
     }
 }

@@ -105,11 +105,11 @@ impl Sum {
         self.backs > BURIED_ABOVE * self.samples
     }
 
-    /// Irradiance and the variance of its luminance, infinite where nothing has arrived; nothing where
+    /// Irradiance and the variance of its luminance, both zero where nothing has arrived; nothing where
     /// the lumel lies within something.
     pub(crate) fn known(&self) -> Option<(Vec3, f32)> {
         if self.samples == 0.0 {
-            return Some((Vec3::ZERO, f32::INFINITY));
+            return Some((Vec3::ZERO, 0.0));
         }
         (!self.is_buried()).then(|| (self.mean(), self.scatter() / self.samples))
     }
