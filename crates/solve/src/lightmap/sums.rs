@@ -70,20 +70,22 @@ impl Sum {
         }
     }
 
-    /// Follows a change of light. Its noise is thought to grow and shrink with it.
-    pub(crate) fn follow(&mut self, change: &Change) {
+    /// Follows a change of light. Its noise is thought to grow and shrink with it. What is known weighs as
+    /// many samples as make the change's variance of a `scatter` that lumels about it have alike: by its
+    /// own, lumels that are too bright would weigh more.
+    pub(crate) fn follow(&mut self, change: &Change, scatter: f32) {
         if self.samples == 0.0 || *change == Change::default() {
             return;
         }
-        let (before, scatter) = (self.mean(), self.scatter());
+        let (before, own) = (self.mean(), self.scatter());
         let now = (before + change.by).max(Vec3::ZERO);
         let level = luminance(before);
         let brighter = if level > 0.0 { (luminance(now) / level).min(BRIGHTER) } else { 1.0 };
-        let scatter = scatter * brighter * brighter;
+        let louder = brighter * brighter;
         self.sum = self.samples * now;
-        self.squares = self.samples * (scatter + luminance(now).powi(2));
+        self.squares = self.samples * (louder * own + luminance(now).powi(2));
         if change.variance > 0.0 {
-            self.limit((scatter / change.variance).max(LEAST));
+            self.limit((louder * scatter / change.variance).max(LEAST));
         }
     }
 
@@ -119,6 +121,12 @@ impl Sum {
         let mean = luminance(self.mean());
         (self.squares / self.samples - mean * mean).max(0.0)
     }
+}
+
+/// Mean variance a sample of the luminance, at some lumels.
+pub(crate) fn scatter(sums: &[Sum]) -> f32 {
+    let known = || sums.iter().filter(|sum| sum.samples > 0.0 && !sum.is_buried());
+    known().map(Sum::scatter).sum::<f32>() / known().count().max(1) as f32
 }
 
 /// How noisy a sample is at some lumels, as it is displayed: the standard deviation of its luminance, by
@@ -159,7 +167,7 @@ mod tests {
         let known = Sum::of_samples((0..64).map(|k| if k % 2 == 0 { 1.0 } else { 3.0 }));
         let after = |by: f32, variance: f32| {
             let mut sum = known;
-            sum.follow(&Change { by: Vec3::splat(by), variance });
+            sum.follow(&Change { by: Vec3::splat(by), variance }, known.scatter());
             sum
         };
         assert_eq!(after(0.0, 0.0), known);
@@ -167,10 +175,14 @@ mod tests {
         assert!((brighter.mean() - 4.0).abs().max_element() < 1e-5);
         assert!((brighter.scatter() - 4.0).abs() < 1e-4 && brighter.samples() == 64.0);
         assert!((after(2.0, 0.25).samples() - 16.0).abs() < 1e-3);
+        // One that is bright by chance weighs no more than those about it.
+        let mut bright = Sum::of_samples((0..64).map(|k| if k % 16 == 0 { 50.0 } else { 1.0 }));
+        bright.follow(&Change { by: Vec3::ZERO, variance: 0.1 }, known.scatter());
+        assert!((bright.samples() - 10.0).abs() < 1e-3, "{}", bright.samples());
         let dark = after(-9.0, 1.0);
         assert_eq!((dark.mean(), dark.samples()), (Vec3::ZERO, LEAST));
         let mut nothing = Sum::default();
-        nothing.follow(&Change { by: Vec3::ONE, variance: 1.0 });
+        nothing.follow(&Change { by: Vec3::ONE, variance: 1.0 }, 1.0);
         assert_eq!(nothing, Sum::default());
     }
 }

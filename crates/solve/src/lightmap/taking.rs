@@ -13,7 +13,7 @@ use super::change::{Change, Glanced};
 use super::draws::is_glance;
 use super::point::Point;
 use super::slopes;
-use super::sums::{Sum, noise};
+use super::sums::{Sum, noise, scatter};
 
 /// Light is changing where glances differ by this share of it.
 const CHANGING: f32 = 0.02;
@@ -83,11 +83,11 @@ impl LightmapSolver {
             let receivers = self.cells.receivers_of(cell);
             let block = self.block_of(receivers.start);
             let sums = &mut self.sums[receivers];
-            let (mut by, mut level) = (0.0, 0.0);
+            let (mut by, mut level, scatter) = (0.0, 0.0, scatter(sums));
             for (sum, change) in sums.iter_mut().zip(changes) {
                 by += luminance(change.by.abs());
                 level += luminance(sum.mean());
-                sum.follow(&change);
+                sum.follow(&change, scatter);
             }
             let most = blocks.entry(block).or_default();
             *most = most.max(if level > 0.0 { by / level } else { by });
