@@ -130,18 +130,21 @@ impl Budget {
     }
 }
 
-/// Chooses how many samples lumels take in a tick, so that they fill [`LumelPace::SHARE`] of its period,
-/// beside the tick.
+/// Chooses how many samples lumels take in a tick. They fill what the rest of it leaves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LumelPace {
     period: f64,
     samples: u64,
     is_fixed: bool,
+    /// Samples of this tick's job, and the seconds that it took.
+    taken: Option<(u64, f64)>,
 }
 
 impl LumelPace {
-    /// Share of the period in which lumels are gathered at.
-    const SHARE: f64 = 0.45;
+    /// Share of the period that a tick with lumels aims to fill.
+    const SHARE: f64 = 0.8;
+    /// Share of the period that lumels have, however long the rest takes.
+    const LEAST_SHARE: f64 = 0.3;
     /// Samples of the first tick, and of any at least: few, for machines that are slow.
     const LEAST: u64 = 1024;
     /// Largest growth from one tick to the next.
@@ -150,7 +153,7 @@ impl LumelPace {
     /// Begins with few samples; or always takes so many.
     pub(crate) fn new(period: f64, fixed: Option<u64>) -> Self {
         let samples = fixed.unwrap_or(Self::LEAST);
-        Self { period, samples, is_fixed: fixed.is_some() }
+        Self { period, samples, is_fixed: fixed.is_some(), taken: None }
     }
 
     /// Samples of the next tick.
@@ -160,10 +163,19 @@ impl LumelPace {
 
     /// Takes note of a job of so many samples that took so many seconds.
     pub(crate) fn record(&mut self, samples: u64, seconds: f64) {
+        let (all, before) = self.taken.unwrap_or_default();
+        self.taken = Some((all + samples, before + seconds));
+    }
+
+    /// Takes note of a tick that took so many seconds, with its jobs.
+    pub(crate) fn finish(&mut self, total: f64) {
+        let Some((samples, seconds)) = self.taken.take() else { return };
         if self.is_fixed || samples == 0 {
             return;
         }
-        let fitting = samples as f64 * Self::SHARE * self.period / seconds.max(1e-9);
+        let rest = (total - seconds).max(0.0);
+        let room = (Self::SHARE * self.period - rest).max(Self::LEAST_SHARE * self.period);
+        let fitting = samples as f64 * room / seconds.max(1e-9);
         let most = self.samples as f64 * Self::RISE;
         self.samples = (fitting.min(most) as u64).max(Self::LEAST);
     }
@@ -228,18 +240,31 @@ mod tests {
     }
 
     #[test]
-    fn lumels_fill_their_share() {
-        let mut pace = LumelPace::new(PERIOD, None);
-        for _ in 0..30 {
-            let samples = pace.samples();
-            pace.record(samples, samples as f64 * 1e-6);
+    fn lumels_fill_what_the_rest_leaves() {
+        let after = |rest: f64| {
+            let mut pace = LumelPace::new(PERIOD, None);
+            for _ in 0..30 {
+                let (samples, seconds) = (pace.samples(), pace.samples() as f64 * 1e-6);
+                pace.record(samples, seconds);
+                pace.finish(seconds + rest);
+            }
+            pace
+        };
+        for (rest, share) in [(0.0, LumelPace::SHARE), (0.01, 0.55), (1.0, LumelPace::LEAST_SHARE)]
+        {
+            let (samples, expected) = (after(rest).samples(), (share * PERIOD * 1e6) as u64);
+            assert!(samples.abs_diff(expected) < expected / 100, "{rest}: {samples}");
         }
-        let expected = (LumelPace::SHARE * PERIOD * 1e6) as u64;
-        assert!(pace.samples().abs_diff(expected) < expected / 100, "{}", pace.samples());
-        pace.record(pace.samples(), 1.0);
+        let mut pace = after(0.0);
+        let samples = pace.samples();
+        pace.finish(0.01);
+        assert_eq!(pace.samples(), samples, "no job has ended");
+        pace.record(samples, 1.0);
+        pace.finish(1.0);
         assert_eq!(pace.samples(), LumelPace::LEAST, "it falls at once");
         let mut fixed = LumelPace::new(PERIOD, Some(77));
         fixed.record(77, 1.0);
+        fixed.finish(1.0);
         assert_eq!(fixed.samples(), 77);
     }
 

@@ -574,6 +574,7 @@ impl Tick {
         } else {
             self.budget.record(gather, total)
         };
+        self.lumel_pace.finish(total);
         if report.late {
             tracing::debug!(tick = self.number, seconds = report.total_seconds(), "late");
         }
