@@ -477,7 +477,7 @@ fn jobs_run_beside_each_other_and_can_be_given_up() {
     let scene = lit_room();
     let mut tracer = tracer(2);
     let mut huge = job(&scene, 1);
-    huge.budgets = vec![Budget { receiver: 0, samples: 20_000_000, seed: None }];
+    huge.budgets = vec![Budget { receiver: 0, samples: 20_000_000, draws: Draws::Own }];
     let endless = tracer.submit(huge.clone());
     let queued = tracer.submit(job(&scene, 2));
     let wanted = tracer.submit(job(&scene, 3));
