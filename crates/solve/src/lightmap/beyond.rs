@@ -12,7 +12,7 @@ use lumencast_scene::Snapshot;
 use rayon::prelude::*;
 
 use super::NO_RECEIVER;
-use super::cells::Block;
+use super::blocks::Block;
 use super::places::{PlacedSurface, surfaces};
 use super::point::Point;
 

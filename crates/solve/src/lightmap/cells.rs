@@ -16,15 +16,14 @@ use std::ops::Range;
 use glam::{IVec2, UVec2, Vec3};
 use lumencast_gather::Budget;
 
+use super::blocks::{BLOCK, on_page};
 use super::draws::Part;
 use super::places::LumelPlace;
 
 /// Lumels a side of a cell.
 const CELL: u32 = 16;
 /// Cells a side of a block.
-const CELLS: u32 = 4;
-/// Lumels a side of a block.
-pub(crate) const BLOCK: u32 = CELL * CELLS;
+const CELLS: u32 = BLOCK / CELL;
 /// Lumels a side of a square of which a glance takes one, of each surface and direction.
 const GLANCE: u32 = 4;
 /// The same in the first turns of a block, and how many turns these are.
@@ -67,40 +66,6 @@ struct Turns {
     count: u8,
     /// How noisy a sample is there: the standard deviation of its luminance, by the square root of that.
     noise: f32,
-}
-
-/// A square of lumels that are solved together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Block {
-    pub(crate) page: u32,
-    row: u32,
-    column: u32,
-}
-
-impl Block {
-    /// The block of a lumel.
-    pub(crate) fn of(lumel: u32, page_size: u32) -> Self {
-        let (page, at) = on_page(lumel, page_size);
-        Self { page, row: at.y / BLOCK, column: at.x / BLOCK }
-    }
-
-    /// Those about it on its page.
-    pub(crate) fn beside(&self, page_size: u32) -> impl Iterator<Item = Self> {
-        let Self { page, row, column } = *self;
-        let blocks = page_size.div_ceil(BLOCK);
-        let near = move |at: u32| at.saturating_sub(1)..(at + 2).min(blocks);
-        let all = near(row).flat_map(move |row| near(column).map(move |column| (row, column)));
-        all.filter(move |at| *at != (row, column)).map(move |(row, column)| Self {
-            page,
-            row,
-            column,
-        })
-    }
-
-    /// Its first lumel.
-    pub(crate) fn corner(&self) -> UVec2 {
-        BLOCK * UVec2::new(self.column, self.row)
-    }
 }
 
 /// The cells of all pages, and whose turn it is.
@@ -361,12 +326,6 @@ impl Cells {
     fn receivers(&self) -> usize {
         self.cells.last().map_or(0, |cell| cell.receivers.end as usize)
     }
-}
-
-/// The page of a lumel, and its place there.
-pub(crate) fn on_page(lumel: u32, page_size: u32) -> (u32, UVec2) {
-    let (page, at) = (lumel / (page_size * page_size), lumel % (page_size * page_size));
-    (page, UVec2::new(at % page_size, at / page_size))
 }
 
 /// Puts those lumels of a cell first that a glance takes, then those of a block's first turns, and counts

@@ -6,7 +6,7 @@
 use glam::UVec2;
 use lumencast_gather::{Budget, Draws};
 
-use super::cells::{BLOCK, on_page};
+use super::blocks::{BLOCK, on_page};
 
 /// Where one of so many lumels a side of a square draws so many samples.
 #[derive(Clone, Copy, Debug)]

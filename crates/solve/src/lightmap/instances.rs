@@ -8,7 +8,7 @@ use lumencast_charts::lumels_on_pages;
 use lumencast_light::{Layout, Lightmap, Surface};
 use lumencast_scene::Snapshot;
 
-use super::cells::Block;
+use super::blocks::Block;
 use super::places::{LumelPlace, lumel_places};
 use super::point::Point;
 use super::sums::Sum;

@@ -2,6 +2,7 @@
 
 mod backs;
 mod beyond;
+mod blocks;
 mod cells;
 mod change;
 mod draws;
@@ -30,7 +31,8 @@ use lumencast_scene::Snapshot;
 
 use crate::blend::BlendSettings;
 pub use backs::with_backs;
-use cells::{Block, Cells};
+use blocks::Block;
+use cells::Cells;
 use draws::Part;
 use glances::Glances;
 use places::{LumelPlace, lumel_places};

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::cells::Block;
+use super::blocks::Block;
 
 /// New samples' share of what is known from which on a block is ripe.
 const RIPE: f32 = 0.4;

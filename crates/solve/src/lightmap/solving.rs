@@ -4,7 +4,7 @@ use glam::{UVec2, Vec3};
 use lumencast_light::{Lightmap, luminance, slope};
 use rayon::prelude::*;
 
-use super::cells::{BLOCK, Block};
+use super::blocks::{BLOCK, Block};
 use super::filter::{Noisy, REACH, filter};
 use super::{LightmapSolver, NO_RECEIVER, beyond, fill};
 

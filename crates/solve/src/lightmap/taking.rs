@@ -8,7 +8,7 @@ use lumencast_light::luminance;
 use rayon::prelude::*;
 
 use super::LightmapSolver;
-use super::cells::{Block, on_page};
+use super::blocks::{Block, on_page};
 use super::change::{Change, Glanced};
 use super::draws::is_glance;
 use super::point::Point;
