@@ -13,7 +13,7 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 use std::ops::Range;
 
-use glam::{IVec2, UVec2, Vec3};
+use glam::{IVec2, Vec3};
 use lumencast_gather::Budget;
 
 use super::blocks::{BLOCK, on_page};
@@ -365,6 +365,8 @@ fn main_direction(direction: Vec3) -> (usize, bool) {
 
 #[cfg(test)]
 mod tests {
+    use glam::UVec2;
+
     use super::super::draws::is_glance;
     use super::*;
 

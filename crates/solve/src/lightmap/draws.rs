@@ -76,7 +76,8 @@ mod tests {
     fn parts_follow_each_other() {
         for spacing in [1, 2, 4] {
             let part = Part { spacing, samples: 8 };
-            let drawing = (0..64u32 * 64).filter(|k| (k % 64 | k / 64) % spacing == 0);
+            let drawing = (0..64u32 * 64)
+                .filter(|k| [k % 64, k / 64].iter().all(|at| at.is_multiple_of(spacing)));
             let first = |lumel| match part.of_turn(7, lumel, 64) {
                 Draws::Shared { sequence: 7, first } => first,
                 other => panic!("{other:?}"),
