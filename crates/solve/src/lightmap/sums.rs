@@ -123,22 +123,26 @@ impl Sum {
     }
 }
 
+/// Those at which something has arrived, and that do not lie within something.
+fn known(sums: &[Sum]) -> impl Iterator<Item = &Sum> {
+    sums.iter().filter(|sum| sum.samples > 0.0 && !sum.is_buried())
+}
+
 /// Mean variance a sample of the luminance, at some lumels.
 pub(crate) fn scatter(sums: &[Sum]) -> f32 {
-    let known = || sums.iter().filter(|sum| sum.samples > 0.0 && !sum.is_buried());
-    known().map(Sum::scatter).sum::<f32>() / known().count().max(1) as f32
+    known(sums).map(Sum::scatter).sum::<f32>() / known(sums).count().max(1) as f32
 }
 
 /// How noisy a sample is at some lumels, as it is displayed: the standard deviation of its luminance, by
 /// the square root of that.
 pub(crate) fn noise(sums: &[Sum]) -> f32 {
-    let (mut squares, mut known) = (0.0, 0.0);
-    for sum in sums.iter().filter(|sum| sum.samples > 0.0 && !sum.is_buried()) {
+    let (mut squares, mut count) = (0.0, 0.0);
+    for sum in known(sums) {
         let mean = luminance(sum.mean());
         squares += if mean > 0.0 { sum.scatter() / mean } else { 0.0 };
-        known += 1.0;
+        count += 1.0;
     }
-    if known > 0.0 { (squares / known as f32).sqrt() } else { 0.0 }
+    if count > 0.0 { (squares / count as f32).sqrt() } else { 0.0 }
 }
 
 #[cfg(test)]
