@@ -34,6 +34,8 @@ const GLANCE_SAMPLES: u32 = 16;
 const TURN_SAMPLES: u32 = 8;
 /// The same in a turn that was hurried.
 const HURRIED_SAMPLES: u32 = 32;
+/// In place of a turn's number, which is more, where cells are hurried.
+const HURRIED: u64 = 0;
 /// So many samples are taken in turns for each one of glances where light is changing, and where it was
 /// not.
 const CHANGES: u64 = 3;
@@ -205,15 +207,12 @@ impl Cells {
     pub(crate) fn budgets(&mut self, samples: u64, version: u64, lumels: &[u32]) -> Vec<Budget> {
         let mut budgets = Vec::new();
         let (mut glances, mut calm, mut turns) = (0, 0, 0);
-        if !self.hurried.is_empty() {
-            self.turns += 1;
-        }
         while turns < samples
             && let Some(cell) = self.hurried.pop_front()
         {
             let receivers = self.cells[cell].receivers.clone();
             let part = Part { spacing: 1, samples: HURRIED_SAMPLES };
-            turns += self.take(receivers, part, Some(self.turns), lumels, &mut budgets);
+            turns += self.take(receivers, part, Some(HURRIED), lumels, &mut budgets);
         }
         while glances + calm + turns < samples && !self.cells.is_empty() {
             if self.first > 0 {
