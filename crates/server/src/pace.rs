@@ -136,8 +136,8 @@ pub(crate) struct LumelPace {
     period: f64,
     samples: u64,
     is_fixed: bool,
-    /// Samples of this tick's job, and the seconds that it took.
-    taken: Option<(u64, f64)>,
+    /// Samples of this tick's jobs, and the seconds that they took.
+    taken: (u64, f64),
 }
 
 impl LumelPace {
@@ -153,7 +153,7 @@ impl LumelPace {
     /// Begins with few samples; or always takes so many.
     pub(crate) fn new(period: f64, fixed: Option<u64>) -> Self {
         let samples = fixed.unwrap_or(Self::LEAST);
-        Self { period, samples, is_fixed: fixed.is_some(), taken: None }
+        Self { period, samples, is_fixed: fixed.is_some(), taken: (0, 0.0) }
     }
 
     /// Samples of the next tick.
@@ -163,13 +163,13 @@ impl LumelPace {
 
     /// Takes note of a job of so many samples that took so many seconds.
     pub(crate) fn record(&mut self, samples: u64, seconds: f64) {
-        let (all, before) = self.taken.unwrap_or_default();
-        self.taken = Some((all + samples, before + seconds));
+        self.taken.0 += samples;
+        self.taken.1 += seconds;
     }
 
     /// Takes note of a tick that took so many seconds, with its jobs.
     pub(crate) fn finish(&mut self, total: f64) {
-        let Some((samples, seconds)) = self.taken.take() else { return };
+        let (samples, seconds) = std::mem::take(&mut self.taken);
         if self.is_fixed || samples == 0 {
             return;
         }
