@@ -55,6 +55,8 @@ enum Came {
 }
 
 impl Follower {
+    /// A client that follows the state from now on: a track is read from its newest group when it is
+    /// first asked for, so that what an edit caused until then would never come.
     async fn connect(server: &Serving) -> Self {
         let client =
             Client::connect(&server.url(), ConnectOptions::default()).await.expect("a connection");
@@ -64,8 +66,10 @@ impl Follower {
         let catalog = read("catalog", ReadOptions::default());
         let state = read("state", all);
         let light = read(&LIGHT.to_string(), ReadOptions::default());
-        let cache = Cache::new();
-        Self { client, cache, catalog, state, light, began: Instant::now() }
+        let (cache, began) = (Cache::new(), Instant::now());
+        let mut follower = Self { client, cache, catalog, state, light, began };
+        follower.next_state().await;
+        follower
     }
 
     fn now(&self) -> f64 {
