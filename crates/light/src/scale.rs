@@ -21,6 +21,11 @@ impl ScaleRule {
             .iter()
             .filter(|c| c.is_finite())
             .fold(0.0_f32, |largest, c| largest.max(c.abs().max_element()));
+        self.follow(largest)
+    }
+
+    /// The same, by the largest coefficient.
+    pub fn follow(&mut self, largest: f32) -> i8 {
         let current = self.log2.unwrap_or(0);
         if largest > 0.0 {
             let ratio = f64::from(largest) / f64::from(current).exp2();

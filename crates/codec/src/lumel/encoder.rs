@@ -5,6 +5,7 @@ use lumencast_video::VideoError;
 
 use super::coding::LumelCoding;
 use super::page_encoder::PageEncoder;
+use super::pages::Pages;
 use super::tile_encoder::TileEncoder;
 use crate::{EncodedRegion, LightmapShape, UpdateInfo};
 
@@ -21,19 +22,8 @@ pub struct LumelEncoder {
 /// What each region keeps.
 enum Regions {
     Tiles(Vec<TileEncoder>),
-    Pages {
-        encoders: Vec<PageEncoder>,
-        /// The page whose turn is next.
-        next: usize,
-        /// How many lumels may become pictures now.
-        room: usize,
-    },
+    Pages(Pages),
 }
-
-/// So many lumels become pictures in an update, so that large pages cost half the bits, at half the rate.
-const LUMELS_AN_UPDATE: usize = 1 << 19;
-/// Each page has its turn within so many updates, however many there are.
-const LONGEST_TURN: usize = 8;
 
 impl LumelEncoder {
     /// For lightmaps of a shape, whose coding is that of `coding`.
@@ -46,9 +36,7 @@ impl LumelEncoder {
             None => Regions::Tiles(shape.tiles().map(TileEncoder::new).collect()),
             Some((packing, qp)) => {
                 let encoder = |tile| PageEncoder::new(tile, packing, qp);
-                let encoders: Vec<PageEncoder> = shape.tiles().map(encoder).collect();
-                let [_, room] = rooms(&encoders);
-                Regions::Pages { encoders, next: 0, room }
+                Regions::Pages(Pages::new(shape.tiles().map(encoder).collect()))
             }
         };
         Self { shape, scale: ScaleRule::default(), regions }
@@ -92,10 +80,10 @@ impl LumelEncoder {
     ) -> Result<Vec<EncodedRegion>, VideoError> {
         let LightmapShape { page_size, pages, .. } = self.shape;
         assert_eq!((lightmap.layout.page_size, lightmap.layout.pages), (page_size, pages));
-        let scale_log2 = self.scale.update(&lightmap.irradiance);
-        let mut frames = Vec::new();
         match &mut self.regions {
             Regions::Tiles(encoders) => {
+                let scale_log2 = self.scale.update(&lightmap.irradiance);
+                let mut frames = Vec::new();
                 for encoder in encoders {
                     if watched(encoder.tile().id) {
                         frames.push(encoder.encode(lightmap, info, scale_log2));
@@ -103,36 +91,12 @@ impl LumelEncoder {
                         encoder.rest();
                     }
                 }
+                Ok(frames)
             }
-            Regions::Pages { encoders, next, room } => {
-                for _ in 0..encoders.len() {
-                    let encoder = &mut encoders[*next];
-                    let lumels = encoder.tile().lumel_count();
-                    if !watched(encoder.tile().id) {
-                        encoder.rest();
-                    } else if lumels <= *room {
-                        *room -= lumels;
-                        frames.extend(encoder.encode(lightmap, info, scale_log2)?);
-                    } else {
-                        break;
-                    }
-                    *next = (*next + 1) % encoders.len();
-                }
-                let [more, most] = rooms(encoders);
-                *room = (*room + more).min(most);
-            }
+            Regions::Pages(pages) => pages.encode(lightmap, info, &mut self.scale, watched),
         }
-        Ok(frames)
     }
 }
-
-/// How many lumels more may become pictures with each update, and how many at most.
-fn rooms(pages: &[PageEncoder]) -> [usize; 2] {
-    let lumels = || pages.iter().map(|page| page.tile().lumel_count());
-    let more = LUMELS_AN_UPDATE.max(lumels().sum::<usize>().div_ceil(LONGEST_TURN));
-    [more, more.max(lumels().max().unwrap_or(0))]
-}
-
 impl std::fmt::Debug for LumelEncoder {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("LumelEncoder").field("shape", &self.shape).finish_non_exhaustive()

@@ -7,6 +7,8 @@
 use glam::Vec3;
 use lumencast_light::luminance;
 
+use super::news::brightest;
+
 /// How irradiance becomes codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Mapping {
@@ -39,16 +41,17 @@ impl Mapping {
             false => f64::from(*values.select_nth_unstable_by(middle, f32::total_cmp).1),
         };
         let toe = ((scale / median).log2() + BELOW_MEDIAN).round().clamp(0.0, MAX_TOE.into()) as u8;
-        let octaves =
-            (f64::from(toe).exp2() * HEADROOM * brightest(irradiance) / scale + 1.0).log2();
+        let octaves = (f64::from(toe).exp2() * HEADROOM * f64::from(brightest(irradiance)) / scale
+            + 1.0)
+            .log2();
         let range = (octaves * 8.0).ceil().clamp(8.0, u8::MAX.into()) as u8;
         Self { scale_log2, toe, range }
     }
 
-    /// Whether light can still be told by it: none is too bright, and it does not lie in the lowest
-    /// codes alone.
-    pub(crate) fn suits(self, irradiance: &[Vec3]) -> bool {
-        let brightest = brightest(irradiance);
+    /// Whether light can still be told by it, by its brightest channel: none is too bright, and it does
+    /// not lie in the lowest codes alone.
+    pub(crate) fn suits(self, brightest: f32) -> bool {
+        let brightest = f64::from(brightest);
         brightest <= self.irradiance(255.0) && brightest * 8.0 >= self.irradiance(255.0)
     }
 
@@ -67,10 +70,6 @@ impl Mapping {
         let toes = (code / 255.0 * self.octaves()).exp2() - 1.0;
         toes * (f64::from(self.scale_log2) - f64::from(self.toe)).exp2()
     }
-}
-
-fn brightest(irradiance: &[Vec3]) -> f64 {
-    irradiance.iter().map(|e| e.max_element()).filter(|e| e.is_finite()).fold(0.0, f32::max).into()
 }
 
 /// Codes in 1/256, by the first bits of irradiance as f32: its exponent, and 9 bits of its fraction.
@@ -168,14 +167,14 @@ mod tests {
     fn a_mapping_suits_its_light() {
         let light: Vec<Vec3> = (0..1000).map(|i| Vec3::splat(0.01 * i as f32)).collect();
         let mapping = Mapping::of(&light, 4);
-        assert!(mapping.suits(&light));
+        assert!(mapping.suits(brightest(&light)));
         assert!(mapping.irradiance(255.0) >= 9.99 * 1.25);
         assert!(mapping.irradiance(255.0) < 9.99 * 1.5);
         // A quarter of the median, about 5 of 16.
         assert_eq!(mapping.toe, 4);
         let brighter: Vec<Vec3> = light.iter().map(|e| 2.0 * *e).collect();
         let darker: Vec<Vec3> = light.iter().map(|e| 0.05 * *e).collect();
-        assert!(!mapping.suits(&brighter) && !mapping.suits(&darker));
+        assert!(!mapping.suits(brightest(&brighter)) && !mapping.suits(brightest(&darker)));
         for odd in [vec![], vec![Vec3::ZERO; 9], vec![Vec3::NAN; 9], vec![Vec3::MAX; 9]] {
             let mapping = Mapping::of(&odd, 127);
             assert!(LightTable::new(mapping).irradiance(0) == 0.0, "{odd:?}");

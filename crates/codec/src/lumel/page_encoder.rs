@@ -1,9 +1,13 @@
 //! One page as video.
 
+use std::borrow::Cow;
+
+use glam::Vec3;
 use lumencast_light::{Lightmap, Told};
 use lumencast_video::{H264Encoder, PictureEncoder, Qp, VideoError};
 
 use super::mapping::{CodeTable, Mapping};
+use super::news::PageNews;
 use super::planes::{Packing, Planes};
 use super::slope_codes::{self, as_light};
 use super::tiles::Tile;
@@ -26,6 +30,7 @@ pub(crate) struct PageEncoder {
     tile: Tile,
     packing: Packing,
     qp: Qp,
+    news: PageNews,
     planes: Planes,
     table: Option<(Mapping, CodeTable)>,
     encoder: Option<H264Encoder>,
@@ -45,7 +50,8 @@ struct Group {
 impl PageEncoder {
     pub(crate) fn new(tile: Tile, packing: Packing, qp: Qp) -> Self {
         let planes = Planes::new(packing, tile.size.x);
-        Self { tile, packing, qp, planes, table: None, encoder: None, group: None }
+        let news = PageNews::new(tile.size.x);
+        Self { tile, packing, qp, news, planes, table: None, encoder: None, group: None }
     }
 
     pub(crate) fn tile(&self) -> Tile {
@@ -57,18 +63,35 @@ impl PageEncoder {
         self.group = None;
     }
 
-    /// The frame of an update; none where nothing is to be told.
+    /// What a lightmap tells on this page, as light; it is to be encoded next.
+    pub(crate) fn look<'a>(&mut self, lightmap: &'a Lightmap) -> Cow<'a, [Vec3]> {
+        let lumels = self.tile.lumel_count();
+        let first = self.tile.page as usize * lumels;
+        let page = as_light(lightmap, self.tile.told, first..first + lumels);
+        self.news.look(&page);
+        page
+    }
+
+    /// The brightest channel of irradiance, lux, when this was looked at last; 0 where it tells no
+    /// irradiance.
+    pub(crate) fn brightest(&self) -> f32 {
+        match self.tile.told {
+            Told::Irradiance => self.news.brightest(),
+            Told::Slopes => 0.0,
+        }
+    }
+
+    /// The frame of an update of the page that was looked at last; none where nothing is to be told.
     pub(crate) fn encode(
         &mut self,
-        lightmap: &Lightmap,
+        page: &[Vec3],
         info: UpdateInfo,
         scale_log2: i8,
     ) -> Result<Option<EncodedRegion>, VideoError> {
-        let lumels = self.tile.lumel_count();
-        let first = self.tile.page as usize * lumels;
-        let page = &*as_light(lightmap, self.tile.told, first..first + lumels);
         let before = self.table.as_ref().map(|(mapping, _)| *mapping);
-        let suits = |mapping: &Mapping| mapping.scale_log2 == scale_log2 && mapping.suits(page);
+        let suits = |mapping: &Mapping| {
+            mapping.scale_log2 == scale_log2 && mapping.suits(self.news.brightest())
+        };
         let mapping = match self.tile.told {
             Told::Slopes => slope_codes::MAPPING,
             Told::Irradiance => {
@@ -81,7 +104,11 @@ impl PageEncoder {
         let kept = self.table.take().filter(|(known, _)| *known == mapping);
         let (_, table) =
             self.table.insert(kept.unwrap_or_else(|| (mapping, CodeTable::new(mapping))));
-        let changed = self.planes.follow(page, table, group.is_none());
+        let anew = group.is_none();
+        if anew {
+            self.news.forget();
+        }
+        let changed = self.planes.follow(page, self.news.take(), table, anew);
         let group = group.filter(|group| {
             let is_long = group.pictures >= GROUP_PICTURES
                 || !(0.0..GROUP_SECONDS).contains(&(info.time - group.began));

@@ -7,6 +7,7 @@ use glam::Vec3;
 use lumencast_video::Picture;
 
 use super::mapping::{CodeTable, LightTable};
+use super::news::SQUARE;
 
 /// Where the three planes of a page lie in a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,8 +18,8 @@ pub(crate) enum Packing {
     Stacked,
 }
 
-/// Sides of pictures are multiples of this, H.264's macroblock.
-const BLOCK: u32 = 16;
+/// Sides of pictures are multiples of H.264's macroblock.
+const MACROBLOCK: u32 = SQUARE as u32;
 /// A code stays as it was while the light is no farther from it than so much, in 1/256. Light that
 /// hardly changes costs no bits, and its noise is not seen.
 const DEAD_ZONE: i32 = 192;
@@ -35,7 +36,7 @@ pub(crate) struct Planes {
 impl Packing {
     /// Width and height of the picture of a page.
     pub(crate) fn size(self, page_size: u32) -> (u32, u32) {
-        let side = page_size.next_multiple_of(BLOCK);
+        let side = page_size.next_multiple_of(MACROBLOCK);
         match self {
             Self::Subsampled => (side, side),
             Self::Stacked => (side, 3 * side),
@@ -55,9 +56,15 @@ impl Planes {
         &self.picture
     }
 
-    /// Follows a page's light, row after row; whether any code has changed. `anew` takes each code as
-    /// near as can be.
-    pub(crate) fn follow(&mut self, page: &[Vec3], table: &CodeTable, anew: bool) -> bool {
+    /// Follows the light of some squares of a page, given row after row; whether any code has changed.
+    /// `anew` takes each code as near as can be.
+    pub(crate) fn follow(
+        &mut self,
+        page: &[Vec3],
+        squares: impl Iterator<Item = [usize; 2]>,
+        table: &CodeTable,
+        anew: bool,
+    ) -> bool {
         let dead_zone = if anew { 0 } else { DEAD_ZONE };
         let (page_size, width) = (self.page_size, self.picture.width as usize);
         let last = page_size - 1;
@@ -70,11 +77,14 @@ impl Planes {
             }
         };
         let codes = |x: usize, y: usize| ycocg(page[y.min(last) * page_size + x.min(last)], table);
-        match self.packing {
-            Packing::Subsampled => {
-                let [co, cg] = &mut self.picture.chroma;
-                for y in (0..self.picture.height as usize).step_by(2) {
-                    for x in (0..width).step_by(2) {
+        for [columns, rows] in squares.map(|at| at.map(|at| at * SQUARE..(at + 1) * SQUARE)) {
+            match self.packing {
+                Packing::Subsampled => {
+                    let [co, cg] = &mut self.picture.chroma;
+                    for (y, x) in rows
+                        .step_by(2)
+                        .flat_map(|y| columns.clone().step_by(2).map(move |x| (y, x)))
+                    {
                         let quad = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
                         let quad = quad.map(|(x, y)| (y * width + x, codes(x, y)));
                         for (at, [luma, ..]) in quad {
@@ -87,11 +97,9 @@ impl Planes {
                         settle(&mut cg[at], mean(2));
                     }
                 }
-            }
-            Packing::Stacked => {
-                let plane = width * width;
-                for y in 0..width {
-                    for x in 0..width {
+                Packing::Stacked => {
+                    let plane = width * width;
+                    for (y, x) in rows.flat_map(|y| columns.clone().map(move |x| (y, x))) {
                         for (k, code) in codes(x, y).into_iter().enumerate() {
                             settle(&mut self.picture.luma[k * plane + y * width + x], code);
                         }
