@@ -258,7 +258,14 @@ impl Solver {
 
     /// What arrives at lumels, filtered on the surface.
     pub(crate) fn solve_lightmaps(&mut self) {
-        self.each_lightmap(|lightmap, published| lightmap.solve(true, published));
+        let fields = std::mem::take(&mut self.light).into_fields();
+        let (lightmaps, volumes): (Vec<Field>, Vec<Field>) =
+            fields.into_iter().partition(|field| field.as_lightmap().is_some());
+        let probes = Light::new(volumes);
+        self.light = Light::new(lightmaps);
+        self.each_lightmap(|lightmap, published| lightmap.solve(true, &probes, published));
+        let lightmaps = std::mem::take(&mut self.light).into_fields();
+        self.light = Light::new(probes.into_fields().into_iter().chain(lightmaps));
     }
 
     /// Calls `with` for each lightmap, with what is published of it.

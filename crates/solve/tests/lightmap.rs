@@ -6,7 +6,7 @@ use glam::{Affine3A, Vec3};
 use lumencast_charts::{LaidOut, Sheet, laid_out, sheets};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Receiver, Shading};
-use lumencast_light::{FieldId, Lightmap, Place, SurfaceId};
+use lumencast_light::{FieldId, Light, Lightmap, Place, SurfaceId};
 use lumencast_scene::{Edit, Environment, LightmapSpec, Material, Scene, Snapshot, Transform};
 use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{GatherOptions, LightmapSolver, Request, Solver, Turn, spread, with_backs};
@@ -35,7 +35,7 @@ fn lit(scene: &Arc<Snapshot>, bounces: u32, samples: u32) -> (LightmapSolver, La
     let ticket = tracer.submit(job);
     solver.take(&tracer.wait(ticket).expect("light"), &budgets);
     let mut lightmap = solver.dark();
-    solver.solve(true, &mut lightmap);
+    solver.solve(true, &Light::default(), &mut lightmap);
     (solver, laid_out, lightmap)
 }
 
@@ -86,7 +86,7 @@ fn slopes_tell_what_arrives_on_tilted_normals() {
     let job = solver.job(scene.clone(), 256);
     solver.take(&gathered(job.receivers.to_vec(), 256), &job.budgets);
     let mut lightmap = solver.dark();
-    solver.solve(true, &mut lightmap);
+    solver.solve(true, &Light::default(), &mut lightmap);
     let floor = |place: &Place| place.normal.y > 0.9;
     let places: Vec<Place> =
         spread(&scene, &lightmap.layout, 600).into_iter().filter(floor).collect();
@@ -141,7 +141,7 @@ fn a_glance_at_all_pages_lights_them() {
             spent += job.samples();
             let ticket = tracer.submit(job);
             solver.take(&tracer.wait(ticket).expect("light"), &budgets);
-            solver.solve(true, lightmap);
+            solver.solve(true, &Light::default(), lightmap);
         }
     };
     let worst = |lightmap: &Lightmap, scene: &Snapshot, emission: f32| {
@@ -213,7 +213,7 @@ fn a_lightmap_without_light_is_dark() {
     let laid_out = laid(&scene);
     let mut solver = LightmapSolver::new(FieldId(0), &scene, &laid_out, MEAN);
     let mut lightmap = solver.dark();
-    solver.solve(true, &mut lightmap);
+    solver.solve(true, &Light::default(), &mut lightmap);
     assert!(lightmap.irradiance.iter().all(|e| *e == Vec3::ZERO));
 }
 
@@ -272,7 +272,7 @@ fn noise_is_filtered_across_charts() {
             let ticket = tracer.submit(job);
             solver.take(&tracer.wait(ticket).expect("light"), &budgets);
             let mut lightmap = solver.dark();
-            solver.solve(true, &mut lightmap);
+            solver.solve(true, &Light::default(), &mut lightmap);
             lightmap
         };
         let [noisy, right] = [8, 2048].map(light);
@@ -418,7 +418,7 @@ fn a_lamp_that_moves_is_followed() {
         let budgets = job.budgets.clone();
         solver.take(&gathered(job), &budgets);
         let mut lightmap = solver.dark();
-        solver.solve(true, &mut lightmap);
+        solver.solve(true, &Light::default(), &mut lightmap);
         lightmap
     };
     let right = converged(&after);
@@ -431,7 +431,7 @@ fn a_lamp_that_moves_is_followed() {
             let (job, budgets) = solver.next_job(scene.clone(), lumels / 4);
             spent += job.samples();
             solver.take(&gathered(Job { seed: spent, ..job }), &budgets);
-            solver.solve(true, &mut lightmap);
+            solver.solve(true, &Light::default(), &mut lightmap);
         }
         let read = |lightmap: &Lightmap| irradiances(scene, lightmap, 2000);
         let (read, right) = (read(&lightmap), read(&right));

@@ -33,6 +33,12 @@ impl Block {
         })
     }
 
+    /// Its number among those of all pages.
+    pub(crate) fn number(&self, page_size: u32) -> usize {
+        let across = page_size.div_ceil(BLOCK);
+        ((self.page * across + self.row) * across + self.column) as usize
+    }
+
     /// Its first lumel.
     pub(crate) fn corner(&self) -> UVec2 {
         BLOCK * UVec2::new(self.column, self.row)

@@ -29,8 +29,11 @@ const GLANCE: u32 = 4;
 /// The same in the first turns of a block, and how many turns these are.
 const FIRST: u32 = 2;
 const FIRST_TURNS: u8 = 2;
-/// Samples of a lumel in a glance, and in a turn.
-const GLANCE_SAMPLES: u32 = 16;
+/// Samples of a lumel in a glance: as many as let a glance at all cells take so many in all, a power of two
+/// within these bounds.
+const GLANCES_SAMPLES: u32 = 1 << 19;
+const GLANCE_SAMPLES: Range<u32> = 4..16;
+/// Samples of a lumel in a turn.
 const TURN_SAMPLES: u32 = 8;
 /// The same in a turn that was hurried.
 const HURRIED_SAMPLES: u32 = 32;
@@ -42,6 +45,8 @@ const CHANGES: u64 = 3;
 const CALM: u64 = 8;
 /// So many glances at a cell and at those about it are to find no change.
 const CHANGING: u8 = 4;
+/// Lumels within something are gathered at in one of so many turns.
+const BURIED: u64 = 8;
 /// Share of turns that all blocks have alike, however noisy they are.
 const EVEN: f32 = 0.5;
 
@@ -74,6 +79,7 @@ struct Turns {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cells {
     page_size: u32,
+    glance_samples: u32,
     /// Block by block.
     cells: Vec<Cell>,
     /// Cells whose light is changing, for so many more glances that find no change.
@@ -126,7 +132,19 @@ impl Cells {
         };
         let places: Vec<(u32, IVec2)> = cells.iter().map(place).collect();
         let cell_at = places.iter().copied().zip(0..).collect();
-        Self { page_size, first: cells.len(), cells, blocks, places, cell_at, ..Self::default() }
+        let glanced: u32 = cells.iter().map(|cell| cell.glance).sum();
+        let glance_samples = 1 << (GLANCES_SAMPLES / glanced.max(1)).max(1).ilog2();
+        let Range { start: fewest, end: most } = GLANCE_SAMPLES;
+        Self {
+            page_size,
+            glance_samples: glance_samples.clamp(fewest, most),
+            first: cells.len(),
+            cells,
+            blocks,
+            places,
+            cell_at,
+            ..Self::default()
+        }
     }
 
     /// Light may be another: all cells get a glance before any has its turn. Those that wait for
@@ -136,11 +154,11 @@ impl Cells {
     }
 
     /// Lets the block of a cell, whose light is another now, have its turn before those where nothing
-    /// has changed.
+    /// has changed, and as it had its first ones.
     pub(crate) fn hasten(&mut self, cell: usize) {
         let least = self.blocks.iter().map(|block| block.due).fold(f64::INFINITY, f64::min);
         let block = self.block_of(cell);
-        self.blocks[block].due = least;
+        (self.blocks[block].due, self.blocks[block].count) = (least, 0);
     }
 
     /// Sets how noisy a sample is in a block: the standard deviation of its luminance, by the square root
@@ -154,9 +172,14 @@ impl Cells {
         self.blocks.partition_point(|block| block.cells.end <= cell)
     }
 
+    /// The cells of a block.
+    pub(crate) fn of_block(&self, block: usize) -> Range<usize> {
+        self.blocks[block].cells.clone()
+    }
+
     /// The receivers of a block.
     pub(crate) fn receivers_of_block(&self, block: usize) -> Range<usize> {
-        let Range { start, end } = self.blocks[block].cells;
+        let Range { start, end } = self.of_block(block);
         self.receivers_of(start).start..self.receivers_of(end - 1).end
     }
 
@@ -203,8 +226,14 @@ impl Cells {
     }
 
     /// What to gather next, about so many samples in all. `lumels` are those of receivers: what a glance
-    /// takes depends on them alone.
-    pub(crate) fn budgets(&mut self, samples: u64, version: u64, lumels: &[u32]) -> Vec<Budget> {
+    /// takes depends on them alone. Those that lie within something are left out of most turns.
+    pub(crate) fn budgets(
+        &mut self,
+        samples: u64,
+        version: u64,
+        lumels: &[u32],
+        is_buried: impl Fn(u32) -> bool,
+    ) -> Vec<Budget> {
         let mut budgets = Vec::new();
         let (mut glances, mut calm, mut turns) = (0, 0, 0);
         while turns < samples
@@ -232,6 +261,8 @@ impl Cells {
             } else if let Some(receivers) = self.next_turn() {
                 let spacing = if self.is_one_of_first { FIRST } else { 1 };
                 let part = Part { spacing, samples: TURN_SAMPLES };
+                let all_alike = self.turns.is_multiple_of(BURIED);
+                let receivers = receivers.filter(|receiver| all_alike || !is_buried(*receiver));
                 turns += self.take(receivers, part, Some(self.turns), lumels, &mut budgets);
             }
             // However many samples there are, a job asks for no more than all lumels.
@@ -246,13 +277,13 @@ impl Cells {
     /// samples.
     fn take(
         &self,
-        receivers: Range<u32>,
+        receivers: impl Iterator<Item = u32>,
         part: Part,
         turn: Option<u64>,
         lumels: &[u32],
         budgets: &mut Vec<Budget>,
     ) -> u64 {
-        let count = u64::from(receivers.end - receivers.start);
+        let before = budgets.len();
         budgets.extend(receivers.map(|receiver| {
             let lumel = lumels[receiver as usize];
             let draws = match turn {
@@ -261,12 +292,12 @@ impl Cells {
             };
             Budget { receiver, samples: part.samples, draws }
         }));
-        count * u64::from(part.samples)
+        (budgets.len() - before) as u64 * u64::from(part.samples)
     }
 
     /// The same for a glance at a cell.
     fn glance_at(&self, cell: usize, lumels: &[u32], budgets: &mut Vec<Budget>) -> u64 {
-        let part = Part { spacing: GLANCE, samples: GLANCE_SAMPLES };
+        let part = Part { spacing: GLANCE, samples: self.glance_samples };
         self.take(self.glanced(cell), part, None, lumels, budgets)
     }
 
@@ -404,9 +435,10 @@ mod tests {
         let all = all(&places);
         let mut seen = HashSet::new();
         // A sixteenth of the lumels.
-        let glances = u64::from(PAGE * PAGE / 16 * GLANCE_SAMPLES);
+        let glances = u64::from(PAGE * PAGE / 16 * cells.glance_samples);
+        assert_eq!(cells.glance_samples, GLANCE_SAMPLES.end);
         for _ in 0..8 {
-            let budgets = cells.budgets(glances / 8, 1, &all);
+            let budgets = cells.budgets(glances / 8, 1, &all, |_| false);
             assert_eq!(share(&budgets), 1.0);
             seen.extend(lumels(&places, &budgets));
         }
@@ -417,7 +449,7 @@ mod tests {
         // Then one of four, and all of them.
         let turns = u64::from(PAGE * PAGE * TURN_SAMPLES);
         for count in [4, 4, 1] {
-            let turn = |_| lumels(&places, &cells.budgets(turns / 4 / count, 1, &all));
+            let turn = |_| lumels(&places, &cells.budgets(turns / 4 / count, 1, &all, |_| false));
             let turned: HashSet<u32> = (0..4).flat_map(turn).collect();
             assert_eq!(turned.len(), PAGE as usize * PAGE as usize / count as usize);
         }
@@ -434,28 +466,28 @@ mod tests {
             let glances = budgets.iter().filter(|b| is_glance(b));
             glances.map(|b| cells.cell_of(b.receiver)).collect()
         };
-        let coarse = cells.budgets(samples, 1, &all);
+        let coarse = cells.budgets(samples, 1, &all, |_| false);
         assert_eq!((share(&coarse), cells_of(&cells, &coarse).len()), (1.0, 64));
-        assert_eq!(share(&cells.budgets(samples, 1, &all)), 0.0, "nothing is another");
-        let calm = share(&cells.budgets(samples, 2, &all));
+        assert_eq!(share(&cells.budgets(samples, 1, &all, |_| false)), 0.0, "nothing is another");
+        let calm = share(&cells.budgets(samples, 2, &all, |_| false));
         assert!((0.05..0.2).contains(&calm), "{calm}");
         cells.count_glance(9, true);
         let about: BTreeSet<usize> = cells.about(9).collect();
         assert!((4..=9).contains(&about.len()));
         for version in 3..6 {
-            let budgets = cells.budgets(samples, version, &all);
+            let budgets = cells.budgets(samples, version, &all, |_| false);
             let glanced = cells_of(&cells, &budgets);
             assert!(about.is_subset(&glanced) && glanced.len() < 24, "{glanced:?}");
         }
         (0..64).for_each(|cell| cells.count_glance(cell, true));
-        let quarter = share(&cells.budgets(samples, 6, &all));
+        let quarter = share(&cells.budgets(samples, 6, &all, |_| false));
         assert!((0.25..0.4).contains(&quarter), "{quarter}");
         for _ in 0..CHANGING {
             (0..64).for_each(|cell| cells.count_glance(cell, false));
         }
-        assert!(share(&cells.budgets(samples, 7, &all)) < 0.2, "light is calm again");
+        assert!(share(&cells.budgets(samples, 7, &all, |_| false)) < 0.2, "light is calm again");
         cells.expect_change();
-        assert_eq!(share(&cells.budgets(samples / 2, 8, &all)), 1.0);
+        assert_eq!(share(&cells.budgets(samples / 2, 8, &all, |_| false)), 1.0);
     }
 
     /// Glances at a lumel are the same in all jobs.
@@ -466,7 +498,7 @@ mod tests {
         let mut seen = HashMap::new();
         for version in 1..20 {
             cells.expect_change();
-            for budget in cells.budgets(u64::from(PAGE * PAGE), version, &all) {
+            for budget in cells.budgets(u64::from(PAGE * PAGE), version, &all, |_| false) {
                 let known = seen.entry(budget.receiver).or_insert(budget.draws);
                 assert_eq!(budget.draws, *known);
             }
@@ -479,6 +511,6 @@ mod tests {
     fn no_lumels_are_no_trouble() {
         let mut cells = Cells::new(&mut [], PAGE);
         cells.expect_change();
-        assert!(cells.budgets(1000, 1, &[]).is_empty());
+        assert!(cells.budgets(1000, 1, &[], |_| false).is_empty());
     }
 }

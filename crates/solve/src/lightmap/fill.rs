@@ -6,8 +6,7 @@
 //! pyramid of halves, and down again to where nothing is known. What comes of it is smooth, costs few
 //! bits, and is the nearest neighbour's light beside a chart.
 
-use glam::{UVec2, Vec2, Vec3};
-use rayon::prelude::*;
+use glam::{UVec2, Vec2, Vec3, Vec4};
 
 /// A level of the pyramid: sums of what is known, and their weights.
 struct Level {
@@ -71,24 +70,25 @@ pub(crate) fn fill(page: &mut [Vec3], side: u32, is_known: impl Fn(usize) -> boo
 
 /// Gives lumels beside known ones the mean of these, which are known from then on.
 fn grow(page: &mut [Vec3], known: &mut [bool], side: u32) {
-    let beside = |number: u32| {
-        let (x, y) = ((number % side) as i32, (number / side) as i32);
-        let about = (0..9).map(move |k| (x + k % 3 - 1, y + k / 3 - 1));
-        let within = |c: i32| (0..side as i32).contains(&c);
-        about
-            .filter(move |(x, y)| within(*x) && within(*y))
-            .map(move |(x, y)| (y * side as i32 + x) as usize)
+    // Light, and whether it is known.
+    let own = |(known, light): (&bool, &Vec3)| if *known { light.extend(1.0) } else { Vec4::ZERO };
+    let own: Vec<Vec4> = known.iter().zip(page.iter()).map(own).collect();
+    let side = side as usize;
+    let of_row = |number: usize| {
+        let column = number % side;
+        let left = if column > 0 { own[number - 1] } else { Vec4::ZERO };
+        let right = if column + 1 < side { own[number + 1] } else { Vec4::ZERO };
+        left + own[number] + right
     };
-    let mean = |number: u32| {
-        let lumels = beside(number).filter(|lumel| known[*lumel]).map(|lumel| page[lumel]);
-        let (sum, count) = lumels.fold((Vec3::ZERO, 0.0), |(sum, n), light| (sum + light, n + 1.0));
-        (count > 0.0).then(|| sum / count)
-    };
-    let unknown = (0..page.len() as u32).into_par_iter().filter(|n| !known[*n as usize]);
-    let grown: Vec<(u32, Vec3)> = unknown.filter_map(|n| Some((n, mean(n)?))).collect();
-    for (number, light) in grown {
-        page[number as usize] = light;
-        known[number as usize] = true;
+    let rows: Vec<Vec4> = (0..own.len()).map(of_row).collect();
+    for (number, (light, known)) in page.iter_mut().zip(known).enumerate() {
+        if !*known {
+            let above = if number >= side { rows[number - side] } else { Vec4::ZERO };
+            let sum = above + rows[number] + rows.get(number + side).copied().unwrap_or_default();
+            if sum.w > 0.0 {
+                (*light, *known) = (sum.truncate() / sum.w, true);
+            }
+        }
     }
 }
 

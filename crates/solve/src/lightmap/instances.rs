@@ -1,6 +1,6 @@
 //! Instances that move, rest, come and go, and what becomes of their lumels.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
@@ -100,6 +100,10 @@ impl LightmapSolver {
                 }
             }
         }
+        let known = new.lumels.iter().zip(&new.sums).filter(|(_, sum)| sum.samples() > 0.0);
+        let known: BTreeSet<Block> =
+            known.map(|(lumel, _)| Block::of(*lumel, new.layout.page_size)).collect();
+        new.dark.retain(|block| !known.contains(block));
         for lumels in std::iter::once(&mut shown.irradiance).chain(&mut shown.slopes) {
             lumels.resize(new.layout.lumel_count(), Vec3::ZERO);
         }

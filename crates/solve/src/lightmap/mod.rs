@@ -13,6 +13,7 @@ mod instances;
 mod places;
 mod point;
 mod points;
+mod queue;
 mod ripening;
 mod seams;
 mod slopes;
@@ -20,7 +21,7 @@ mod solving;
 mod sums;
 mod taking;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
@@ -38,6 +39,7 @@ use glances::Glances;
 use places::{LumelPlace, lumel_places};
 use point::Point;
 pub use points::spread;
+use queue::Queue;
 use ripening::Ripening;
 use seams::Seams;
 pub use seams::sides_of_seams;
@@ -79,11 +81,15 @@ pub struct LightmapSolver {
     seams: Arc<Seams>,
     /// Whether lumels are gathered at in turns: light is live.
     in_turns: bool,
-    /// Blocks that are solved next.
-    news: BTreeSet<Block>,
+    /// Blocks that are solved next: their light is another, or they never were.
+    news: Queue,
     /// Blocks that are solved by and by: much more is known of them, or of what they read of others.
-    due: BTreeSet<Block>,
+    due: Queue,
     ripening: Ripening,
+    /// Blocks that nothing was known of: those that show nothing, and those that show the light of probes.
+    /// The first ones are the next to show it.
+    dark: VecDeque<Block>,
+    unknown: VecDeque<Block>,
     /// Blocks without surfaces beside those that have some: they are solved with these.
     beside: Arc<BTreeMap<Block, Vec<Block>>>,
     /// Blocks that read light of a block when they are filtered.
@@ -133,9 +139,11 @@ impl LightmapSolver {
             slopes: None,
             seams: Arc::new(Seams::new(scene, &layout)),
             in_turns: false,
-            news: BTreeSet::new(),
-            due: BTreeSet::new(),
+            news: Queue::default(),
+            due: Queue::default(),
             ripening: Ripening::default(),
+            dark: covered(&places, layout.page_size).into_iter().collect(),
+            unknown: VecDeque::new(),
             readers: Arc::new(readers),
             beside: Arc::new(empty_beside(&places, layout.page_size)),
             without: ids.filter(|id| !placed.contains_key(id)).collect(),
@@ -196,7 +204,9 @@ impl LightmapSolver {
     /// [`Self::take`].
     pub fn next_job(&mut self, scene: Arc<Snapshot>, samples: u64) -> (Job, Vec<Budget>) {
         self.in_turns = true;
-        let mut budgets = self.cells.budgets(samples, scene.version, &self.lumels);
+        let is_buried = |receiver: u32| self.sums[receiver as usize].is_certainly_buried();
+        let (version, lumels) = (scene.version, &self.lumels);
+        let mut budgets = self.cells.budgets(samples, version, lumels, is_buried);
         if self.settings.significance.is_infinite() {
             budgets.iter_mut().for_each(|budget| budget.draws = Draws::Own);
         }
@@ -246,9 +256,14 @@ fn placed(scene: &Snapshot, layout: &Layout) -> HashMap<InstanceId, Affine3A> {
     all.filter(|(id, _)| with_lumels.contains(id)).collect()
 }
 
+/// The blocks in which surfaces lie.
+fn covered(places: &[LumelPlace], page_size: u32) -> BTreeSet<Block> {
+    places.iter().map(|place| Block::of(place.lumel, page_size)).collect()
+}
+
 /// The blocks in which no surface lies, beside those in which some do.
 fn empty_beside(places: &[LumelPlace], page_size: u32) -> BTreeMap<Block, Vec<Block>> {
-    let covered: BTreeSet<Block> = places.iter().map(|p| Block::of(p.lumel, page_size)).collect();
+    let covered = covered(places, page_size);
     let empty = |block: &Block| {
         let beside = block.beside(page_size).filter(|beside| !covered.contains(beside));
         (*block, beside.collect())

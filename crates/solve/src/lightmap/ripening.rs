@@ -43,6 +43,11 @@ impl Ripening {
         self.0.insert(block, News::default());
     }
 
+    /// Whether a block was solved since its light was forgotten.
+    pub(crate) fn is_solved(&self, block: &Block) -> bool {
+        self.0.contains_key(block)
+    }
+
     /// What was known of a block's light counts no more.
     pub(crate) fn forget(&mut self, block: &Block) {
         self.0.remove(block);

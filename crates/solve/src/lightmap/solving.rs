@@ -1,15 +1,21 @@
 //! What is known of lumels becomes light that can be shown.
 
+use std::collections::BTreeSet;
+
 use glam::{UVec2, Vec3};
-use lumencast_light::{Lightmap, luminance, slope};
+use lumencast_light::{Light, Lightmap, luminance, slope};
 use rayon::prelude::*;
 
 use super::blocks::{BLOCK, Block};
 use super::filter::{Noisy, REACH, filter};
 use super::{LightmapSolver, NO_RECEIVER, beyond, fill};
 
-/// So many blocks are solved at a time, beside those that cannot wait.
+/// So many blocks whose light is another are solved at a time where light is live, and so many of others.
+const NEWS_AT_ONCE: usize = 12;
 const DUE_AT_ONCE: usize = 4;
+/// So many blocks that nothing is known of show the light of probes at a time, and so many do so again.
+const DARK_AT_ONCE: usize = 16;
+const UNKNOWN_AT_ONCE: usize = 2;
 
 /// What is shown of a block's lumels, row by row of [`BLOCK`].
 struct Solved {
@@ -19,18 +25,16 @@ struct Solved {
 
 impl LightmapSolver {
     /// Makes light of what has been taken in since the last time: filtered on the surface where
-    /// `filtered`, spread to where nothing is known, and the same on both sides of seams. `shown` is what
-    /// [`Self::dark`] made, with all that has been solved since.
-    pub fn solve(&mut self, filtered: bool, shown: &mut Lightmap) {
-        let mut news = std::mem::take(&mut self.news);
-        self.due.retain(|block| !news.contains(block));
-        for _ in 0..DUE_AT_ONCE {
-            news.extend(self.due.pop_first());
-        }
+    /// `filtered`, spread to where nothing is known, and the same on both sides of seams. Where nothing
+    /// is known yet, the light of `probes` is shown, if there are any. `shown` is what [`Self::dark`] made, with
+    /// all that has been solved since.
+    pub fn solve(&mut self, filtered: bool, probes: &Light, shown: &mut Lightmap) {
+        let mut news = self.next();
         news.iter().for_each(|block| self.ripening.solved(*block));
         let beside = news.iter().filter_map(|block| self.beside.get(block)).flatten();
         let beside: Vec<Block> = beside.copied().collect();
         news.extend(beside);
+        self.show_probes(probes, shown);
         let news: Vec<Block> = news.into_iter().collect();
         let solved: Vec<Solved> =
             news.par_iter().map(|block| self.solved(block, filtered)).collect();
@@ -41,7 +45,12 @@ impl LightmapSolver {
                 self.put(block, &solved, shown);
             }
         }
-        let seams = self.seams.about(|lumel| news.binary_search(&Block::of(lumel, size)).is_ok());
+        let numbers: Vec<usize> = news.iter().map(|block| block.number(size)).collect();
+        let mut is_new = vec![false; numbers.last().map_or(0, |last| last + 1)];
+        numbers.into_iter().for_each(|number| is_new[number] = true);
+        let number = |lumel| Block::of(lumel, size).number(size);
+        let seams =
+            self.seams.about(|lumel| is_new.get(number(lumel)).is_some_and(|is_new| *is_new));
         let of = |lumel: &u32| self.known(beyond::own(self.receiver_of[*lumel as usize])?);
         let is_known = |lumel: &u32| of(lumel).is_some_and(|lumel| lumel.is_known());
         let known: Vec<bool> = seams.lumels().iter().map(is_known).collect();
@@ -49,6 +58,59 @@ impl LightmapSolver {
         if let Some(slopes) = &mut shown.slopes {
             seams.apply_signed(slopes, &known);
         }
+    }
+
+    /// Blocks to be solved now. Where light is live these are some, in turn: most of them such whose light
+    /// is another.
+    fn next(&mut self) -> BTreeSet<Block> {
+        if !self.in_turns {
+            self.due.take_all();
+            return self.news.take_all();
+        }
+        let mut next = self.news.take(NEWS_AT_ONCE);
+        let others = DUE_AT_ONCE.max(NEWS_AT_ONCE - next.len());
+        next.iter().chain(self.news.all()).for_each(|block| self.due.remove(block));
+        next.extend(self.due.take(others));
+        next
+    }
+
+    /// Lets blocks that nothing is known of show the light of probes, some at a time, until samples come.
+    fn show_probes(&mut self, probes: &Light, shown: &mut Lightmap) {
+        if probes.volumes().next().is_none() {
+            return;
+        }
+        let Self { dark, unknown, ripening, .. } = self;
+        dark.retain(|block| !ripening.is_solved(block));
+        unknown.retain(|block| !ripening.is_solved(block));
+        let next: Vec<Block> = match dark.is_empty() {
+            true => unknown.drain(..UNKNOWN_AT_ONCE.min(unknown.len())).collect(),
+            false => dark.drain(..DARK_AT_ONCE.min(dark.len())).collect(),
+        };
+        unknown.extend(&next);
+        let told: Vec<Vec<Vec3>> =
+            next.par_iter().map(|block| self.told_by_probes(block, probes)).collect();
+        for (block, told) in next.iter().zip(told) {
+            self.put(block, &told, &mut shown.irradiance);
+        }
+    }
+
+    /// The irradiance of probes at the lumels of a block, row by row.
+    fn told_by_probes(&self, block: &Block, probes: &Light) -> Vec<Vec3> {
+        let size = self.layout.page_size;
+        let receiver = |number: u32| {
+            let at = block.corner() + UVec2::new(number % BLOCK, number / BLOCK);
+            let is_on_page = at.max_element() < size;
+            beyond::own(is_on_page.then(|| self.receiver_of[self.layout.index(block.page, at)])?)
+        };
+        let told = |receiver: u32| {
+            let point = &self.points[receiver as usize];
+            probes.irradiance(point.position, point.normal()).max(Vec3::ZERO)
+        };
+        let told: Vec<Option<Vec3>> =
+            (0..BLOCK * BLOCK).map(|number| receiver(number).map(told)).collect();
+        let mut light: Vec<Vec3> = told.iter().map(|told| told.unwrap_or_default()).collect();
+        fill::fill(&mut light, BLOCK, |number| told[number].is_some());
+        light
     }
 
     /// Puts the lumels of a block, row by row of [`BLOCK`], among those of all pages.

@@ -9,6 +9,8 @@ use super::change::Change;
 /// Share of backs, by winding, above which a lumel lies within something: its light is that of the
 /// lumels about it.
 const BURIED_ABOVE: f32 = 0.5;
+/// So many samples tell whether it does.
+const CERTAIN: f32 = 16.0;
 /// What was known of light that has changed weighs as many samples, at least.
 const LEAST: f32 = 4.0;
 /// Noise grows with light that becomes brighter up to that.
@@ -105,6 +107,11 @@ impl Sum {
 
     pub(crate) fn is_buried(&self) -> bool {
         self.backs > BURIED_ABOVE * self.samples
+    }
+
+    /// Whether more samples would hardly find otherwise.
+    pub(crate) fn is_certainly_buried(&self) -> bool {
+        self.is_buried() && self.samples >= CERTAIN
     }
 
     /// Irradiance and the variance of its luminance, both zero where nothing has arrived; nothing where

@@ -56,7 +56,9 @@ impl LightmapSolver {
             let sums = &self.sums[receivers];
             self.cells.set_noise(number, noise(sums));
             let known: f32 = sums.iter().map(Sum::samples).sum();
-            self.ripen(block, new / known, 0.0);
+            if self.ripening.is_solved(&block) || self.is_seen_all(number) {
+                self.ripen(block, new / known, 0.0);
+            }
         }
         self.due.extend(self.ripening.ripe());
     }
@@ -93,7 +95,7 @@ impl LightmapSolver {
             *most = most.max(if level > 0.0 { by / level } else { by });
             if by > MUCH * level {
                 self.cells.hasten(cell);
-                self.due.extend(self.readers.get(&block).into_iter().flatten());
+                self.due.extend(self.readers.get(&block).into_iter().flatten().copied());
             }
         }
         for (block, change) in blocks {
@@ -130,6 +132,15 @@ impl LightmapSolver {
         if at_once || !self.in_turns {
             self.news.insert(block);
         }
+    }
+
+    /// Whether every cell of a block has samples.
+    fn is_seen_all(&self, block: usize) -> bool {
+        let is_seen = |cell| {
+            let sums = &self.sums[self.cells.receivers_of(cell)];
+            sums.iter().any(|sum| sum.samples() > 0.0)
+        };
+        self.cells.of_block(block).all(is_seen)
     }
 
     /// The block of a receiver.

@@ -20,7 +20,7 @@ use lumencast_charts::LaidOut;
 use lumencast_codec::{LumelCoding, Qp};
 use lumencast_gather::path_trace::{CpuPathTracer, Levels, Options};
 use lumencast_gather::{Gather, Job, Receiver};
-use lumencast_light::{FieldId, Lightmap, Place};
+use lumencast_light::{FieldId, Light, Lightmap, Place};
 use lumencast_scene::{Scene, Snapshot};
 use lumencast_server::TickOptions;
 use lumencast_solve::blend::BlendSettings;
@@ -117,10 +117,10 @@ impl BenchLightmap {
         self.gather(&mut solver, &snapshot, &mut tracer)?;
         let gather_seconds = start.elapsed().as_secs_f64();
         let mut gathered = solver.dark();
-        solver.clone().solve(false, &mut gathered);
+        solver.clone().solve(false, &Light::default(), &mut gathered);
         let start = Instant::now();
         let mut lightmap = solver.dark();
-        solver.solve(true, &mut lightmap);
+        solver.solve(true, &Light::default(), &mut lightmap);
         let filter_seconds = start.elapsed().as_secs_f64();
 
         let sides = sides_of_seams(&snapshot, &lightmap);
@@ -225,7 +225,7 @@ impl BenchLightmap {
                 let mut solver = LightmapSolver::new(FieldId(0), &snapshot, laid_out, MEAN);
                 self.gather(&mut solver, &snapshot, &mut tracer)?;
                 let mut lightmap = solver.dark();
-                solver.solve(true, &mut lightmap);
+                solver.solve(true, &Light::default(), &mut lightmap);
                 Some((edit, lightmap))
             }
         };
