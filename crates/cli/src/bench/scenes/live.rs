@@ -1,6 +1,7 @@
 //! A scene's light as a server casts it: some seconds after the server began, and after a light has moved.
 
 use anyhow::Result;
+use lumencast_codec::{LumelCoding, Qp};
 use lumencast_gather::Gather;
 use lumencast_light::Field;
 use lumencast_picture::Picture;
@@ -59,6 +60,7 @@ impl Live<'_> {
             gather: GatherOptions { directional: wanted.directional, ..gather },
             volumes: wanted.volumes.clone(),
             lightmap: wanted.lightmap.clone(),
+            lumel_coding: LumelCoding::H264(Qp::default()),
             ..TickOptions::default()
         };
         let bar = output::spinner(format!("Casting {}", subject.name));
@@ -73,11 +75,19 @@ impl Live<'_> {
             let fields: Vec<Field> = cast.tick.light().fields().to_vec();
             draw_light(renderer, fields, subject.view, settings)
         };
+        let write = |what: &str, picture: &Picture| {
+            bench.write(&subject.name, what, picture, settings.pre_exposure)
+        };
         add("as served, converged".to_owned(), &still, judge)?;
-        add(format!("live, after {seconds} s"), &part(&[])?, judge)?;
+        let live = part(&[])?;
+        write("live", &live)?;
+        add(format!("live, after {seconds} s"), &live, judge)?;
         if let Some((edit, converged, judge)) = moved {
             add("a light moved, converged".to_owned(), &converged, &judge)?;
-            add(format!("live, {seconds} s after it moved"), &part(&[edit])?, &judge)?;
+            write("moved", &converged)?;
+            let live = part(&[edit])?;
+            write("live-moved", &live)?;
+            add(format!("live, {seconds} s after it moved"), &live, &judge)?;
         }
         bar.finish_and_clear();
         Ok(beside)

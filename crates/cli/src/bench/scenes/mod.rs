@@ -80,7 +80,8 @@ pub(crate) struct BenchScenes {
     /// Keeps references in this folder and goes on from there.
     #[arg(long, value_name = "FOLDER")]
     keep: Option<PathBuf>,
-    /// Writes each scene's indirect light, the reference's and how they differ into this folder.
+    /// Writes each scene's indirect light, the reference's and how they differ into this folder; with
+    /// --live, what is shown after the seconds, and the converged light where it has moved.
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
     /// Puts the table into this document of markdown, in place of the one that an earlier run put there
@@ -200,15 +201,9 @@ impl BenchScenes {
         if let Some((what, picture)) = more {
             beside.push(Beside { what, psnr: judge.psnr(&picture)? });
         }
-        if let Some(folder) = &self.output {
-            let write = |what: &str, picture: &Picture, exposure: f32| {
-                let path = folder.join(format!("{}-{what}.png", subject.name));
-                picture.write_png(path, ToneMap::Gamma, exposure)
-            };
-            write("reference", judge.reference(), exposure)?;
-            write("field", &picture, exposure)?;
-            write("difference", &judge.difference(&picture), 1.0)?;
-        }
+        self.write(&subject.name, "reference", judge.reference(), exposure)?;
+        self.write(&subject.name, "field", &picture, exposure)?;
+        self.write(&subject.name, "difference", &judge.difference(&picture), 1.0)?;
         if let Some(seconds) = self.live {
             let live = Live { bench: self, subject: &subject, wanted: &wanted, settings };
             beside.extend(live.beside(renderer, gatherer, judge, seconds.into())?);
@@ -232,6 +227,13 @@ impl BenchScenes {
             exposure,
             beside,
         })
+    }
+
+    /// Writes a picture of a scene, where that is wished for.
+    fn write(&self, scene: &str, what: &str, picture: &Picture, exposure: f32) -> Result<()> {
+        let Some(folder) = &self.output else { return Ok(()) };
+        let path = folder.join(format!("{scene}-{what}.png"));
+        Ok(picture.write_png(path, ToneMap::Gamma, exposure)?)
     }
 
     fn traced(&self, subject: &Subject, parts: Parts) -> Result<Traced> {
