@@ -2,11 +2,11 @@
 
 use std::f32::consts::PI;
 
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Quat, UVec3, Vec3};
 use lumencast_charts::{LaidOut, Sheet, laid_out, sheets};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Receiver, Shading};
-use lumencast_light::{FieldId, Light, Lightmap, Place, SurfaceId};
+use lumencast_light::{FieldId, Grid, Light, Lightmap, Order, Place, ProbeVolume, SurfaceId};
 use lumencast_scene::{Edit, Environment, LightmapSpec, Material, Scene, Snapshot, Transform};
 use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{GatherOptions, LightmapSolver, Request, Solver, Turn, spread, with_backs};
@@ -160,6 +160,44 @@ fn a_glance_at_all_pages_lights_them() {
     assert!(worst(&lightmap, &scene, 3.0) > 0.5, "nothing has been gathered");
     gather(&mut solver, &mut lightmap, &scene, 2 * lumels);
     assert!(worst(&lightmap, &scene, 3.0) < 0.08, "{}", worst(&lightmap, &scene, 3.0));
+}
+
+/// Lumels that nothing is known of show the light of probes, until samples tell of all about them.
+#[test]
+fn lumels_begin_with_the_light_of_probes() {
+    let scene = Arc::new(furnace(1.0));
+    let laid_out = laid(&scene);
+    let mut solver = LightmapSolver::new(FieldId(1), &scene, &laid_out, BlendSettings::default());
+    let grid = Grid {
+        center: Vec3::ZERO,
+        rotation: Quat::IDENTITY,
+        size: Vec3::splat(8.0),
+        resolution: UVec3::ONE,
+    };
+    let mut volume = ProbeVolume::dark(FieldId(0), grid, Order::L1);
+    for probe in 0..grid.probe_count() {
+        volume.probe_mut(probe)[0] = Vec3::X / 0.282_094_8; // radiance 1, of red, from everywhere
+    }
+    let probes = Light::new([volume]);
+    let mut lightmap = solver.dark();
+    let read = |lightmap: &Lightmap| irradiances(&scene, lightmap, 500);
+    solver.solve(true, &Light::default(), &mut lightmap);
+    assert!(read(&lightmap).iter().all(|e| *e == Vec3::ZERO), "there are no probes");
+    solver.solve(true, &probes, &mut lightmap);
+    assert!(read(&lightmap).iter().all(|e| e.abs_diff_eq(PI * Vec3::X, 1e-3)));
+    let mut tracer = tracer();
+    let mut lit = 0;
+    while lit < 500 {
+        let (job, budgets) = solver.next_job(scene.clone(), 4096);
+        let ticket = tracer.submit(Job { bounces: 12, ..job });
+        solver.take(&tracer.wait(ticket).expect("light"), &budgets);
+        solver.solve(true, &probes, &mut lightmap);
+        let now = read(&lightmap).iter().filter(|e| e.z > 0.5 * PI).count();
+        assert!(now >= lit, "light of lumels gives way to none");
+        lit = now;
+        let either = |e: &Vec3| e.x > 0.5 * PI;
+        assert!(read(&lightmap).iter().all(either), "and nothing is dark meanwhile");
+    }
 }
 
 /// Under an even sky: a plate that stands free has lumels on both sides and is as bright as the sky; a

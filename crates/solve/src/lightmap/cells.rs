@@ -507,6 +507,23 @@ mod tests {
         assert_eq!(others.len(), seen.len());
     }
 
+    /// Lumels within something have few turns, but as many glances.
+    #[test]
+    fn buried_lumels_are_gathered_at_now_and_then() {
+        let (places, mut cells) = cells();
+        let all = all(&places);
+        let mut counts = [0; 2];
+        for _ in 0..64 {
+            for budget in cells.budgets(u64::from(8 * PAGE * PAGE), 1, &all, |r| r % 2 == 0) {
+                counts[budget.receiver as usize % 2] += u64::from(!is_glance(&budget));
+            }
+        }
+        let share = counts[0] as f32 / counts[1] as f32;
+        assert!((0.1..0.15).contains(&share), "{share}");
+        let budgets = cells.budgets(1 << 20, 1, &all, |_| true);
+        assert!(!budgets.is_empty(), "all of them");
+    }
+
     #[test]
     fn no_lumels_are_no_trouble() {
         let mut cells = Cells::new(&mut [], PAGE);
