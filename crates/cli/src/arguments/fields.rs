@@ -64,9 +64,10 @@ pub(crate) struct LiveFieldsArguments {
     /// (h264-stacked), or as they are (halves), which takes a fast link.
     #[arg(long, value_enum, default_value_t = SentAs::H264)]
     lumel_coding: SentAs,
-    /// How coarse the video is; 6 more make half the bytes or less.
-    #[arg(long, value_name = "12..36", default_value_t, value_parser = qp)]
-    qp: Qp,
+    /// How coarse the video is; 6 more make half the bytes or less. Unless given, 12 for pages of up to
+    /// 512² lumels, and 15 for larger ones.
+    #[arg(long, value_name = "12..36", value_parser = qp)]
+    qp: Option<Qp>,
     /// Lets lumels also tell how light depends on the normal, for surfaces with normal maps. Takes about
     /// twice the bytes.
     #[arg(long)]
@@ -91,11 +92,12 @@ fn qp(text: &str) -> Result<Qp, String> {
 }
 
 impl LiveFieldsArguments {
-    /// How lumels are sent.
-    pub(crate) fn coding(&self) -> LumelCoding {
+    /// How lumels on pages of so many a side are sent.
+    pub(crate) fn coding(&self, page_size: u32) -> LumelCoding {
+        let qp = self.qp.unwrap_or(Qp::for_pages(page_size));
         match self.lumel_coding {
-            SentAs::H264 => LumelCoding::H264(self.qp),
-            SentAs::H264Stacked => LumelCoding::H264Stacked(self.qp),
+            SentAs::H264 => LumelCoding::H264(qp),
+            SentAs::H264Stacked => LumelCoding::H264Stacked(qp),
             SentAs::Halves => LumelCoding::Halves,
         }
     }

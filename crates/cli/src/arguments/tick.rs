@@ -53,6 +53,7 @@ impl TickArguments {
         gatherer: &mut dyn Gather,
     ) -> Result<TickOptions> {
         let lightmap = self.fields.lumels(scene, gatherer)?;
+        let page_size = lightmap.as_ref().map_or(0, |laid_out| laid_out.layout.page_size);
         let blend = BlendSettings { ratio: self.ratio, significance: self.significance };
         let feedback = if self.feedback { ", feedback" } else { "" };
         let options = gather.options(blend, gather.reading.served());
@@ -67,7 +68,7 @@ impl TickArguments {
             lightmap,
             lumel_samples: None,
             charts: Store::of_user(),
-            lumel_coding: self.fields.coding(),
+            lumel_coding: self.fields.coding(page_size),
             script: self.edits.as_deref().map(read_script).transpose()?,
         })
     }

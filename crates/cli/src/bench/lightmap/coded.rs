@@ -77,7 +77,8 @@ impl Coded {
 
     /// Whether servers send it so unless told otherwise.
     pub(super) fn is_default(&self) -> bool {
-        (self.qp, self.stacked) == (Qp::default().get(), false)
+        let default = Qp::for_pages(self.shown.layout.page_size).get();
+        (self.qp, self.stacked) == (default, false)
     }
 
     pub(super) fn name(&self) -> &'static str {

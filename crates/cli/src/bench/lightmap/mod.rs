@@ -232,7 +232,7 @@ impl BenchLightmap {
         let goals = Goals { before: before.clone(), after, white };
         let gather = GatherOptions { bounces: self.bounces, ..GatherOptions::default() };
         let lightmap = Some(laid_out.clone());
-        let lumel_coding = LumelCoding::H264(Qp::default());
+        let lumel_coding = LumelCoding::H264(Qp::for_pages(laid_out.layout.page_size));
         let options = TickOptions { gather, lightmap, lumel_coding, ..TickOptions::default() };
         live::measure(scene, Box::new(tracer), options, &goals)
     }

@@ -56,11 +56,12 @@ impl Live<'_> {
             }
         };
         let gather = served.gathered(BOUNCES - 1, f32::INFINITY, BlendSettings::default());
+        let page_size = wanted.lightmap.as_ref().map_or(0, |laid_out| laid_out.layout.page_size);
         let options = TickOptions {
             gather: GatherOptions { directional: wanted.directional, ..gather },
             volumes: wanted.volumes.clone(),
             lightmap: wanted.lightmap.clone(),
-            lumel_coding: LumelCoding::H264(Qp::default()),
+            lumel_coding: LumelCoding::H264(Qp::for_pages(page_size)),
             ..TickOptions::default()
         };
         let bar = output::spinner(format!("Casting {}", subject.name));
