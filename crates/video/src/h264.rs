@@ -25,10 +25,10 @@ impl Qp {
         Self::RANGE.contains(&qp).then_some(Self(qp))
     }
 
-    /// What suits lumels on pages of so many a side, so that they lose at most about 1.5 dB: 12, but 15 for
-    /// pages of more than 512. Light of small pages has less noise to lose, and costs few bytes.
+    /// What suits lumels on pages of so many a side, so that they lose at most 1.5 dB: 12, but 18 for
+    /// pages of more than 512, which lose less and cost more bytes.
     pub fn for_pages(side: u32) -> Self {
-        Self(if side <= 512 { 12 } else { 15 })
+        Self(if side <= 512 { 12 } else { 18 })
     }
 
     /// As a number.
