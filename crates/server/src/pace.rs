@@ -143,7 +143,7 @@ pub(crate) struct LumelPace {
 impl LumelPace {
     /// Share of the period that a tick with lumels aims to fill.
     const SHARE: f64 = 0.8;
-    /// Share of the period, or of a tick that takes longer, that lumels have at least.
+    /// Share of the period that lumels have, however long the rest takes.
     const LEAST_SHARE: f64 = 0.3;
     /// Samples of the first tick, and of any at least: few, for machines that are slow.
     const LEAST: u64 = 1024;
@@ -174,8 +174,7 @@ impl LumelPace {
             return;
         }
         let rest = (total - seconds).max(0.0);
-        let least = Self::LEAST_SHARE * self.period.max(total);
-        let room = (Self::SHARE * self.period - rest).max(least);
+        let room = (Self::SHARE * self.period - rest).max(Self::LEAST_SHARE * self.period);
         let fitting = samples as f64 * room / seconds.max(1e-9);
         let most = self.samples as f64 * Self::RISE;
         self.samples = (fitting.min(most) as u64).max(Self::LEAST);
@@ -251,11 +250,9 @@ mod tests {
             }
             pace
         };
-        let least = LumelPace::LEAST_SHARE;
-        for (rest, room) in
-            [(0.0, 0.8 * PERIOD), (0.01, 0.55 * PERIOD), (1.0, least / (1.0 - least))]
+        for (rest, share) in [(0.0, LumelPace::SHARE), (0.01, 0.55), (1.0, LumelPace::LEAST_SHARE)]
         {
-            let (samples, expected) = (after(rest).samples(), (room * 1e6) as u64);
+            let (samples, expected) = (after(rest).samples(), (share * PERIOD * 1e6) as u64);
             assert!(samples.abs_diff(expected) < expected / 100, "{rest}: {samples}");
         }
         let mut pace = after(0.0);
@@ -264,7 +261,7 @@ mod tests {
         assert_eq!(pace.samples(), samples, "no job has ended");
         pace.record(samples, 1.0);
         pace.finish(1.0);
-        assert!(pace.samples() <= samples * 3 / 10, "it falls at once");
+        assert_eq!(pace.samples(), LumelPace::LEAST, "it falls at once");
         let mut fixed = LumelPace::new(PERIOD, Some(77));
         fixed.record(77, 1.0);
         fixed.finish(1.0);

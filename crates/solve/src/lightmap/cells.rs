@@ -154,11 +154,11 @@ impl Cells {
     }
 
     /// Lets the block of a cell, whose light is another now, have its turn before those where nothing
-    /// has changed, and as it had its first ones.
+    /// has changed.
     pub(crate) fn hasten(&mut self, cell: usize) {
         let least = self.blocks.iter().map(|block| block.due).fold(f64::INFINITY, f64::min);
         let block = self.block_of(cell);
-        (self.blocks[block].due, self.blocks[block].count) = (least, 0);
+        self.blocks[block].due = least;
     }
 
     /// Sets how noisy a sample is in a block: the standard deviation of its luminance, by the square root

@@ -13,6 +13,8 @@ use super::{LightmapSolver, NO_RECEIVER, beyond, fill};
 /// So many blocks whose light is another are solved at a time where light is live, and so many of others.
 const NEWS_AT_ONCE: usize = 12;
 const DUE_AT_ONCE: usize = 4;
+/// More of these where there are many blocks: none waits for more than so many turns.
+const DUE_WITHIN: usize = 64;
 /// So many blocks that nothing is known of show the light of probes at a time, and so many do so again.
 const DARK_AT_ONCE: usize = 16;
 const UNKNOWN_AT_ONCE: usize = 2;
@@ -68,7 +70,7 @@ impl LightmapSolver {
             return self.news.take_all();
         }
         let mut next = self.news.take(NEWS_AT_ONCE);
-        let others = DUE_AT_ONCE.max(NEWS_AT_ONCE - next.len());
+        let others = DUE_AT_ONCE.max(self.readers.len().div_ceil(DUE_WITHIN));
         next.iter().chain(self.news.all()).for_each(|block| self.due.remove(block));
         next.extend(self.due.take(others));
         next
