@@ -1,12 +1,10 @@
 //! What the server says over HTTP: the page, the scene's files, its health and its counters.
 
-use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
 use axum::Router;
-use axum::body::Bytes;
 use axum::extract::{Path, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderValue, StatusCode, header};
@@ -14,11 +12,10 @@ use axum::middleware::map_response;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 
-use lumencast_codec::ResourceHash;
-
 use crate::files::{FileSet, respond};
 use crate::metrics::Metrics;
 use crate::page;
+use crate::resources::Resources;
 
 /// A tick may end so much later than expected before the server calls itself ill.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -39,7 +36,7 @@ pub(crate) struct Shared {
     /// The scene's files; grows when an edit adds another glTF.
     pub(crate) scene_files: RwLock<FileSet>,
     /// What shapes of fields name, by hash; grows with them.
-    pub(crate) resources: RwLock<HashMap<ResourceHash, Bytes>>,
+    pub(crate) resources: RwLock<Resources>,
     /// Name of the scene and of its broadcast.
     pub(crate) scene: String,
     /// The scene's glTF file under `/scene/`.
@@ -140,7 +137,7 @@ async fn scene_file(
 /// Layouts and charts of lightmaps (docs/wire.md, "Resources"). What is in one never changes.
 async fn resource(State(shared): State<Arc<Shared>>, Path(hash): Path<String>) -> Response {
     let resources = shared.resources.read().unwrap_or_else(PoisonError::into_inner);
-    let bytes = hash.parse().ok().and_then(|hash| resources.get(&hash).cloned());
+    let bytes = hash.parse().ok().and_then(|hash| resources.get(hash));
     let Some(bytes) = bytes else { return StatusCode::NOT_FOUND.into_response() };
     let forever = "public, max-age=31536000, immutable";
     let head =

@@ -24,6 +24,7 @@ mod page;
 mod publish;
 mod published;
 mod report;
+mod resources;
 mod server;
 mod temporary;
 mod tick;

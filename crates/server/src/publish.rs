@@ -1,11 +1,11 @@
 //! Frames onto their tracks.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError};
 
 use bytes::Bytes;
 use lumencast_codec::tracks::{self, LightTrack};
-use lumencast_codec::{Catalog, EncodedRegion, Resource, ResourceHash};
+use lumencast_codec::{Catalog, EncodedRegion, Resource};
 use lumencast_transport::{Broadcast, TrackWriter};
 
 use crate::http::Shared;
@@ -78,7 +78,7 @@ impl Outlet for Publisher {
 
     fn resources(&mut self, resources: Vec<Resource>) {
         let mut known = self.shared.resources.write().unwrap_or_else(PoisonError::into_inner);
-        *known = by_hash(resources);
+        known.replace(resources);
     }
 
     fn catalog(&mut self, catalog: &Catalog) {
@@ -97,12 +97,6 @@ impl Outlet for Publisher {
             write(track, frame.bytes, frame.new_group, &self.shared);
         }
     }
-}
-
-/// Resources as clients ask for them.
-pub(crate) fn by_hash(resources: Vec<Resource>) -> HashMap<ResourceHash, Bytes> {
-    let named = |resource: Resource| (resource.hash(), resource.into_bytes().into());
-    resources.into_iter().map(named).collect()
 }
 
 /// A frame that cannot be written is lost as one lost on the way would be: clients wait for the

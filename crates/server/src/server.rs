@@ -21,7 +21,8 @@ use crate::loader::Loader;
 use crate::metrics::Metrics;
 use crate::pace::Beat;
 use crate::page;
-use crate::publish::{Publisher, by_hash};
+use crate::publish::Publisher;
+use crate::resources::Resources;
 use crate::tick::{Tick, TickOptions};
 
 /// How long a tick waits for its light: longer than ticks take that are a little late.
@@ -82,7 +83,7 @@ impl Server {
             metrics: Metrics::default(),
             page,
             scene_files: RwLock::new(scene_files(tick.scene())),
-            resources: RwLock::new(by_hash(tick.resources())),
+            resources: RwLock::new(Resources::new(tick.resources())),
             scene: tick.scene().name().to_owned(),
             root: tick.scene().root_file().to_owned(),
             tick: AtomicU64::new(0),

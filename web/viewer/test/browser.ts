@@ -33,7 +33,9 @@ export async function openPage(
   const page = await browser.newPage({ viewport, hasTouch: touch, isMobile: touch });
   page.setDefaultTimeout(PATIENCE);
   page.on('pageerror', (error) => errors.push(String(error)));
-  page.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
+  page.on('console', (message) => {
+    if (message.type() === 'error') errors.push(`${message.text()} (${message.location().url})`);
+  });
   try {
     await page.goto(`${address}/?${new URLSearchParams({ scale: '1', ...query })}`);
     await page.waitForFunction(() => window.lumencast);
