@@ -13,6 +13,12 @@ const AGE_INTERVAL = 250;
 const AGES = [0.1, 10] as const;
 
 /**
+ * Milliseconds without a frame after which new pictures are painted whole: as long as a passage takes at
+ * most. What was painted before them is light of long ago, which other pictures have replaced unseen.
+ */
+const REST = 500;
+
+/**
  * Bytes of pictures that are brought to the device in a frame, unless one alone has more: about a
  * millisecond of a page's time. Others wait for the next one.
  */
@@ -56,6 +62,8 @@ export class LumelPages {
   #scale = 0;
   #look: LumelLook = 'light';
   #agedAt = -Infinity;
+  /** When pages were last asked to be up to date, milliseconds. */
+  #updatedAt = -Infinity;
 
   /** `fields`: numbers of the lightmaps, in the plan's order. */
   constructor(
@@ -81,9 +89,11 @@ export class LumelPages {
       this.#agedAt = now;
       isAnew = true;
     }
+    const hasRested = now - this.#updatedAt > REST;
+    this.#updatedAt = now;
     this.#scale = scale;
     this.#look = look;
-    const planned = lightmaps.flatMap((lightmap) => this.#planOf(lightmap, isAnew, now));
+    const planned = lightmaps.flatMap((lightmap) => this.#planOf(lightmap, isAnew, hasRested, now));
     const strokes =
       look === 'light' ? this.#paint(planned, isAnew) : planned.map((plan) => this.#flat(plan, now));
     if (strokes.length === 0) return false;
@@ -93,7 +103,7 @@ export class LumelPages {
   }
 
   /** What of a lightmap is not painted yet as it should be. */
-  #planOf({ field, regions }: LightmapLight, isAnew: boolean, now: number): Planned[] {
+  #planOf({ field, regions }: LightmapLight, isAnew: boolean, hasRested: boolean, now: number): Planned[] {
     const lightmap = this.fields.indexOf(field.id);
     if (lightmap < 0) return [];
     const planned: Planned[] = [];
@@ -107,7 +117,7 @@ export class LumelPages {
       const isNew = revision !== painted.revision;
       if (isNew) Object.assign(painted, { revision, at: now, shown: painted.shown < 0 ? -1 : 0 });
       // What lies there is nothing, of another scale or no light: there is no way from it.
-      const isWhole = isAnew || painted.shown < 0 || (this.#look !== 'light' && isNew);
+      const isWhole = isAnew || painted.shown < 0 || (isNew && (hasRested || this.#look !== 'light'));
       const to = isWhole ? 1 : region.shown;
       const share = isWhole ? 1 : this.#look === 'light' ? shareOf(painted.shown, to) : 0;
       if (share <= 0) continue;

@@ -79,6 +79,14 @@ describe('pages', () => {
     expect(painted.flat().map(({ first }) => first)).toEqual([1, 2, 2, 2]);
   });
 
+  it('take a picture in whole after a rest, in which others have come unseen', () => {
+    update([region({ picture: halves(1) })], 0);
+    update([region({ revision: 2, picture: halves(2), shown: 0.5 })], 500);
+    update([region({ revision: 4, picture: halves(4), shown: 0.1 })], 1001);
+    update([region({ revision: 5, picture: halves(5), shown: 0.1 })], 1501);
+    expect(shares()).toEqual([[1], [0.5], [1], [0.1]]);
+  });
+
   it('begin with the first picture, however far its passage is', () => {
     update([region({ shown: 0.1 })]);
     update([region({ shown: 0.5 })]);
