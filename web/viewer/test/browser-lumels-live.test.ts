@@ -24,14 +24,14 @@ let page: Page;
 const errors: string[] = [];
 
 /** Few probes, lumels and samples leave some of the processor to the pages. */
-const start = (port: number) =>
+const start = (port: number, ...options: string[]) =>
   Server.start(program, 'cornell', port, [
-    ...['--page', folder, '--samples', '4..16', '--volume', '4x4x4', '--lightmap', '64'],
+    ...['--page', folder, '--samples', '4..16', '--volume', '4x4x4', '--lightmap', '64', ...options],
   ]);
 
 /** The page at an exposure that suits lumels, and all that stands still lit by these. */
-async function open(renderer: 'webgl' | 'webgpu'): Promise<Page> {
-  const page = await openPage(browser, server.address, VIEWPORT, { renderer }, errors);
+async function open(renderer: 'webgl' | 'webgpu', { address } = server): Promise<Page> {
+  const page = await openPage(browser, address, VIEWPORT, { renderer }, errors);
   await page.evaluate(() => (window.lumencast!.viewer.exposure = 2 ** -1));
   await vi.waitFor(async () => expect(await lit(page)).toBe(STILL), { timeout: PATIENCE, interval: 100 });
   return page;
@@ -134,6 +134,29 @@ it('leaves what is moved, and comes back where it is put down', async () => {
     await expect.poll(() => lit(page)).toBe(STILL);
   }
   expect(errors).toEqual([]);
+});
+
+it('tells normal maps where light comes from, when asked to', async () => {
+  const directional = await start(await freePort(), '--directional');
+  const other = await open('webgl', directional);
+  try {
+    // Codes of the slopes' picture: some lumels have light from one side, others from another.
+    const codes = () =>
+      other.evaluate(() => {
+        const { fields } = window.lumencast!.session.light();
+        const regions = fields.flatMap((field) => (field.kind === 'lightmap' ? field.regions : []));
+        const slopes = regions.filter(({ slopes }) => slopes).map(({ picture }) => picture);
+        return slopes.map((picture) => (picture.kind === 'planes' ? new Set(picture.y).size : 0));
+      });
+    await expect.poll(async () => Math.max(...(await codes()))).toBeGreaterThan(20);
+    expect(await codes()).toHaveLength(1);
+    // Without normal maps the light is the same.
+    await expect.poll(async () => difference(await seen(page), await seen(other))).toBeLessThan(0.03);
+    expect(errors).toEqual([]);
+  } finally {
+    await other.close();
+    await directional.kill();
+  }
 });
 
 it('stays when the server dies, and goes on when it is back', async () => {
