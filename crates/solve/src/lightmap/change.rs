@@ -6,6 +6,9 @@
 //! by weights that never change, and what is known there follows. Thus errors do not add up from glance to
 //! glance: what a lumel shows is the mean of what arrived beyond glances, and the glances of now.
 //!
+//! Light that became darker keeps the share that glances find left, lest bright spots outlast what lit
+//! them: shares of parts multiply as differences add up.
+//!
 //! Where glances nearby disagree about how light has changed since what is known was gathered, its
 //! pattern is another. The more they disagree, the less what is known weighs.
 
@@ -35,19 +38,30 @@ pub(crate) struct Glanced {
     pub(crate) position: Vec3,
     /// World, unit.
     pub(crate) normal: Vec3,
-    /// By how much its irradiance has changed since the last glance, lux.
+    /// The irradiance that the newest glance has found, lux.
+    pub(crate) now: Vec3,
+    /// By how much that has changed since the glance before it.
     pub(crate) change: Vec3,
     /// By how much its luminance has changed since what is known was gathered.
     pub(crate) since: f32,
 }
 
 /// How the light of a lumel has changed.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Change {
     /// By how much irradiance has, lux.
     pub(crate) by: Vec3,
+    /// The share of it that is left where it has become darker. What is brighter than its surroundings
+    /// loses more, and nothing becomes darker than black.
+    pub(crate) left: Vec3,
     /// The variance of luminance beyond which what is known tells nothing more.
     pub(crate) variance: f32,
+}
+
+impl Default for Change {
+    fn default() -> Self {
+        Self { by: Vec3::ZERO, left: Vec3::ONE, variance: 0.0 }
+    }
 }
 
 impl Change {
@@ -60,7 +74,8 @@ impl Change {
         texel: f32,
     ) -> Self {
         let normal = point.normal();
-        let (mut weights, mut by, mut since, mut squares) = (0.0, Vec3::ZERO, 0.0, 0.0);
+        let (mut weights, mut since, mut squares) = (0.0, 0.0, 0.0);
+        let (mut now, mut by) = (Vec3::ZERO, Vec3::ZERO);
         for glance in glances {
             let off = (glance.at - at).as_vec2().length_squared();
             let near = 1.0 - off / (REACH * REACH);
@@ -72,6 +87,7 @@ impl Change {
             let facing = glance.normal.dot(normal).max(0.0).powi(NORMAL_POWER);
             let weight = near * near * if is_beside { facing.max(ELSEWHERE) } else { ELSEWHERE };
             weights += weight;
+            now += weight * glance.now;
             by += weight * glance.change;
             since += weight * glance.since;
             squares += weight * glance.since.powi(2);
@@ -81,13 +97,18 @@ impl Change {
         }
         let square = (since / weights).powi(2);
         let apart = (squares / weights - square).max(0.0) + LEAST * LEAST * square;
-        Self { by: by / weights, variance: DISAGREEMENT * DISAGREEMENT * apart }
+        let was = now - by;
+        let left = Vec3::select(was.cmpgt(now), now / was, Vec3::ONE).max(Vec3::ZERO);
+        Self { by: by / weights, left, variance: DISAGREEMENT * DISAGREEMENT * apart }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What glances found at first.
+    const WAS: f32 = 100.0;
 
     /// Glances at every fourth lumel of a floor whose lumels are 0.1 m large.
     fn floor(change: impl Fn(IVec2) -> f32) -> Vec<Glanced> {
@@ -98,6 +119,7 @@ mod tests {
                 at,
                 position: 0.1 * Vec3::new(at.x as f32, 0.0, at.y as f32),
                 normal: Vec3::Y,
+                now: Vec3::splat(WAS + change),
                 change: Vec3::splat(change),
                 since: change,
             }
@@ -134,6 +156,24 @@ mod tests {
             let (parts, all) = (by(&left) + by(&right), by(&floor(whole)));
             assert!((parts / all - 1.0).abs() < 1e-5, "{parts}, {all}");
         }
+    }
+
+    /// What becomes darker by parts is as dark in the end as what does so at once.
+    #[test]
+    fn shares_multiply() {
+        let is_left = |at: IVec2| at.x < 20;
+        let first = floor(|at| if is_left(at) { -75.0 } else { 0.0 });
+        let mut then = floor(|at| if is_left(at) { 0.0 } else { -50.0 });
+        let left = then.iter_mut().filter(|glanced| is_left(glanced.at));
+        left.for_each(|glanced| glanced.now -= 75.0);
+        let whole = floor(|at| if is_left(at) { -75.0 } else { -50.0 });
+        for x in 12..30 {
+            let left = |glances: &[Glanced]| of(IVec2::new(x, 20), Vec3::Y, glances).left.x;
+            assert!((left(&first) * left(&then) - left(&whole)).abs() < 1e-5, "at {x}");
+        }
+        let at = IVec2::splat(20);
+        assert_eq!(of(at, Vec3::Y, &floor(|_| -WAS)).left, Vec3::ZERO);
+        assert_eq!(of(at, Vec3::Y, &floor(|_| 9.0)).left, Vec3::ONE, "it is brighter");
     }
 
     #[test]

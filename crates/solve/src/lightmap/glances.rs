@@ -30,6 +30,11 @@ impl Glances {
         None
     }
 
+    /// Irradiance that the last glance at a receiver has found, lux; zero before there was any.
+    pub(crate) fn last(&self, receiver: u32) -> Vec3 {
+        self.0.get(&receiver).map_or(Vec3::ZERO, |found| found.last)
+    }
+
     /// Samples were added to what is known of a receiver, and are this share of it.
     pub(crate) fn add(&mut self, receiver: u32, share: f32) {
         if let Some(found) = self.0.get_mut(&receiver) {
@@ -66,7 +71,10 @@ mod tests {
         let mut glances = Glances::default();
         assert_eq!(glances.look(3, Vec3::ONE), None);
         glances.add(3, 1.0);
-        assert_eq!(glances.since(3), 0.0);
+        assert_eq!(
+            (glances.since(3), glances.last(3), glances.last(4)),
+            (0.0, Vec3::ONE, Vec3::ZERO)
+        );
         assert_eq!(glances.look(3, Vec3::splat(5.0)), Some(Vec3::splat(4.0)));
         assert_eq!(glances.look(3, Vec3::splat(5.0)), Some(Vec3::ZERO));
         assert!((glances.since(3) - 4.0).abs() < 1e-5);

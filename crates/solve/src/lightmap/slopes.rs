@@ -65,7 +65,7 @@ mod tests {
         assert!(slopes.at(0).abs_diff_eq(Vec3::new(-1.0 / 3.0, 0.0, 0.0), 1e-6));
         // What has become brighter before something came, and then counts less.
         let mut brighter = all;
-        brighter.follow(&Change { by: 2.0 * all.mean(), variance: 0.0 }, all.scatter());
+        brighter.follow(&Change { by: 2.0 * all.mean(), ..Change::default() }, all.scatter());
         let mut now = brighter;
         now.add(&one, 0.5);
         slopes.add(0, 8.0 * Vec3::Y, [&brighter, &one, &now]);

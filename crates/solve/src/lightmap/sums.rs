@@ -12,7 +12,7 @@ const BURIED_ABOVE: f32 = 0.5;
 /// So many samples tell whether it does.
 const CERTAIN: f32 = 16.0;
 /// What was known of light that has changed weighs as many samples, at least.
-const LEAST: f32 = 4.0;
+const LEAST: f32 = 0.25;
 /// Noise grows with light that becomes brighter up to that.
 const BRIGHTER: f32 = 4.0;
 /// Samples of a lumel from which on its light is shown.
@@ -80,7 +80,8 @@ impl Sum {
             return;
         }
         let (before, own) = (self.mean(), self.scatter());
-        let now = (before + change.by).max(Vec3::ZERO);
+        let is_darker = change.by.cmplt(Vec3::ZERO);
+        let now = Vec3::select(is_darker, change.left * before, before + change.by);
         let level = luminance(before);
         let brighter = if level > 0.0 { (luminance(now) / level).min(BRIGHTER) } else { 1.0 };
         let louder = brighter * brighter;
@@ -178,7 +179,8 @@ mod tests {
         let known = Sum::of_samples((0..64).map(|k| if k % 2 == 0 { 1.0 } else { 3.0 }));
         let after = |by: f32, variance: f32| {
             let mut sum = known;
-            sum.follow(&Change { by: Vec3::splat(by), variance }, known.scatter());
+            let left = Vec3::splat(if by < 0.0 { 0.25 } else { 1.0 });
+            sum.follow(&Change { by: Vec3::splat(by), left, variance }, known.scatter());
             sum
         };
         assert_eq!(after(0.0, 0.0), known);
@@ -188,12 +190,13 @@ mod tests {
         assert!((after(2.0, 0.25).samples() - 16.0).abs() < 1e-3);
         // One that is bright by chance weighs no more than those about it.
         let mut bright = Sum::of_samples((0..64).map(|k| if k % 16 == 0 { 50.0 } else { 1.0 }));
-        bright.follow(&Change { by: Vec3::ZERO, variance: 0.1 }, known.scatter());
+        bright.follow(&Change { variance: 0.1, ..Change::default() }, known.scatter());
         assert!((bright.samples() - 10.0).abs() < 1e-3, "{}", bright.samples());
-        let dark = after(-9.0, 1.0);
-        assert_eq!((dark.mean(), dark.samples()), (Vec3::ZERO, LEAST));
+        let dark = after(-9.0, 100.0);
+        assert_eq!((dark.mean(), dark.samples()), (Vec3::splat(0.5), LEAST));
+        assert!((dark.scatter() - 1.0 / 16.0).abs() < 1e-4);
         let mut nothing = Sum::default();
-        nothing.follow(&Change { by: Vec3::ONE, variance: 1.0 }, 1.0);
+        nothing.follow(&Change { by: Vec3::ONE, ..Change::default() }, 1.0);
         assert_eq!(nothing, Sum::default());
     }
 }

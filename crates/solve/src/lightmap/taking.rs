@@ -113,6 +113,7 @@ impl LightmapSolver {
                 at: place(receiver),
                 position,
                 normal: self.points[receiver].normal(),
+                now: self.glances.last(receiver as u32),
                 change: changes.get(&(receiver as u32)).copied().unwrap_or_default(),
                 since: self.glances.since(receiver as u32),
             }
