@@ -35,6 +35,9 @@ const AWAY = -1.2;
 /** Milliseconds between two pictures, and pictures in which a surface passes from probes to lumels. */
 const FRAME = 50;
 const PASSAGE = 10;
+/** All of tomb's lumels, computed beside two pages that are drawn by the processor, take their time. */
+const PATIENT = { timeout: PATIENCE };
+const LONG = { timeout: 4 * PATIENCE };
 /** Codes by which a picture may change more than evenly: 2 a frame at 60 Hz. */
 const UNEVEN = 6;
 
@@ -132,7 +135,7 @@ async function gesture(act: () => Promise<unknown>): Promise<void> {
   await page.evaluate(() => window.lumencast!.viewer.draw());
 }
 
-it('leaves its lumels in the hand, and has them where it is put down, on every page', async () => {
+it('leaves its lumels in the hand, and has them where it is put down, on every page', LONG, async () => {
   const [here, there] = [await floorAround(0), await floorAround(AWAY)];
   expect(await byProbes(0)).toBeLessThan(4);
   await shoot(page, 'tomb-home.png');
@@ -153,24 +156,24 @@ it('leaves its lumels in the hand, and has them where it is put down, on every p
     const lights = [await lit(page), await byProbes(along), await lit(other)] as const;
     return lights[0] === STILL - 1 && lights[1] > 20 && lights[2] === STILL - 1;
   };
-  await expect.poll(dragged).toBe(true);
+  await expect.poll(dragged, PATIENT).toBe(true);
   const end = await handleAt(AWAY);
   await gesture(() => mouse.move(...end));
   // A hand may rest before it lets go: what it holds then has its lumels already.
-  await expect.poll(() => lit(page)).toBe(STILL);
+  await expect.poll(() => lit(page), PATIENT).toBe(STILL);
   await gesture(() => mouse.up());
   await page.keyboard.press('Escape');
 
-  await expect.poll(() => lit(other)).toBe(STILL);
+  await expect.poll(() => lit(other), PATIENT).toBe(STILL);
   await settle(page, 50);
   expect([await lit(page), await lit(other)]).toEqual([STILL, STILL]);
   expect(await byProbes(AWAY)).toBeLessThan(4);
   expect(await place(page)).toBeCloseTo(AWAY, 1);
   expect(await place(other)).toBeCloseTo(await place(page), 5);
-  await expect.poll(() => floorAround(0)).toBeGreaterThan(1.15 * here);
-  await expect.poll(() => floorAround(AWAY)).toBeLessThan(0.9 * there);
+  await expect.poll(() => floorAround(0), PATIENT).toBeGreaterThan(1.15 * here);
+  await expect.poll(() => floorAround(AWAY), PATIENT).toBeLessThan(0.9 * there);
   const apart = async () => difference(await look(page, 'indirect'), await look(other, 'indirect'));
-  await expect.poll(apart).toBeLessThan(0.03);
+  await expect.poll(apart, PATIENT).toBeLessThan(0.03);
   await shoot(page, 'tomb-away.png');
   await shoot(other, 'tomb-away-webgl.png');
   expect(errors).toEqual([]);
