@@ -35,7 +35,7 @@ pub(crate) struct Shared {
     pub(crate) page: FileSet,
     /// The scene's files; grows when an edit adds another glTF.
     pub(crate) scene_files: RwLock<FileSet>,
-    /// What shapes of fields name, by hash; grows with them.
+    /// What shapes of fields name, by hash.
     pub(crate) resources: RwLock<Resources>,
     /// Name of the scene and of its broadcast.
     pub(crate) scene: String,
