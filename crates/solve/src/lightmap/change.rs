@@ -51,8 +51,8 @@ pub(crate) struct Glanced {
 pub(crate) struct Change {
     /// By how much irradiance has, lux.
     pub(crate) by: Vec3,
-    /// The share of it that is left where it has become darker. What is brighter than its surroundings
-    /// loses more, and nothing becomes darker than black.
+    /// The share of it that is left where it has become darker, and one elsewhere. What is brighter
+    /// than its surroundings loses more, and nothing becomes darker than black.
     pub(crate) left: Vec3,
     /// The variance of luminance beyond which what is known tells nothing more.
     pub(crate) variance: f32,

@@ -80,8 +80,7 @@ impl Sum {
             return;
         }
         let (before, own) = (self.mean(), self.scatter());
-        let is_darker = change.by.cmplt(Vec3::ZERO);
-        let now = Vec3::select(is_darker, change.left * before, before + change.by);
+        let now = change.left * before + change.by.max(Vec3::ZERO);
         let level = luminance(before);
         let brighter = if level > 0.0 { (luminance(now) / level).min(BRIGHTER) } else { 1.0 };
         let louder = brighter * brighter;
