@@ -105,19 +105,23 @@ fn still_light_costs_almost_nothing() {
     let mut decoder = decoder(&light, Coding::H264, 0);
     let first = encode(&mut encoder, &light, 0);
     let shown = decoder.decode(&first[0].bytes).expect("a keyframe").irradiance;
-    let mut bytes = 0;
+    let (mut bytes, mut keyframes) = (0, 0);
     for u in 1..=200 {
         let mut flickering = light.clone();
         for (i, value) in flickering.irradiance.iter_mut().enumerate() {
             *value *= 1.0 + 0.002 * ((i as f32 + u as f32) * 12.9898).sin();
         }
         for frame in encode(&mut encoder, &flickering, u) {
-            bytes += frame.bytes.len();
+            match frame.new_group {
+                true => keyframes += 1,
+                false => bytes += frame.bytes.len(),
+            }
             let decoded = decoder.decode(&frame.bytes).expect("a frame");
             assert_eq!((decoded.head.info.update, &decoded.irradiance), (u, &shown));
         }
     }
-    assert!((1..=8 * 32).contains(&bytes), "{bytes} bytes in 8 seconds");
+    assert!((1..=8 * 32).contains(&bytes), "{bytes} bytes in 8 seconds beside keyframes");
+    assert!(keyframes <= 3, "{keyframes} keyframes in 8 seconds");
 }
 
 #[test]
@@ -139,6 +143,34 @@ fn changing_light_has_a_keyframe_every_two_seconds() {
         assert!(psnr(&light.irradiance, &decoded.irradiance) > 38.0, "update {u}");
     }
     assert!(keyframes.len() >= 4 && keyframes.windows(2).all(|pair| pair[1] - pair[0] <= 50));
+}
+
+/// Whoever has lost a picture of light that stands is not left with it.
+#[test]
+fn still_light_has_keyframes_that_cost_little() {
+    for (page_size, seconds) in [(64, 2..=3), (512, 4..=60)] {
+        let light = lightmap(page_size, 1, 0);
+        let mut encoder = encoder(&light, LumelCoding::H264(qp(12)));
+        let mut decoder = decoder(&light, Coding::H264, 0);
+        let first = encode(&mut encoder, &light, 0);
+        decoder.decode(&first[0].bytes).expect("a keyframe");
+        let (mut bytes, mut keyframes) = (0, vec![0]);
+        for u in 1..=4000 {
+            for frame in encode(&mut encoder, &light, u) {
+                bytes += frame.bytes.len();
+                let decoded = decoder.decode(&frame.bytes).expect("a frame");
+                assert!(psnr(&light.irradiance, &decoded.irradiance) > 38.0);
+                if frame.new_group {
+                    keyframes.push(u);
+                }
+            }
+        }
+        assert!(keyframes.len() > 2);
+        for group in keyframes.windows(2).map(|pair| (pair[1] - pair[0]) / 25) {
+            assert!(seconds.contains(&group), "{page_size}: {group} s");
+        }
+        assert!(bytes < 160 * 2500, "{page_size}: {bytes} bytes in 160 seconds");
+    }
 }
 
 /// A new group begins where light needs another scale or mapping, and where somebody comes to watch.

@@ -35,7 +35,8 @@ impl LumelEncoder {
         let regions = match coding.video() {
             None => Regions::Tiles(shape.tiles().map(TileEncoder::new).collect()),
             Some((packing, qp)) => {
-                let encoder = |tile| PageEncoder::new(tile, packing, qp);
+                let count = shape.tiles().count();
+                let encoder = |tile| PageEncoder::new(tile, count, packing, qp);
                 Regions::Pages(Pages::new(shape.tiles().map(encoder).collect()))
             }
         };

@@ -1,6 +1,7 @@
 //! One page as video.
 
 use std::borrow::Cow;
+use std::ops::RangeInclusive;
 
 use glam::Vec3;
 use lumencast_light::{Lightmap, Told};
@@ -18,16 +19,21 @@ use crate::{EncodedRegion, UpdateInfo};
 const GROUP_PICTURES: u32 = 50;
 /// A group spans so many seconds of scene time at most, while there are pictures.
 const GROUP_SECONDS: f64 = 2.0;
-/// A group has so many frames at most, those without a picture among them.
-const GROUP_FRAMES: u32 = 250;
-/// Where nothing changes, a frame without a picture goes out every so many updates: it tells that the
-/// light is still that of now.
+/// Where nothing changes, a frame without a picture goes out every so many updates, about a second: it
+/// tells that the light is still that of now.
 const IDLE_UPDATES: u64 = 25;
+/// So many bytes of each of them are put by for the next keyframe, which mends what was lost. All pages
+/// share them.
+const IDLE_BYTES: usize = 2048;
+/// A group has so many of them, at least and at most.
+const IDLE_FRAMES: RangeInclusive<usize> = 2..=60;
 
 /// Encodes one page. Costs 1.5 bytes a lumel, 3 where planes are stacked, and what the video encoder
 /// takes.
 pub(crate) struct PageEncoder {
     tile: Tile,
+    /// Number of all pages.
+    pages: usize,
     packing: Packing,
     qp: Qp,
     news: PageNews,
@@ -44,14 +50,31 @@ struct Group {
     /// Scene time of its first picture.
     began: f64,
     pictures: u32,
-    frames: u32,
+    /// Frames without a picture.
+    idle: usize,
+    /// How many of these there are at most.
+    most_idle: usize,
+}
+
+impl Group {
+    /// Whether a keyframe is due, at a scene time, where the light has changed or not.
+    fn is_over(&self, changed: bool, time: f64) -> bool {
+        match changed {
+            true => {
+                self.pictures >= GROUP_PICTURES
+                    || !(0.0..GROUP_SECONDS).contains(&(time - self.began))
+            }
+            false => self.idle >= self.most_idle,
+        }
+    }
 }
 
 impl PageEncoder {
-    pub(crate) fn new(tile: Tile, packing: Packing, qp: Qp) -> Self {
+    /// For one of so many pages.
+    pub(crate) fn new(tile: Tile, pages: usize, packing: Packing, qp: Qp) -> Self {
         let planes = Planes::new(packing, tile.size.x);
         let news = PageNews::new(tile.size.x);
-        Self { tile, packing, qp, news, planes, table: None, encoder: None, group: None }
+        Self { tile, pages, packing, qp, news, planes, table: None, encoder: None, group: None }
     }
 
     pub(crate) fn tile(&self) -> Tile {
@@ -109,28 +132,29 @@ impl PageEncoder {
             self.news.forget();
         }
         let changed = self.planes.follow(page, self.news.take(), table, anew);
-        let group = group.filter(|group| {
-            let is_long = group.pictures >= GROUP_PICTURES
-                || !(0.0..GROUP_SECONDS).contains(&(info.time - group.began));
-            !(changed && is_long) && group.frames < GROUP_FRAMES
-        });
         if let Some(group) = group.filter(|_| !changed)
             && info.update - group.newest < IDLE_UPDATES
         {
             return Ok(None);
         }
+        let group = group.filter(|group| !group.is_over(changed, info.time));
         let base = group.map(|group| group.newest);
         let mut bytes = Vec::with_capacity(64);
         VideoHead { info, base, mapping }.write(&mut bytes);
-        if changed || group.is_none() {
+        let has_picture = changed || group.is_none();
+        if has_picture {
             bytes.extend(self.picture(group.is_none())?);
         }
-        let before = group.unwrap_or(Group { newest: 0, began: info.time, pictures: 0, frames: 0 });
+        let before = group.unwrap_or_else(|| {
+            let (start, end) = IDLE_FRAMES.into_inner();
+            let most_idle = (bytes.len() * self.pages / IDLE_BYTES).clamp(start, end);
+            Group { newest: 0, began: info.time, pictures: 0, idle: 0, most_idle }
+        });
         self.group = Some(Group {
             newest: info.update,
-            began: before.began,
-            pictures: before.pictures + u32::from(changed),
-            frames: before.frames + 1,
+            pictures: before.pictures + u32::from(has_picture),
+            idle: before.idle + usize::from(!has_picture),
+            ..before
         });
         let (region, new_group) = (self.tile.id, group.is_none());
         Ok(Some(EncodedRegion { region, layer: 0, new_group, bytes, error: 0.0 }))
