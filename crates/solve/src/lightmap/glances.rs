@@ -5,6 +5,22 @@ use std::collections::HashMap;
 use glam::Vec3;
 use lumencast_light::luminance;
 
+/// Light is changing where it is brighter or darker by this share of it, and by so many standard errors of
+/// what glances have found.
+const CHANGING: f32 = 0.02;
+const CERTAIN: f32 = 2.0;
+
+/// Whether changes of luminance stand out that glances have found at lumels which lie together: of the noise
+/// that these have, and of the variance of what is shown. What does not is sooner known by more samples than
+/// by more glances.
+pub(crate) fn stand_out(since: &[f32], level: f32, variance: f32) -> bool {
+    let count = since.len() as f32;
+    let mean = since.iter().sum::<f32>() / count;
+    let squares = since.iter().map(|by| (by - mean).powi(2)).sum::<f32>() / count;
+    let error = variance + CERTAIN * CERTAIN * squares / count;
+    mean.abs() > CHANGING * level && mean * mean > error
+}
+
 /// What the glances at a lumel have found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Found {
@@ -63,6 +79,18 @@ impl Glances {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn changes_stand_out_of_noise() {
+        let since: Vec<f32> = (0..16).map(|k| if k % 2 == 0 { 1.0 } else { -0.6 }).collect();
+        assert!(!stand_out(&since, 2.0, 0.0), "they disagree");
+        let since: Vec<f32> = since.iter().map(|by| by + 0.5).collect();
+        assert!(stand_out(&since, 2.0, 0.0));
+        assert!(!stand_out(&since, 2.0, 0.6), "what is shown is as noisy");
+        assert!(!stand_out(&since, 100.0, 0.0), "too little to be seen");
+        assert!(stand_out(&[-0.5; 16], 2.0, 0.0));
+        assert!(!stand_out(&[0.0; 16], 0.0, 0.0) && !stand_out(&[], 0.0, 0.0));
+    }
 
     /// Light that jumps is told by the next glance; since what is known is of then, until samples of now
     /// make up for it.

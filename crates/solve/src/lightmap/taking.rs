@@ -11,12 +11,13 @@ use super::LightmapSolver;
 use super::blocks::{Block, on_page};
 use super::change::{Change, Glanced};
 use super::draws::is_glance;
+use super::glances::stand_out;
 use super::point::Point;
 use super::slopes;
 use super::sums::{Sum, noise, scatter};
 
-/// Light is changing where glances differ by this share of it.
-const CHANGING: f32 = 0.02;
+/// What is shown of a lumel is a mean of about so many: the filter's.
+const ALIKE: f32 = 64.0;
 /// A cell that is brighter or darker by this share of its light is gathered at sooner than others.
 const MUCH: f32 = 0.1;
 
@@ -65,16 +66,16 @@ impl LightmapSolver {
 
     /// Lets what is known follow what glances have found at receivers.
     fn follow_changes(&mut self, changes: &HashMap<u32, Vec3>) {
-        let mut glanced = BTreeMap::<usize, [f32; 2]>::new();
+        let mut glanced = BTreeMap::<usize, bool>::new();
         for (receiver, change) in changes {
-            let [by, level] = glanced.entry(self.cells.cell_of(*receiver)).or_default();
-            *by += luminance(change.abs());
-            *level += luminance(self.sums[*receiver as usize].mean());
+            let is_other = glanced.entry(self.cells.cell_of(*receiver)).or_default();
+            *is_other |= luminance(change.abs()) > 0.0;
         }
-        for (cell, [by, level]) in &glanced {
-            self.cells.count_glance(*cell, *by > CHANGING * level);
+        for cell in glanced.keys() {
+            let is_changing = self.is_changing(*cell);
+            self.cells.count_glance(*cell, is_changing);
         }
-        let changed = glanced.iter().filter(|(_, [by, _])| *by > 0.0);
+        let changed = glanced.iter().filter(|(_, is_other)| **is_other);
         let about: BTreeSet<usize> =
             changed.flat_map(|(cell, _)| self.cells.about(*cell)).collect();
         let about: Vec<usize> = about.into_iter().collect();
@@ -101,6 +102,17 @@ impl LightmapSolver {
         for (block, change) in blocks {
             self.ripen(block, 0.0, change);
         }
+    }
+
+    /// Whether light is another in a cell than what is shown of it, by what glances have found there.
+    fn is_changing(&self, cell: usize) -> bool {
+        let sums = &self.sums[self.cells.receivers_of(cell)];
+        let samples = sums.iter().map(Sum::samples).sum::<f32>() / sums.len() as f32;
+        let variance = scatter(sums) / (samples.max(1.0) * ALIKE);
+        let glanced = self.cells.glanced_of(cell);
+        let since: Vec<f32> = glanced.clone().map(|r| self.glances.since(r as u32)).collect();
+        let levels = self.sums[glanced].iter().map(|sum| luminance(sum.mean()));
+        stand_out(&since, levels.sum::<f32>() / since.len() as f32, variance)
     }
 
     /// How the light of a cell's lumels has changed, by what glances have found at receivers.
