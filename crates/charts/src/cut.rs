@@ -2,6 +2,7 @@
 //!
 //! The library is young: what it returns is checked, and a panic in it is an error.
 
+use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use bytemuck::{Pod, Zeroable};
@@ -68,6 +69,46 @@ impl Shape<'_> {
         };
         self.triangles.iter().map(area).sum()
     }
+
+    /// Number of parts that touch each other nowhere, where triangles share no position. A chart lies on
+    /// one part alone.
+    fn parts(&self) -> u32 {
+        let mut first_at = HashMap::new();
+        let mut parts = UnionFind((0..self.positions.len() as u32).collect());
+        let mut count = 0;
+        for triangle in self.triangles {
+            let [a, b, c] = triangle.map(|vertex| {
+                let at = self.positions[vertex as usize] + Vec3::ZERO;
+                *first_at.entry(at.to_array().map(f32::to_bits)).or_insert_with(|| {
+                    count += 1;
+                    vertex
+                })
+            });
+            count -= u32::from(parts.unite(a, b)) + u32::from(parts.unite(b, c));
+        }
+        count
+    }
+}
+
+/// Sets of numbers, by trees whose roots name them.
+struct UnionFind(Vec<u32>);
+
+impl UnionFind {
+    fn root(&mut self, mut of: u32) -> u32 {
+        while self.0[of as usize] != of {
+            let above = self.0[of as usize];
+            self.0[of as usize] = self.0[above as usize];
+            of = above;
+        }
+        of
+    }
+
+    /// Makes one set of two; whether they were two.
+    fn unite(&mut self, a: u32, b: u32) -> bool {
+        let [a, b] = [self.root(a), self.root(b)];
+        self.0[a.max(b) as usize] = a.min(b);
+        a != b
+    }
 }
 
 /// Cuts a surface into charts.
@@ -75,6 +116,10 @@ pub(crate) fn cut(shape: &Shape<'_>, watch: Watch<'_>) -> Result<Cut, ChartError
     let area = shape.area();
     if !(area > 0.0 && area.is_finite()) {
         return Err(ChartError::NoArea);
+    }
+    let parts = shape.parts();
+    if parts > MOST_CHARTS {
+        return Err(ChartError::TooManyCharts { charts: parts });
     }
     let texels_per_unit = (FIRST_LUMELS / area).sqrt() as f32;
     let density = Density::Fixed { texels_per_unit, page_size: None };

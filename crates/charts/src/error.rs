@@ -8,9 +8,9 @@ pub enum ChartError {
     #[error("it has no area")]
     NoArea,
     /// It falls into more charts than pages are worth.
-    #[error("it falls into {charts} charts, more than {}", crate::cut::MOST_CHARTS)]
+    #[error("it falls into {charts} charts or more; {} are too many", crate::cut::MOST_CHARTS)]
     TooManyCharts {
-        /// As many as there would be.
+        /// As many as there would be, at least.
         charts: u32,
     },
     /// Its progress was told to someone who wished it to end.

@@ -315,6 +315,31 @@ fn bad_meshes_have_lumels_or_are_named() {
     }
 }
 
+/// A mesh of a million parts is named, and not unwrapped: that would take minutes.
+#[test]
+fn meshes_of_too_many_charts_are_named() {
+    let mut stage = Stage::default();
+    let material = stage.material(grey());
+    stage.quad(Vec3::ZERO, Vec3::X, Vec3::Y, material);
+    let corner = |k: u32| Vec3::new((k % 1000) as f32, (k / 1000) as f32, 1.0);
+    let triangle = |k| [Vec3::ZERO, 0.5 * Vec3::X, 0.5 * Vec3::Y].map(|p| corner(k) + p);
+    let positions = (0..1_000_000).flat_map(triangle).collect();
+    let primitive = Primitive {
+        vertices: Vertices { positions, ..Vertices::default() },
+        triangles: (0..1_000_000).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect(),
+        ..Primitive::default()
+    };
+    stage.primitive(primitive, Affine3A::IDENTITY);
+    let scene = stage.snapshot();
+    let watch = |progress: lumencast_charts::Progress| {
+        assert!(progress.done < 1_000_000, "its triangles were unwrapped");
+        true
+    };
+    let Sheets { sheets, notes } = sheets(&scene, None, &watch).unwrap();
+    assert_eq!((sheets.len(), notes.len()), (1, 1), "{notes:?}");
+    assert!(notes[0].contains("mesh 1, primitive 0") && notes[0].contains("1000000 charts"));
+}
+
 #[test]
 fn nothing_to_lay_out_is_said() {
     assert_eq!(laid_out(&[], LightmapSpec::default()), Err(ChartError::NoArea));
