@@ -146,11 +146,11 @@ impl LightmapSolver {
             self.hurry(id);
         }
         if is_home {
-            let is_known = self.receivers_of(id).all(|r| self.sums[r as usize].is_settled());
-            if is_known {
+            let is_shown = self.is_settled(id) && self.is_solved(id);
+            if is_shown {
                 self.moved.remove(&id);
             }
-            return is_known;
+            return is_shown;
         }
         if let Some(at) = at.filter(|_| rests) {
             self.placed.insert(id, at);
@@ -174,6 +174,18 @@ impl LightmapSolver {
         }
         self.points = points.into();
         self.hurry(id);
+    }
+
+    /// Whether enough has arrived at all lumels of an instance.
+    fn is_settled(&self, id: InstanceId) -> bool {
+        self.receivers_of(id).all(|receiver| self.sums[receiver as usize].is_settled())
+    }
+
+    /// Whether what is shown of an instance's lumels is the light of where it is.
+    fn is_solved(&self, id: InstanceId) -> bool {
+        let blocks: BTreeSet<Block> =
+            self.receivers_of(id).map(|receiver| self.block_of(receiver as usize)).collect();
+        blocks.iter().all(|block| self.ripening.is_solved(block))
     }
 
     /// Lets an instance's lumels be gathered at before all others.

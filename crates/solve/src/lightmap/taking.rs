@@ -157,7 +157,7 @@ impl LightmapSolver {
     }
 
     /// The block of a receiver.
-    fn block_of(&self, receiver: usize) -> Block {
+    pub(crate) fn block_of(&self, receiver: usize) -> Block {
         Block::of(self.lumels[receiver], self.layout.page_size)
     }
 }
