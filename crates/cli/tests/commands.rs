@@ -318,6 +318,10 @@ fn bench_lightmap_judges_the_light_of_lumels() {
         ["gathered", "filtered"].map(|what| report["irradiance_db"][what].as_f64().expect(what));
     assert!(gathered > 20.0 && filtered > gathered + 2.0, "{gathered} {filtered}");
     assert!(report["reference"]["noise_db"].as_f64().is_some_and(|noise| noise >= 35.0));
+    let bytes = report["bytes_a_lumel"].as_f64().expect("a number");
+    assert!((44.0..120.0).contains(&bytes), "{bytes}");
+    assert_eq!(report["coded"].as_array().map(Vec::len), Some(8));
+    assert!(report["poison_codes"].as_f64().is_some_and(|codes| codes <= 1.0), "{report}");
     let words = bench(&few).stdout;
     assert!(words.contains("irradiance: ") && words.contains("1 × 256²"), "{words}");
     let alone = cache.triangles("alone", &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 0.0);

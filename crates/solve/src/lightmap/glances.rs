@@ -36,6 +36,11 @@ struct Found {
 pub(crate) struct Glances(HashMap<u32, Found>);
 
 impl Glances {
+    /// Bytes of memory, but for what a map keeps free.
+    pub(crate) fn bytes(&self) -> usize {
+        self.0.len() * size_of::<(u32, Found)>()
+    }
+
     /// Takes in the irradiance that a glance has found. Tells how much it has changed since the last one;
     /// nothing where it was the first.
     pub(crate) fn look(&mut self, receiver: u32, last: Vec3) -> Option<Vec3> {

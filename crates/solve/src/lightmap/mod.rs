@@ -181,6 +181,18 @@ impl LightmapSolver {
         self.lumels.len()
     }
 
+    /// Bytes of memory that grow with the number of lumels, without the light that is shown.
+    pub fn bytes(&self) -> usize {
+        let Self { lumels, points, receiver_of, sums, .. } = self;
+        size_of_val(&**lumels)
+            + size_of_val(&**points)
+            + size_of_val(&**receiver_of)
+            + size_of_val(&**sums)
+            + self.slopes.as_ref().map_or(0, Slopes::bytes)
+            + self.glances.bytes()
+            + self.seams.bytes()
+    }
+
     /// Number of lumels within something.
     pub fn buried_count(&self) -> usize {
         self.sums.iter().filter(|sum| sum.is_buried()).count()

@@ -91,6 +91,11 @@ impl Seams {
         self.points.len()
     }
 
+    /// Bytes of memory.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.lumels) + size_of_val(&*self.points)
+    }
+
     /// The lumels that take part, by their index among those of all pages.
     pub(crate) fn lumels(&self) -> &[u32] {
         &self.lumels

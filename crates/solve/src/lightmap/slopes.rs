@@ -11,6 +11,11 @@ use super::sums::Sum;
 pub(crate) struct Slopes(Vec<Vec3>);
 
 impl Slopes {
+    /// Bytes of memory.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.0)
+    }
+
     /// Of so many receivers, at which nothing has arrived.
     pub(crate) fn new(receivers: usize) -> Self {
         Self(vec![Vec3::ZERO; receivers])

@@ -18,6 +18,8 @@ const SECONDS: f64 = 10.0;
 const CALM: f64 = 2.0;
 /// A picture is coarse once so much of its light is there.
 const COARSE: f64 = 0.5;
+/// All lumels are refreshed but for those in which no light arrives, or the same.
+const NEARLY_ALL: f64 = 0.99;
 /// One lumel of so many is looked at.
 const STRIDE: usize = 5;
 
@@ -47,6 +49,8 @@ struct Followed {
     /// Seconds until half of its light was there, and nearly all.
     half: Option<f64>,
     most: Option<f64>,
+    /// Seconds until nearly all lumels had other light than at the edit.
+    refreshed: Option<f64>,
     /// How near light is after ten seconds, decibels.
     settled: f64,
 }
@@ -65,7 +69,12 @@ pub(super) fn measure(
     let followed = goals.after.as_ref().map(|(edit, after)| {
         let edits = std::slice::from_ref(edit);
         let part = Part::of(&mut cast, edits, [&goals.before, after], goals.white);
-        Followed { half: part.reached(0.5), most: part.reached(0.95), settled: part.settled }
+        Followed {
+            half: part.reached(0.5),
+            most: part.reached(0.95),
+            refreshed: part.refreshed,
+            settled: part.settled,
+        }
     });
     bar.finish_and_clear();
     let coarse = first.reached(COARSE);
@@ -76,6 +85,7 @@ pub(super) fn measure(
 struct Part {
     /// Seconds, and the share of the change that was there.
     shares: Vec<(f64, f64)>,
+    refreshed: Option<f64>,
     settled: f64,
     flicker: f64,
 }
@@ -88,10 +98,13 @@ impl Part {
             covered.iter().map(|lumel| luminance(lightmap.irradiance[*lumel])).collect()
         };
         let [from, to] = [from, to].map(seen);
-        let (mut shares, mut changes, mut last) = (Vec::new(), Vec::new(), from.clone());
+        let (mut shares, mut changes) = (Vec::new(), Vec::new());
+        let shown = cast.tick.light().lightmaps().next().map_or_else(|| from.clone(), seen);
+        let (mut last, mut refresh) = (shown.clone(), Refresh::of(shown));
         cast.go_on(edits, SECONDS, |light: &Light, seconds| {
             let shown = light.lightmaps().next().map_or_else(Vec::new, seen);
             shares.push((seconds, share(&from, &to, &shown)));
+            refresh.look(&shown, seconds);
             if seconds > SECONDS - CALM {
                 let both = last.iter().zip(&shown);
                 changes
@@ -104,13 +117,35 @@ impl Part {
             last.iter().zip(&to).map(|(a, b)| f64::from(code(*a, white) - code(*b, white)).powi(2));
         let settled =
             20.0 * 255.0f64.log10() - 10.0 * (squares.sum::<f64>() / to.len() as f64).log10();
-        Self { shares, settled, flicker }
+        Self { shares, refreshed: refresh.done, settled, flicker }
     }
 
     /// Seconds from which on so much of the change was there.
     fn reached(&self, share: f64) -> Option<f64> {
         let missing = self.shares.iter().rposition(|(_, reached)| *reached < share);
         self.shares.get(missing.map_or(0, |at| at + 1)).map(|(seconds, _)| *seconds)
+    }
+}
+
+/// Which lumels still show the light that they had first.
+struct Refresh {
+    first: Vec<f32>,
+    stale: Vec<usize>,
+    done: Option<f64>,
+}
+
+impl Refresh {
+    fn of(first: Vec<f32>) -> Self {
+        Self { stale: (0..first.len()).collect(), first, done: None }
+    }
+
+    /// What lumels show at a time, seconds.
+    fn look(&mut self, shown: &[f32], seconds: f64) {
+        let Self { first, stale, done } = self;
+        stale.retain(|lumel| shown.get(*lumel) == Some(&first[*lumel]));
+        if (stale.len() as f64) < (1.0 - NEARLY_ALL) * first.len() as f64 {
+            done.get_or_insert(seconds);
+        }
     }
 }
 
@@ -139,6 +174,7 @@ impl Live {
             "edit": self.followed.as_ref().map(|followed| json!({
                 "half_seconds": followed.half,
                 "most_seconds": followed.most,
+                "refresh_seconds": followed.refreshed,
                 "db_after_10_s": followed.settled,
             })),
         })
@@ -156,9 +192,10 @@ impl Live {
         );
         if let Some(followed) = &self.followed {
             say!(
-                "a moved light: half after {}, 95 % after {}, {:.1} dB after 10 s",
+                "a moved light: half after {}, 95 % after {}, all refreshed after {}, {:.1} dB after 10 s",
                 seconds(followed.half),
                 seconds(followed.most),
+                seconds(followed.refreshed),
                 followed.settled
             );
         }

@@ -97,6 +97,12 @@ pub(crate) struct BenchLightmap {
     json: bool,
 }
 
+/// Bytes of memory of the light that is shown.
+fn lightmap_bytes(lightmap: &Lightmap) -> usize {
+    let slopes = lightmap.slopes.as_ref().map_or(0, |slopes| size_of_val(&**slopes));
+    size_of_val(&*lightmap.irradiance) + slopes
+}
+
 impl BenchLightmap {
     pub(crate) fn run(self) -> Result<()> {
         let mut scene = self.scene.open()?;
@@ -181,6 +187,8 @@ impl BenchLightmap {
             backs: layout.surfaces().iter().filter(|surface| surface.id.back).count(),
             lumels: solver.lumel_count(),
             buried: solver.buried_count(),
+            bytes_a_lumel: (solver.bytes() + lightmap_bytes(&lightmap)) as f64
+                / solver.lumel_count().max(1) as f64,
             samples: self.samples,
             bounces: self.bounces,
             materials: self.materials,

@@ -24,6 +24,8 @@ pub(super) struct Report {
     pub(super) lumels: usize,
     /// How many of the lumels lie within something.
     pub(super) buried: usize,
+    /// Bytes of memory a lumel: what is known of them, and the light that is shown.
+    pub(super) bytes_a_lumel: f64,
     /// Samples a lumel.
     pub(super) samples: u32,
     pub(super) bounces: u32,
@@ -66,6 +68,7 @@ impl Report {
             "backs": self.backs,
             "lumels": self.lumels,
             "buried": self.buried,
+            "bytes_a_lumel": self.bytes_a_lumel,
             "samples": self.samples,
             "bounces": self.bounces,
             "materials": self.materials.to_string(),
@@ -88,13 +91,14 @@ impl Report {
 
     pub(super) fn say(&self) {
         say!(
-            "{}: {} × {}², a lumel every {:.1} cm, {} lumels ({} within something)",
+            "{}: {} × {}², a lumel every {:.1} cm, {} lumels ({} within something), {:.0} bytes each",
             self.scene,
             self.pages,
             self.page_size,
             100.0 * self.texel,
             self.lumels,
-            self.buried
+            self.buried,
+            self.bytes_a_lumel
         );
         say!(
             "irradiance: {:.1} dB, as gathered {:.1} dB, {} samples a lumel",
