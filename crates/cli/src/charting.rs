@@ -34,6 +34,7 @@ pub(crate) fn lay_out(
         tell!("warning: {note}");
     }
     if sheets.is_empty() {
+        tell!("warning: the scene has no still surface that lumels can lie on: probes light all");
         return Ok(None);
     }
     let all = with_backs(sheets, scene, gatherer)?;

@@ -4,8 +4,10 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lumencast_charts::{LaidOut, Sheet, Sheets, laid_out, lumels, usual};
+use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Charts, Surface};
 use lumencast_scene::{LightmapSpec, Scene};
+use lumencast_solve::with_backs;
 use serde_json::{Value, json};
 
 use crate::charting;
@@ -18,6 +20,10 @@ pub(crate) fn lightmap_report(scene: &mut Scene, spec: Option<LightmapSpec>) -> 
     if sheets.is_empty() {
         return Ok(json!({ "pages": 0, "surfaces": 0, "notes": notes }));
     }
+    let mut tracer = CpuPathTracer::new(Options::default())?;
+    let start = Instant::now();
+    let sheets = with_backs(sheets, &scene.snapshot(), &mut tracer)?;
+    let looked = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let LaidOut { layout, texel, coarser } =
         laid_out(&sheets, spec.unwrap_or_else(|| usual(&sheets)))?;
@@ -31,11 +37,12 @@ pub(crate) fn lightmap_report(scene: &mut Scene, spec: Option<LightmapSpec>) -> 
         "texel": texel,
         "coarser_than_asked": coarser,
         "surfaces": layout.surfaces().len(),
+        "backs": layout.surfaces().iter().filter(|surface| surface.id.back).count(),
         "charts": sheets.iter().map(Sheet::charts).sum::<usize>(),
         "triangles_left_out": left_out,
         "lumels": covered,
         "coverage": covered as f32 / layout.lumel_count().max(1) as f32,
-        "seconds": { "cut": cut, "laid_out": laid_out },
+        "seconds": { "cut": cut, "looked_at_backs": looked, "laid_out": laid_out },
         "notes": notes,
     }))
 }

@@ -108,6 +108,9 @@ impl LiveFieldsArguments {
         scene: &mut Scene,
         gatherer: &mut dyn Gather,
     ) -> Result<Option<LaidOut>> {
+        if !self.fields.contains(&FieldKind::Volume) {
+            tell!("note: volumes are computed too, since probes light what moves");
+        }
         match self.fields.contains(&FieldKind::Lightmap) {
             true => charting::lay_out(&scene.snapshot(), self.lightmap.spec(scene), gatherer),
             false => Ok(None),
@@ -150,12 +153,7 @@ impl FieldsArguments {
         if !self.fields.contains(&FieldKind::Lightmap) {
             return Ok(None);
         }
-        let spec = self.lightmap.spec(scene);
-        let laid_out = charting::lay_out(&scene.snapshot(), spec, gatherer)?;
-        if laid_out.is_none() && !self.volumes() {
-            tell!("warning: the scene has no still surface that lumels can lie on");
-        }
-        Ok(laid_out)
+        charting::lay_out(&scene.snapshot(), self.lightmap.spec(scene), gatherer)
     }
 
     /// How long light is computed: at most so many samples a probe.
