@@ -86,6 +86,115 @@ fn every_picture_has_its_unit_and_still_ones_are_short() {
     assert!(keyframe > 1000);
 }
 
+/// Types of the units in a stream (H.264, table 7-1), and what they hold behind their first byte.
+fn units(stream: &[u8]) -> Vec<(u8, Vec<u8>)> {
+    let starts: Vec<usize> = stream
+        .windows(3)
+        .enumerate()
+        .filter(|(_, code)| *code == [0, 0, 1])
+        .map(|(at, _)| at + 3)
+        .collect();
+    let ends = starts.iter().skip(1).map(|start| start - 3).chain([stream.len()]);
+    let unit =
+        |(start, end): (&usize, usize)| (stream[*start] & 31, stream[start + 1..end].to_vec());
+    starts.iter().zip(ends).map(unit).collect()
+}
+
+const SLICE: u8 = 1;
+const KEYFRAME: u8 = 5;
+const SEQUENCE: u8 = 7;
+const PICTURE: u8 = 8;
+
+/// Neither cuts nor time make keyframes: these come when they are asked for, with all that a decoder
+/// needs.
+#[test]
+fn keyframes_come_when_asked_for() {
+    let (mut encoder, _) = coder(18);
+    let types = |stream: &[u8]| -> Vec<u8> { units(stream).into_iter().map(|(t, _)| t).collect() };
+    let keyframe = encoder.encode(&gradient(0, 0), true).unwrap();
+    assert_eq!(types(&keyframe), [SEQUENCE, PICTURE, KEYFRAME]);
+    for frame in 1..600 {
+        let cut = Picture::plain(SIDE, SIDE, if frame % 2 == 0 { 20 } else { 230 }, [90, 200]);
+        let picture = if frame % 7 < 3 { gradient(frame, 90) } else { cut };
+        assert_eq!(types(&encoder.encode(&picture, false).unwrap()), [SLICE], "{frame}");
+    }
+    assert_eq!(types(&encoder.encode(&gradient(1, 0), true).unwrap()), types(&keyframe));
+}
+
+/// Bits of a unit (H.264, 7.2 and 9.1).
+struct Bits {
+    bytes: Vec<u8>,
+    at: usize,
+}
+
+impl Bits {
+    fn of(unit: &[u8]) -> Self {
+        let mut bytes: Vec<u8> = Vec::new();
+        for byte in unit {
+            // A 3 after two zeros only keeps start codes out.
+            if *byte != 3 || !bytes.ends_with(&[0, 0]) {
+                bytes.push(*byte);
+            }
+        }
+        Self { bytes, at: 0 }
+    }
+
+    fn take(&mut self, count: u32) -> u32 {
+        (0..count).fold(0, |value, _| {
+            let bit = self.bytes[self.at / 8] >> (7 - self.at % 8) & 1;
+            self.at += 1;
+            value << 1 | u32::from(bit)
+        })
+    }
+
+    fn flag(&mut self) -> bool {
+        self.take(1) == 1
+    }
+
+    fn golomb(&mut self) -> u32 {
+        let mut zeros = 0;
+        while !self.flag() {
+            zeros += 1;
+        }
+        (1 << zeros) - 1 + self.take(zeros)
+    }
+}
+
+/// Decoders are told that the whole range is used, and that the matrix is that of BT.709 (H.264, 7.3.2.1.1
+/// and E.1.1).
+#[test]
+fn the_stream_says_how_samples_are_to_be_read() {
+    let (mut encoder, _) = coder(18);
+    let keyframe = encoder.encode(&gradient(0, 0), true).unwrap();
+    let (_, sequence) = units(&keyframe).into_iter().find(|(t, _)| *t == SEQUENCE).unwrap();
+    let mut bits = Bits::of(&sequence);
+    assert_eq!(bits.take(8), 66, "the baseline profile");
+    bits.take(16);
+    bits.golomb();
+    bits.golomb();
+    if bits.golomb() == 0 {
+        bits.golomb();
+    }
+    bits.golomb();
+    bits.flag();
+    let macroblocks = [bits.golomb() + 1, bits.golomb() + 1];
+    assert_eq!(macroblocks, [SIDE / 16; 2]);
+    assert!(bits.flag(), "whole pictures");
+    bits.flag();
+    if bits.flag() {
+        for _ in 0..4 {
+            bits.golomb();
+        }
+    }
+    assert!(bits.flag(), "how samples are to be read is told");
+    assert!(!bits.flag() && !bits.flag() && bits.flag(), "no ratio, no overscan, but the signal");
+    bits.take(3);
+    assert!(bits.flag(), "the whole range");
+    assert!(bits.flag());
+    bits.take(16);
+    assert_eq!(bits.take(8), 1, "BT.709");
+}
+
 /// What changes little is neither denoised nor taken for background: it comes back as it is.
 #[test]
 fn faint_changes_arrive() {
