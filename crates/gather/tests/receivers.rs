@@ -4,10 +4,13 @@
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-use glam::{Quat, UVec3, Vec3};
+use glam::{Quat, UVec2, UVec3, Vec2, Vec3};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Budget, Draws, Gather, Job, Receiver, Shading, Sums, SumsAt};
-use lumencast_light::{FieldId, Grid, Light, Order, Place, ProbeVolume, slope_by};
+use lumencast_light::{
+    ChartVertex, Charts, Field, FieldId, Grid, Layout, Light, Lightmap, Order, Place, ProbeVolume,
+    Rectangle, Surface, SurfaceId, slope_by,
+};
 use lumencast_scene::{Environment, LightKind, Material, PunctualLight, Snapshot};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -314,6 +317,45 @@ fn the_last_surface_reflects_the_light_from_before() {
         };
         check(seen(1.0), C0, seen(0.9), 3e-3);
     }
+}
+
+/// A surface that has lumels reflects their light, and no other.
+#[test]
+fn the_last_surface_reflects_the_light_of_its_lumels() {
+    let albedo = 0.6;
+    let mut stage = Stage::default();
+    let white = stage.material(lambert(Vec3::splat(albedo), BLACK));
+    stage.quad(Vec3::new(-2e3, 0.0, 2e3), Vec3::X * 4e3, Vec3::NEG_Z * 4e3, white);
+    let scene = stage.snapshot();
+    let floor = &scene.instances[0];
+    let primitive = &floor.mesh.primitives[0];
+    let vertex = |source: u32| ChartVertex {
+        source,
+        rectangle: 0,
+        at: Vec2::new(1.0 + 6.0 * (source % 2) as f32, 1.0 + 6.0 * (source / 2) as f32),
+    };
+    let charts = Charts {
+        sizes: vec![UVec2::splat(8)],
+        vertices: (0..primitive.vertices.positions.len() as u32).map(vertex).collect(),
+        triangles: primitive.triangles.clone(),
+    };
+    let reflected = |back: bool, irradiance: f32| {
+        let surface = Surface {
+            id: SurfaceId { node: floor.node.0, back, ..SurfaceId::default() },
+            charts: Arc::new(charts.clone()),
+            rectangles: vec![Rectangle::default()],
+        };
+        let mut lumels = Lightmap::dark(FieldId(3), Arc::new(Layout::new(8, 1, vec![surface])));
+        lumels.irradiance.fill(Vec3::splat(irradiance));
+        let previous = Some(Arc::new(Light::new([Field::Lightmap(lumels)])));
+        let at = Receiver::probe(Vec3::Y);
+        let job = Job { bounces: 0, previous, ..Job::new(scene.clone(), [at], 4096) };
+        gather(job).at(0).mean().next().unwrap().x
+    };
+    // The floor fills half of all directions.
+    let expected = 0.5 * C0 * albedo * 7.0 / PI;
+    check(reflected(false, 7.0), expected, reflected(false, 6.0), 5e-3);
+    check(reflected(false, 7.0), expected, reflected(true, 7.0), 5e-3);
 }
 
 /// A lamp with a size lights the last surface as it lights those before: ρI cos³θ/πh² under it.
