@@ -1,7 +1,8 @@
 //! Lumels while a scene is live: stepped by hand, without network.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
+use std::time::Duration;
 
 use glam::Vec3;
 use lumencast_charts::{LaidOut, laid_out, lumels_on_pages, sheets};
@@ -10,6 +11,7 @@ use lumencast_codec::{
     LumelDecoder, Qp, Resource, ResourceHash, read_charts,
 };
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
+use lumencast_gather::{Gather, Gathered, Job, Progress, Receiver, Ticket};
 use lumencast_light::{Layout, Lightmap, SurfaceId, luminance};
 use lumencast_scene::{
     AnimationId, Edit, InstanceSource, LightSpec, LightmapSpec, NodeId, NodeName, Playback, Scene,
@@ -65,6 +67,15 @@ impl Stepped {
 
     /// The same, whose lumels are sent so.
     fn coded(lumel_coding: LumelCoding) -> Self {
+        let tracer = CpuPathTracer::new(Options::default()).expect("threads");
+        let mut stepped = Self::gathering(lumel_coding, Box::new(tracer));
+        let playback = Playback { playing: Some(false), ..Playback::default() };
+        stepped.edit(1, Edit::SetAnimation { animation: AnimationId(0), playback });
+        stepped
+    }
+
+    /// The same, whose ball goes round.
+    fn gathering(lumel_coding: LumelCoding, gatherer: Box<dyn Gather>) -> Self {
         let mut scene = Scene::builtin("cornell").expect("a built-in scene");
         let options = TickOptions {
             samples: SampleRange::fixed(4),
@@ -73,12 +84,8 @@ impl Stepped {
             lumel_coding,
             ..TickOptions::default()
         };
-        let tracer = CpuPathTracer::new(Options::default()).expect("threads");
-        let tick = Tick::new(scene, Box::new(tracer), options, Epoch(7)).expect("a tick");
-        let mut stepped = Self { tick, kept: Kept::default(), now: 0.0 };
-        let playback = Playback { playing: Some(false), ..Playback::default() };
-        stepped.edit(1, Edit::SetAnimation { animation: AnimationId(0), playback });
-        stepped
+        let tick = Tick::new(scene, gatherer, options, Epoch(7)).expect("a tick");
+        Self { tick, kept: Kept::default(), now: 0.0 }
     }
 
     fn step(&mut self, mail: Mail) {
@@ -164,6 +171,55 @@ fn moved(node: NodeId, x: f32) -> Edit {
     Edit::MoveNode { node, transform }
 }
 
+/// A gatherer that is never done with lumels.
+struct Reluctant {
+    inner: CpuPathTracer,
+    lumels: HashSet<Ticket>,
+}
+
+impl Gather for Reluctant {
+    fn submit(&mut self, job: Job) -> Ticket {
+        let is_of_lumels = matches!(job.receivers.first(), Some(Receiver::Lumel { .. }));
+        let ticket = self.inner.submit(job);
+        if is_of_lumels {
+            self.lumels.insert(ticket);
+        }
+        ticket
+    }
+
+    fn poll(&mut self, ticket: Ticket) -> Progress {
+        match self.lumels.contains(&ticket) {
+            true => Progress::Working(0.5),
+            false => self.inner.poll(ticket),
+        }
+    }
+
+    fn wait(&mut self, ticket: Ticket) -> Option<Gathered> {
+        assert!(!self.lumels.contains(&ticket), "nobody waits for lumels");
+        self.inner.wait(ticket)
+    }
+
+    fn cancel(&mut self, ticket: Ticket) {
+        self.inner.cancel(ticket);
+    }
+}
+
+/// Ticks wait for probes, and never for lumels, however long these take.
+#[test]
+fn live_ticks_do_not_wait_for_lumels() {
+    let inner = CpuPathTracer::new(Options::default()).expect("threads");
+    let reluctant = Reluctant { inner, lumels: HashSet::new() };
+    let mut stepped = Stepped::gathering(LumelCoding::Halves, Box::new(reluctant));
+    for _ in 0..5 {
+        stepped.now += PERIOD;
+        // Far longer than the test may last.
+        let patience = Duration::from_secs(10_000);
+        let report =
+            stepped.tick.step_within(stepped.now, Mail::default(), &mut stepped.kept, patience);
+        assert!(!report.late && report.rays > 0, "{report:?}");
+    }
+}
+
 #[test]
 fn lumels_come_near_to_converged_light_and_follow_a_change() {
     let mut stepped = Stepped::new();
@@ -241,11 +297,7 @@ fn what_moves_loses_its_lumels() {
     let before = stepped.shape();
     assert!(has(&stepped.lightmap().layout));
     let home = stepped.tick.scene().nodes().find(|n| n.id == node).expect("the box").transform;
-    let updates = |stepped: &Stepped| -> Vec<u64> {
-        let id = stepped.lightmap().id.0;
-        let of_lumels = stepped.kept.frames.iter().filter(|(field, _)| *field == id);
-        of_lumels.map(|(_, f)| FrameHead::read(&f.bytes).expect("a head").info.update).collect()
-    };
+    stepped.kept.frames.clear();
 
     stepped.edit(2, moved(node, 0.2));
     assert!(!has(&stepped.lightmap().layout), "at once");
@@ -258,9 +310,14 @@ fn what_moves_loses_its_lumels() {
     stepped.edit(3, moved(node, 0.3));
     assert_eq!(stepped.shape(), shape, "it goes on moving");
     stepped.steps(2);
-    let numbers = updates(&stepped);
-    assert!(numbers.is_sorted(), "updates are numbered on: {numbers:?}");
-    assert!(stepped.kept.frames.iter().any(|(_, frame)| frame.new_group));
+    // Lumels lie where they lay: frames go on.
+    let id = stepped.lightmap().id.0;
+    let of_lumels = stepped.kept.frames.iter().filter(|(field, _)| *field == id);
+    let heads: Vec<FrameHead> =
+        of_lumels.map(|(_, frame)| FrameHead::read(&frame.bytes).expect("a head")).collect();
+    let numbers: Vec<u64> = heads.iter().map(|head| head.info.update).collect();
+    assert!(numbers.windows(2).all(|two| two[1] == two[0] + 1), "{numbers:?}");
+    assert_eq!(heads.len(), 4);
 
     stepped.edit(4, Edit::MoveNode { node, transform: home });
     let mut waited = 0;
