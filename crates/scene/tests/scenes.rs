@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
-use lumencast_scene::{BUILTINS, Scene, Snapshot};
+use lumencast_scene::{BUILTINS, Edit, Scene, Script, Snapshot};
 
 /// The folder of scenes that are not part of the repository.
 fn scenes() -> Option<PathBuf> {
@@ -68,6 +68,21 @@ const FILES: &[(&str, usize)] = &[
     ("samples/TextureSettingsTest/TextureSettingsTest.glb", 72),
     ("samples/TextureTransformTest/TextureTransformTest.glb", 24),
 ];
+
+/// The minutes that are measured do something: each of their edits fits its scene.
+#[test]
+fn scripted_minutes_fit_their_scenes() {
+    for (name, file) in [("cornell", "minute"), ("door", "minute-door"), ("tomb", "minute-tomb")] {
+        let path = format!("{}/../../benches/{file}.jsonl", env!("CARGO_MANIFEST_DIR"));
+        let script = Script::parse(&std::fs::read_to_string(path).unwrap()).unwrap();
+        let mut scene = Scene::builtin(name).unwrap();
+        let edits: Vec<&Edit> = script.due(0.0, 60.0).collect();
+        assert!(edits.len() > 10, "{name}: {} edits", edits.len());
+        for edit in edits {
+            scene.apply(edit).unwrap();
+        }
+    }
+}
 
 #[test]
 fn the_worlds_scenes_load_and_move() {
