@@ -8,7 +8,7 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, it, vi } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { buildPage, difference, look, openPage, PATIENCE, settle, shoot } from './browser.js';
+import { buildPage, difference, draw, look, openPage, PATIENCE, settle, shoot } from './browser.js';
 import { lit, seen, setStrengths, STILL, SURFACES } from './lumels.js';
 import { freePort, lumencastProgram, Server } from './server.js';
 
@@ -193,4 +193,33 @@ it('stays when the server dies, and goes on when it is back', async () => {
     });
   });
   await expect.poll(lumelsOnWalls).toBeGreaterThan(1.3 * dim);
+});
+
+it('is lit by probes alone where the browser decodes no video, and the page says so', async () => {
+  const old = {
+    newPage: async (options: object) => {
+      const page = await browser.newPage(options);
+      await page.addInitScript(() => delete (window as { VideoDecoder?: unknown }).VideoDecoder);
+      return page;
+    },
+  } as unknown as Browser;
+  const own: string[] = [];
+  const page = await openPage(old, server.address, VIEWPORT, { renderer: 'webgl' }, own);
+  await page.evaluate(() => {
+    window.lumencast!.viewer.exposure = 2 ** -1;
+    window.lumencast!.setMode('indirect');
+  });
+  await vi.waitFor(
+    async () => {
+      for (const pixel of await seen(page)) expect(Math.max(...pixel)).toBeGreaterThan(20);
+    },
+    { timeout: PATIENCE, interval: 200 },
+  );
+  expect(await lit(page)).toBe(0);
+  await page.keyboard.press('l');
+  await page.waitForTimeout(300);
+  await draw(page);
+  expect(await page.innerText('.lumels')).toContain('which this browser does not decode for pages');
+  await page.close();
+  expect(own).toEqual([]);
 });

@@ -17,7 +17,7 @@ import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
 
 const VIEWPORT = { width: 560, height: 315 };
 /** Ticks after which light has settled. */
-const TICKS = 750;
+const TICKS = 1500;
 /** Frames in which the page makes all geometries that lumels need. */
 const FRAMES = 30;
 
