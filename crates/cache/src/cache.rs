@@ -7,7 +7,7 @@ use lumencast_codec::{
     Catalog, ClientEdit, Epoch, FieldInfo, LightFile, LightTrack, Resource, ResourceHash,
     StateFrame,
 };
-use lumencast_light::{Field, FieldId, Light};
+use lumencast_light::{Field, FieldId, Light, LumelAges};
 use lumencast_scene::Edit;
 
 use crate::CacheError;
@@ -242,6 +242,13 @@ impl Cache {
             tick: newest.map(|info| info.tick),
             scene_version: newest.map(|info| info.scene_version),
         }
+    }
+
+    /// How long ago, at `now`, the light of each lightmap's tiles came; of saved light, how long ago it was
+    /// loaded.
+    pub fn lumel_ages(&self, now: f64) -> Vec<LumelAges> {
+        let ages = |(id, cache): (&u32, &FieldCache)| cache.lumel_ages(FieldId(*id), now);
+        self.fields.iter().filter_map(ages).collect()
     }
 
     /// Brings the light to what is to be seen at `now`.

@@ -1,7 +1,7 @@
 //! One field: what its kind makes of frames.
 
 use lumencast_codec::{FieldInfo, LightTrack, Shape};
-use lumencast_light::{Field, Light};
+use lumencast_light::{Field, FieldId, Light, LumelAges};
 
 use crate::CacheError;
 use crate::lightmap::LightmapCache;
@@ -89,6 +89,14 @@ impl FieldCache {
         match self {
             Self::Volume(cache) => cache.newest_of(region),
             Self::Lightmap(cache) => cache.newest_of(region),
+        }
+    }
+
+    /// How long ago the light of its lumels came, where it has some; `field` is its number.
+    pub(crate) fn lumel_ages(&self, field: FieldId, now: f64) -> Option<LumelAges> {
+        match self {
+            Self::Volume(_) => None,
+            Self::Lightmap(cache) => Some(cache.ages(field, now)),
         }
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use lumencast_codec::{FrameHead, LightTrack, LightmapShape};
-use lumencast_light::{Field, Layout, Light, Lightmap};
+use lumencast_light::{Field, FieldId, Layout, Light, Lightmap, LumelAges, Told};
 
 use crate::CacheError;
 use crate::newest::Newest;
@@ -83,5 +83,14 @@ impl LightmapCache {
 
     pub(crate) fn newest_of(&self, region: u32) -> Option<&Newest> {
         self.tiles.get(&region)?.newest()
+    }
+
+    /// How long ago the light of each tile came; `field` is the lightmap's number.
+    pub(crate) fn ages(&self, field: FieldId, now: f64) -> LumelAges {
+        let tiles = || self.shape.tiles().filter(|tile| tile.told == Told::Irradiance);
+        let age = |region| Some((now - self.newest_of(region)?.arrived).max(0.0));
+        // The first tile is as large as any.
+        let side = tiles().next().map_or(1, |tile| tile.size.x);
+        LumelAges { field, side, seconds: tiles().map(|tile| age(tile.id)).collect() }
     }
 }

@@ -130,6 +130,32 @@ fn tiles_pass_from_update_to_update() {
 }
 
 #[test]
+fn each_tile_has_the_age_of_its_own_newest_light() {
+    let mut server = Server::new(1, layout());
+    let mut cache = Cache::new();
+    cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();
+    let ages = |cache: &Cache, now| {
+        let [ages] = &cache.lumel_ages(now)[..] else { panic!("one lightmap") };
+        assert_eq!((ages.field, ages.side, ages.seconds.len()), (FieldId(FIELD), 256, 4));
+        ages.clone()
+    };
+    assert_eq!(ages(&cache, 1.0).seconds, [None; 4]);
+    let first = server.update(1.0);
+    add_all(&mut cache, &first[1..], 2.0);
+    assert_eq!(ages(&cache, 3.0).seconds, [None, Some(1.0), Some(1.0), Some(1.0)]);
+    add_all(&mut cache, &server.update(2.0)[3..], 4.0);
+    let known = ages(&cache, 4.5);
+    assert_eq!(known.seconds, [None, Some(2.5), Some(2.5), Some(0.5)]);
+    let layout = layout();
+    let last = UVec2::splat(259);
+    assert_eq!(known.at(&layout, 0, last), Some(0.5));
+    assert_eq!(known.at(&layout, 0, last - UVec2::splat(4)), None, "of the first tile");
+    // What came before again is no newer light.
+    assert_eq!(add(&mut cache, &first[3], 5.0), Ok(false));
+    assert_eq!(ages(&cache, 5.0).seconds[3], Some(1.0));
+}
+
+#[test]
 fn a_tick_is_reached_once_every_tile_is() {
     let mut server = Server::new(1, layout());
     let mut cache = Cache::new();

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use glam::Vec3;
 use lumencast_cache::{Cache, CurrentLight, SceneEvent};
 use lumencast_codec::{Catalog, LightTrack, ResourceHash, StateFrame, limits, tracks};
+use lumencast_light::LumelAges;
 use lumencast_scene::Edit;
 use lumencast_transport::{
     Client, ConnectOptions, ConnectionState, Error, Frame, ReadOptions, TrackReader,
@@ -147,6 +148,12 @@ impl Session {
     pub fn light<R>(&self, now: Instant, see: impl FnOnce(CurrentLight<'_>) -> R) -> R {
         let now = self.shared.seconds(now);
         see(self.shared.lock().cache.light(now))
+    }
+
+    /// How long ago, at `now`, the light of each lightmap's tiles came.
+    pub fn lumel_ages(&self, now: Instant) -> Vec<LumelAges> {
+        let now = self.shared.seconds(now);
+        self.shared.lock().cache.lumel_ages(now)
     }
 
     /// What has happened to the scene since the last call, in order.

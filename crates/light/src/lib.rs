@@ -22,8 +22,8 @@ pub use field::Field;
 pub use field_id::FieldId;
 pub use light::Light;
 pub use lightmap::{
-    ChartVertex, Charts, Layout, Lightmap, Rectangle, STEEPEST, Surface, SurfaceId, TILT, Told,
-    slope, slope_by, tilted,
+    ChartVertex, Charts, Layout, Lightmap, LumelAges, Rectangle, STEEPEST, Surface, SurfaceId,
+    TILT, Told, slope, slope_by, tilted,
 };
 pub use luminance::luminance;
 pub use place::{OnTriangle, Place};
