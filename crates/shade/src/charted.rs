@@ -4,18 +4,25 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use lumencast_gpu::Gpu;
-use lumencast_light::{Charts, Layout, Light, Surface, SurfaceId};
+use lumencast_light::{Charts, FieldId, Layout, Light, Surface, SurfaceId};
 use lumencast_scene::{Instance, Mesh, Primitive};
 use lumencast_shaders::layout;
 
 use crate::part::{Corner, LumelPlace, Part, upload_corners};
 
-/// Where surfaces lie on the layers of the pages' texture.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct SurfaceLayouts {
-    /// With the layers of their first pages: of light, and of slopes.
-    layouts: Vec<(Arc<Layout>, [u32; 2])>,
+/// A lightmap's surfaces on its pages, and its pages on layers of the pages' texture.
+#[derive(Clone, Debug)]
+pub(crate) struct PlacedLayout {
+    /// The lightmap's number.
+    pub(crate) field: FieldId,
+    pub(crate) layout: Arc<Layout>,
+    /// The layers of the first pages: of light, and of slopes.
+    pub(crate) first_layers: [u32; 2],
 }
+
+/// Where surfaces lie on the layers of the pages' texture: lightmap after lightmap.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SurfaceLayouts(Vec<PlacedLayout>);
 
 impl SurfaceLayouts {
     pub(crate) fn of(light: &Light) -> Self {
@@ -25,15 +32,21 @@ impl SurfaceLayouts {
             let first = next;
             let slopes = if lightmap.slopes.is_some() { first + pages } else { first };
             next = slopes + pages;
-            (lightmap.layout.clone(), [first, slopes])
+            let layout = lightmap.layout.clone();
+            PlacedLayout { field: lightmap.id, layout, first_layers: [first, slopes] }
         });
-        Self { layouts: layouts.collect() }
+        Self(layouts.collect())
+    }
+
+    /// Those of all lightmaps.
+    pub(crate) fn all(&self) -> &[PlacedLayout] {
+        &self.0
     }
 
     /// Whether they are the very same.
     pub(crate) fn is(&self, other: &Self) -> bool {
         let addresses = |of: &Self| -> Vec<(*const Layout, [u32; 2])> {
-            of.layouts.iter().map(|(layout, first)| (Arc::as_ptr(layout), *first)).collect()
+            of.0.iter().map(|placed| (Arc::as_ptr(&placed.layout), placed.first_layers)).collect()
         };
         addresses(self) == addresses(other)
     }
@@ -43,9 +56,9 @@ impl SurfaceLayouts {
         let (node, copy, primitive) = (instance.node.0, instance.copy, primitive as u32);
         [false, true].map(|back| {
             let id = SurfaceId { node, copy, primitive, back };
-            self.layouts.iter().find_map(|(layout, first)| {
+            self.0.iter().find_map(|PlacedLayout { layout, first_layers, .. }| {
                 let surface = layout.surface(id)?;
-                Some(Side { surface, first_layers: *first, share: layout.share(id) })
+                Some(Side { surface, first_layers: *first_layers, share: layout.share(id) })
             })
         })
     }
@@ -101,7 +114,7 @@ impl Charted {
         layouts: &SurfaceLayouts,
         rectangles: &mut Vec<layout::Rectangle>,
     ) -> Option<WithLumels<'_>> {
-        if layouts.layouts.is_empty() || !instance.still {
+        if layouts.0.is_empty() || !instance.still {
             return None;
         }
         let primitives = &instance.mesh.primitives;

@@ -1,6 +1,7 @@
 //! How the passes of a frame are drawn: depth alone, and pictures.
 
 use crate::materials::Surface;
+use crate::pages::FlatPages;
 use crate::part::Part;
 use crate::passes::Pass;
 use crate::pipelines::{Layouts, Pipelines};
@@ -75,7 +76,7 @@ impl Depths<'_> {
     }
 }
 
-/// Draws surfaces, and what lies behind them.
+/// Draws surfaces, what lies behind them, and what stands before them.
 #[derive(Clone, Copy)]
 pub(crate) struct Picture<'a> {
     pub(crate) scene: &'a GpuScene,
@@ -86,6 +87,8 @@ pub(crate) struct Picture<'a> {
     pub(crate) field: &'a wgpu::BindGroup,
     /// Whether the environment is shown.
     pub(crate) background: bool,
+    /// The pages that are shown before all, if any.
+    pub(crate) pages: Option<&'a FlatPages>,
 }
 
 impl Picture<'_> {
@@ -113,6 +116,11 @@ impl Picture<'_> {
             encoded.draw(0..3, 0..1);
         }
         self.draw_surfaces(&mut encoded, mixed);
+        if let Some(pages) = self.pages {
+            encoded.set_pipeline(&self.pipelines.pages);
+            encoded.set_bind_group(2, self.field, &[]);
+            pages.draw(&mut encoded);
+        }
     }
 
     fn draw_surfaces(self, encoded: &mut wgpu::RenderPass<'_>, calls: &[Call]) {

@@ -8,10 +8,11 @@ use glam::{Affine3A, Mat3, UVec3, Vec3};
 use lumencast_gpu::Gpu;
 use lumencast_gpu::bindings::{self, FILTERED, SAMPLER, STORAGE, UNIFORM};
 use lumencast_gpu::textures;
-use lumencast_light::{Atlas, Grid, Light, ProbeVolume, ScaleRule, atlas_size, texels};
+use lumencast_light::{Atlas, Grid, Light, LumelAges, ProbeVolume, ScaleRule, atlas_size, texels};
 use lumencast_shaders::layout;
 
 use crate::ShadeError;
+use crate::ages::AgeGrid;
 use crate::charted::SurfaceLayouts;
 use crate::lumels::GpuLumels;
 
@@ -31,6 +32,8 @@ pub(crate) struct GpuField {
     /// The point of the world that places are relative to.
     about: Vec3,
     lumels: GpuLumels,
+    /// How long ago the light of lumels came.
+    ages: Vec<LumelAges>,
     /// Where surfaces lie on the lumels' pages.
     pub(crate) layouts: SurfaceLayouts,
 }
@@ -39,7 +42,7 @@ pub(crate) struct GpuField {
 fn group_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
     let atlas = bindings::texture(FILTERED, wgpu::TextureViewDimension::D3);
     let pages = bindings::texture(FILTERED, wgpu::TextureViewDimension::D2Array);
-    let types = [UNIFORM, STORAGE, atlas, SAMPLER, pages];
+    let types = [UNIFORM, STORAGE, atlas, SAMPLER, pages, STORAGE];
     gpu.group_layout("field", wgpu::ShaderStages::FRAGMENT, &types)
 }
 
@@ -55,7 +58,8 @@ impl GpuField {
         });
         let atlas = texture(gpu, UVec3::ONE);
         let lumels = GpuLumels::new(gpu);
-        let bound = Bound { atlas: &atlas, sampler: &sampler, volumes: &[], lumels: &lumels };
+        let ages = &AgeGrid::new(&[], &SurfaceLayouts::default());
+        let bound = Bound { atlas: &atlas, sampler: &sampler, volumes: &[], lumels: &lumels, ages };
         let group = bound.group(gpu, &layout);
         Self {
             layout,
@@ -68,6 +72,7 @@ impl GpuField {
             placed: vec![],
             about: Vec3::ZERO,
             lumels,
+            ages: vec![],
             layouts: SurfaceLayouts::default(),
         }
     }
@@ -80,14 +85,22 @@ impl GpuField {
         }
     }
 
-    /// Tells the shaders of the volumes.
+    /// Takes in how long ago the light of lumels came.
+    pub(crate) fn set_lumel_ages(&mut self, gpu: &Gpu, ages: Vec<LumelAges>) {
+        self.ages = ages;
+        self.describe(gpu);
+    }
+
+    /// Tells the shaders of the volumes, and of the ages of lumels.
     fn describe(&mut self, gpu: &Gpu) {
         for (grid, volume) in &mut self.placed {
             volume.cell_from_world = cell_from_world(grid, self.about);
         }
         let volumes: Vec<_> = self.placed.iter().map(|(_, volume)| *volume).collect();
+        let ages = &AgeGrid::new(&self.ages, &self.layouts);
         let Self { atlas, sampler, lumels, .. } = self;
-        self.group = Bound { atlas, sampler, volumes: &volumes, lumels }.group(gpu, &self.layout);
+        let bound = Bound { atlas, sampler, volumes: &volumes, lumels, ages };
+        self.group = bound.group(gpu, &self.layout);
     }
 
     /// Takes in other light. Where fields are as large as before, the textures stay.
@@ -178,23 +191,31 @@ struct Bound<'a> {
     sampler: &'a wgpu::Sampler,
     volumes: &'a [layout::Volume],
     lumels: &'a GpuLumels,
+    ages: &'a AgeGrid,
 }
 
 impl Bound<'_> {
     fn group(&self, gpu: &Gpu, layout: &wgpu::BindGroupLayout) -> wgpu::BindGroup {
-        let Self { atlas, sampler, volumes, lumels } = self;
-        let fields = layout::Fields { count: volumes.len() as u32, lumel_scale: lumels.scale() };
+        let Self { atlas, sampler, volumes, lumels, ages } = self;
+        let fields = layout::Fields {
+            count: volumes.len() as u32,
+            lumel_scale: lumels.scale(),
+            age_side: ages.side,
+            age_columns: ages.columns,
+        };
         let uniform =
             gpu.buffer("fields", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&fields), 0);
         let least = size_of::<layout::Volume>() as u64;
         let storage = wgpu::BufferUsages::STORAGE;
         let list = gpu.buffer("volumes", storage, bytemuck::cast_slice(volumes), least);
+        let ages = gpu.buffer("ages", storage, bytemuck::cast_slice(&ages.seconds), 4);
         let resources = [
             uniform.as_entire_binding(),
             list.as_entire_binding(),
             wgpu::BindingResource::TextureView(&textures::view(atlas)),
             wgpu::BindingResource::Sampler(sampler),
             wgpu::BindingResource::TextureView(&lumels.view()),
+            ages.as_entire_binding(),
         ];
         gpu.group("fields", layout, &resources)
     }

@@ -3,7 +3,7 @@
 use lumencast_scene::Snapshot;
 use lumencast_shaders::layout;
 
-use crate::settings::{Lighting, Settings};
+use crate::settings::{Lighting, LumelLook, Settings};
 use crate::shadows::ShadowPlan;
 
 /// How far patterns turn from one frame of a picture to the next: the golden section fills the circle
@@ -37,8 +37,7 @@ impl Frame<'_> {
             light_count: self.snapshot.lights.len() as u32,
             parts: part(emission, layout::parts::EMISSION)
                 | part(direct, layout::parts::DIRECT)
-                | part(indirect, layout::parts::INDIRECT)
-                | part(settings.checkers, layout::parts::CHECKERS),
+                | part(indirect, layout::parts::INDIRECT),
             filter_samples: settings.shadows.filter_samples.max(1),
             search_samples: settings.shadows.search_samples,
             pre_exposure: settings.pre_exposure,
@@ -47,8 +46,12 @@ impl Frame<'_> {
             frame: self.number,
             still: settings.strengths.still,
             moving: settings.strengths.moving,
+            look: match settings.look {
+                LumelLook::Light => layout::look::LIGHT,
+                LumelLook::Lumels => layout::look::LUMELS,
+                LumelLook::Age => layout::look::AGE,
+            },
             occlusion_radius: settings.drawn_occlusion().map_or(0.0, |occlusion| occlusion.radius),
-            ..layout::Frame::default()
         }
     }
 }

@@ -16,6 +16,7 @@
 
 #![forbid(unsafe_code)]
 
+mod ages;
 mod camera;
 mod charted;
 mod deform;
@@ -31,6 +32,7 @@ mod lumels;
 mod materials;
 mod meter;
 mod occlusion;
+mod pages;
 mod part;
 mod passes;
 mod pipelines;
@@ -50,7 +52,7 @@ pub use lumencast_gpu::{Abilities, Gpu, GpuError};
 pub use renderer::Renderer;
 pub use screen::{Measured, Screen, Show};
 pub use settings::{
-    Lighting, Materials, Occlusion, Settings, Shading, Shadows, Strengths, Transparency,
+    Lighting, LumelLook, Materials, Occlusion, Settings, Shading, Shadows, Strengths, Transparency,
 };
 pub use timing::PassTimes;
 pub use wgpu;

@@ -3,9 +3,10 @@
 use lumencast_gpu::Gpu;
 use lumencast_gpu::bindings::{STORAGE, UNIFORM_BY_OFFSET};
 use lumencast_gpu::textures::{COLOR, DEPTH};
-use lumencast_shaders::{Shading, background, depth, forward};
+use lumencast_shaders::{Shading, background, depth, forward, pages};
 
 use crate::materials::Surface;
+use crate::pages::VERTEX_LAYOUT;
 use crate::part;
 use crate::settings::Transparency;
 
@@ -30,6 +31,7 @@ pub(crate) struct Pipelines {
     masked: wgpu::RenderPipeline,
     blended: wgpu::RenderPipeline,
     pub(crate) background: wgpu::RenderPipeline,
+    pub(crate) pages: wgpu::RenderPipeline,
 }
 
 /// What pipelines have in common, and those that no variant changes.
@@ -38,6 +40,7 @@ pub(crate) struct Layouts {
     pub(crate) pass: wgpu::BindGroupLayout,
     forward: wgpu::PipelineLayout,
     background: wgpu::PipelineLayout,
+    pages: wgpu::PipelineLayout,
     depth: wgpu::PipelineLayout,
     solid_depth: wgpu::RenderPipeline,
     masked_depth: wgpu::RenderPipeline,
@@ -62,6 +65,7 @@ impl Layouts {
         let layout = |label, groups: &[_]| gpu.pipeline_layout(label, groups);
         let forward = layout("forward", &[Some(&pass), Some(light), Some(field), Some(material)]);
         let background = layout("background", &[Some(&pass), Some(light)]);
+        let pages = layout("pages", &[None, Some(light), Some(field)]);
         let module = gpu.shader("depth", depth());
         let depth = layout("depth", &[Some(&pass)]);
         let masked = layout("masked depth", &[Some(&pass), None, None, Some(material)]);
@@ -82,7 +86,7 @@ impl Layouts {
         };
         let solid_depth = into_map(&depth, "depth_vertex", None);
         let masked_depth = into_map(&masked, "masked_depth_vertex", Some("masked_depth_fragment"));
-        Self { pass, forward, background, depth, solid_depth, masked_depth }
+        Self { pass, forward, background, pages, depth, solid_depth, masked_depth }
     }
 
     pub(crate) fn depth(&self, surface: Surface) -> &wgpu::RenderPipeline {
@@ -111,30 +115,33 @@ impl Pipelines {
             depth: depth_state(wgpu::CompareFunction::Greater, true),
             samples: variant.samples,
         };
-        let sky = gpu.shader("background", background());
+        let behind = FlatPipeline {
+            label: "background",
+            layout: &layouts.background,
+            module: &gpu.shader("background", background()),
+            entries: ["background_vertex", "background_fragment"],
+            buffers: &[],
+            topology: wgpu::PrimitiveTopology::TriangleList,
+            // Where nothing was drawn: depth 0 is infinitely far.
+            compare: wgpu::CompareFunction::Equal,
+        };
+        let in_front = FlatPipeline {
+            label: "pages",
+            layout: &layouts.pages,
+            module: &gpu.shader("pages", pages()),
+            entries: ["pages_vertex", "pages_fragment"],
+            buffers: &[Some(VERTEX_LAYOUT)],
+            topology: wgpu::PrimitiveTopology::TriangleStrip,
+            compare: wgpu::CompareFunction::Always,
+        };
         Self {
             variant,
             first: first.create(device),
             solid: forward_pipeline(device, layouts, &module, variant, Surface::Solid),
             masked: forward_pipeline(device, layouts, &module, variant, Surface::Masked),
             blended: forward_pipeline(device, layouts, &module, variant, Surface::Blended),
-            background: device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some("background"),
-                layout: Some(&layouts.background),
-                vertex: vertex(&sky, "background_vertex", &[]),
-                primitive: wgpu::PrimitiveState::default(),
-                // Where nothing was drawn: depth 0 is infinitely far.
-                depth_stencil: Some(depth_state(wgpu::CompareFunction::Equal, false)),
-                multisample: multisample(variant.samples),
-                fragment: Some(wgpu::FragmentState {
-                    module: &sky,
-                    entry_point: Some("background_fragment"),
-                    compilation_options: Default::default(),
-                    targets: &[Some(COLOR.into())],
-                }),
-                multiview_mask: None,
-                cache: None,
-            }),
+            background: behind.create(device, variant.samples),
+            pages: in_front.create(device, variant.samples),
         }
     }
 
@@ -246,6 +253,40 @@ impl MeshPipeline<'_> {
             depth_stencil: Some(self.depth),
             multisample: multisample(self.samples),
             fragment,
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}
+
+/// What a pipeline that draws flat before or behind all meshes is made of.
+struct FlatPipeline<'a> {
+    label: &'a str,
+    layout: &'a wgpu::PipelineLayout,
+    module: &'a wgpu::ShaderModule,
+    /// Of vertices and fragments.
+    entries: [&'a str; 2],
+    buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    topology: wgpu::PrimitiveTopology,
+    /// Where it is drawn, by the depth that is there.
+    compare: wgpu::CompareFunction,
+}
+
+impl FlatPipeline<'_> {
+    fn create(self, device: &wgpu::Device, samples: u32) -> wgpu::RenderPipeline {
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(self.label),
+            layout: Some(self.layout),
+            vertex: vertex(self.module, self.entries[0], self.buffers),
+            primitive: wgpu::PrimitiveState { topology: self.topology, ..Default::default() },
+            depth_stencil: Some(depth_state(self.compare, false)),
+            multisample: multisample(samples),
+            fragment: Some(wgpu::FragmentState {
+                module: self.module,
+                entry_point: Some(self.entries[1]),
+                compilation_options: Default::default(),
+                targets: &[Some(COLOR.into())],
+            }),
             multiview_mask: None,
             cache: None,
         })

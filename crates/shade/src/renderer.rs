@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use lumencast_gpu::Gpu;
-use lumencast_light::Light;
+use lumencast_light::{Light, LumelAges};
 use lumencast_scene::{Snapshot, View};
 
 use crate::ShadeError;
@@ -17,6 +17,7 @@ use crate::field::GpuField;
 use crate::frame::Frame;
 use crate::lights::GpuLights;
 use crate::occlusion::Occluder;
+use crate::pages::FlatPages;
 use crate::passes::{Passes, Viewers};
 use crate::pipelines::{Layouts, Pipelines, Variant};
 use crate::scene::GpuScene;
@@ -104,6 +105,12 @@ impl Renderer {
     /// Where it does not fit the device's textures.
     pub fn set_light(&mut self, light: &Light) -> Result<(), ShadeError> {
         self.field.update(&self.gpu, light)
+    }
+
+    /// Takes it from now on that the light of lumels came so long ago, which
+    /// [`LumelLook::Age`](crate::LumelLook::Age) shows. Fields that the light does not have are passed over.
+    pub fn set_lumel_ages(&mut self, ages: Vec<LumelAges>) {
+        self.field.set_lumel_ages(&self.gpu, ages);
     }
 
     /// One picture a view, all under the same light: radiance (cd/m²), row by row from the top left.
@@ -252,7 +259,8 @@ impl Renderer {
         }
     }
 
-    /// Draws one frame of each camera: shadow maps, then occlusion, surfaces, and what lies behind them.
+    /// Draws one frame of each camera: shadow maps, then occlusion, surfaces, what lies behind them, and
+    /// pages of lumels before all.
     /// `taken` is called after each camera's commands, before the next one's overwrite the picture.
     fn frame(
         &mut self,
@@ -275,6 +283,8 @@ impl Renderer {
         let light = self.lights.group(&self.gpu, &frame, &self.occluder);
         let occlusion = frame.settings.drawn_occlusion();
         let occlusion = occlusion.and_then(|settings| self.occluder.groups(&self.gpu, settings));
+        let flat = || FlatPages::new(&self.gpu, &self.field.layouts, frame.settings.size);
+        let pages = frame.settings.pages.then(flat);
         let (Some(target), Some(pipelines)) = (&self.target, &self.pipelines) else { return };
         let picture = Picture {
             scene: &self.scene,
@@ -282,6 +292,7 @@ impl Renderer {
             light: &light,
             field: &self.field.group,
             background: frame.settings.lighting.emission,
+            pages: pages.as_ref(),
         };
         for pass in passes.cameras() {
             if let Some(groups) = &occlusion {

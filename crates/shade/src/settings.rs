@@ -41,6 +41,19 @@ impl Default for Strengths {
     }
 }
 
+/// What surfaces that have lumels show, and pages of lumels: the light, or what one looks into it by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum LumelLook {
+    /// The light.
+    #[default]
+    Light,
+    /// The lumels themselves, as a checkerboard: in place of all light, whatever its exposure.
+    Lumels,
+    /// How long ago the light of lumels came ([`Renderer::set_lumel_ages`](crate::Renderer::set_lumel_ages)),
+    /// likewise: green up to 0.1 s, by yellow at 1 s to red from 10 s on; black where none has come.
+    Age,
+}
+
 /// Which materials to believe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Materials {
@@ -134,8 +147,11 @@ pub struct Settings {
     pub lighting: Lighting,
     /// How strong indirect light is.
     pub strengths: Strengths,
-    /// Whether every other lumel is drawn dark, to see how large they are.
-    pub checkers: bool,
+    /// What is shown at lumels.
+    pub look: LumelLook,
+    /// Whether the pages of lumels are shown flat before the picture, as bright as white surfaces that
+    /// they lit.
+    pub pages: bool,
     /// Which materials.
     pub materials: Materials,
     /// Shadows of punctual lights.
@@ -160,7 +176,8 @@ impl Default for Settings {
             shading: Shading::Pixels,
             lighting: Lighting::FIELD,
             strengths: Strengths::default(),
-            checkers: false,
+            look: LumelLook::Light,
+            pages: false,
             materials: Materials::Full,
             shadows: Shadows::default(),
             occlusion: None,

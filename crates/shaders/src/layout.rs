@@ -67,7 +67,7 @@ pub struct Frame {
     pub occlusion_radius: f32,
     pub still: f32,
     pub moving: f32,
-    pub _pad0: u32,
+    pub look: u32,
 }
 
 /// Light from afar. Group 1, binding 1.
@@ -118,6 +118,8 @@ pub struct ShadowView {
 pub struct Fields {
     pub count: u32,
     pub lumel_scale: f32,
+    pub age_side: u32,
+    pub age_columns: u32,
 }
 
 /// `NO_LUMELS` of the shaders.
@@ -261,8 +263,16 @@ pub mod parts {
     pub const DIRECT: u32 = 2;
     /// Light of the field.
     pub const INDIRECT: u32 = 4;
-    /// Every other lumel is dark.
-    pub const CHECKERS: u32 = 8;
+}
+
+/// Numbers of [`Frame::look`].
+pub mod look {
+    /// `LOOK_LIGHT` of the shader, and so on.
+    pub const LIGHT: u32 = 0;
+    /// `LOOK_LUMELS`.
+    pub const LUMELS: u32 = 1;
+    /// `LOOK_AGE`.
+    pub const AGE: u32 = 2;
 }
 
 /// Values of [`PunctualLight::kind`].

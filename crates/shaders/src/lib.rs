@@ -43,7 +43,7 @@ macro_rules! modules {
 
 /// The names and texts of all modules. `shade/sampling`, which `shade/forward` imports, is one of
 /// `shade/by_pixels` and `shade/by_samples`: see [`forward`].
-pub const MODULES: [(&str, &str); 37] = modules![
+pub const MODULES: [(&str, &str); 39] = modules![
     "common/environment",
     "common/harmonics",
     "common/math",
@@ -63,11 +63,13 @@ pub const MODULES: [(&str, &str); 37] = modules![
     "shade/frame",
     "shade/frame_bindings",
     "shade/indirect",
+    "shade/look",
     "shade/lumels",
     "shade/meter",
     "shade/meter_bindings",
     "shade/occlusion",
     "shade/occlusion_bindings",
+    "shade/pages",
     "shade/pass_bindings",
     "shade/screen",
     "shade/screen_bindings",
@@ -133,6 +135,11 @@ pub fn depth() -> String {
 /// Draws the environment where there is no surface: `background_vertex`, `background_fragment`.
 pub fn background() -> String {
     shader("shade/background")
+}
+
+/// Draws pages of lumels before a picture: `pages_vertex`, `pages_fragment`.
+pub fn pages() -> String {
+    shader("shade/pages")
 }
 
 /// Deforms the vertices of a primitive: `deform_vertices`.

@@ -3,7 +3,7 @@
 use std::mem::{offset_of, size_of};
 
 use lumencast_shaders::{
-    Shading, background, deform, depth, forward, layout, meter, occlusion, screen,
+    Shading, background, deform, depth, forward, layout, meter, occlusion, pages, screen,
 };
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{Module, TypeInner};
@@ -25,6 +25,7 @@ fn every_shader_is_valid() {
         ("forward, by samples", forward(Shading::Samples), 3),
         ("depth", depth(), 4),
         ("background", background(), 2),
+        ("pages", pages(), 2),
         ("deform", deform(), 1),
         ("occlusion", occlusion(), 3),
         ("screen", screen(), 2),
@@ -109,7 +110,7 @@ fn layouts_agree() {
             occlusion_radius,
             still,
             moving,
-            _pad0,
+            look,
         }
     );
     same!(m, Environment { zenith, kind, ground, turn, horizon, _pad });
@@ -129,7 +130,7 @@ fn layouts_agree() {
         }
     );
     same!(m, ShadowView { clip_from_world, texel, near, depth_range, search, reach, _pad0, _pad1 });
-    same!(m, Fields { count, lumel_scale });
+    same!(m, Fields { count, lumel_scale, age_side, age_columns });
     volumes_agree(m);
     same!(m, Map { row0, row1 });
     same!(m, Deform { vertices, morphs, joints, influences, flags });
@@ -181,7 +182,7 @@ fn a_moved_member_is_noticed() {
 /// Numbers that shaders and Rust both name.
 #[test]
 fn constants_agree() {
-    use layout::{deform as bits, light, material, meter as bins, parts, tone};
+    use layout::{deform as bits, light, look, material, meter as bins, parts, tone};
     let screen = compiled("screen", &screen());
     let forward = compiled("forward", &forward(Shading::Pixels));
     let deform = compiled("deform", &deform());
@@ -207,6 +208,9 @@ fn constants_agree() {
         (&forward, "PART_EMISSION", parts::EMISSION),
         (&forward, "PART_DIRECT", parts::DIRECT),
         (&forward, "PART_INDIRECT", parts::INDIRECT),
+        (&forward, "LOOK_LIGHT", look::LIGHT),
+        (&forward, "LOOK_LUMELS", look::LUMELS),
+        (&forward, "LOOK_AGE", look::AGE),
         (&forward, "LIGHT_POINT", light::POINT),
         (&forward, "LIGHT_SPOT", light::SPOT),
         (&forward, "LIGHT_DIRECTIONAL", light::DIRECTIONAL),

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use egui::{ComboBox, Grid, Label, RichText, Slider, Ui};
 use lumencast_light::Offset;
 use lumencast_picture::ToneMap;
-use lumencast_shade::{Lighting, Occlusion, Settings, Shading, Transparency};
+use lumencast_shade::{Lighting, LumelLook, Occlusion, Settings, Shading, Transparency};
 
 use crate::camera::Steering;
 use crate::exposure::Exposure;
@@ -82,8 +82,13 @@ pub(crate) fn show(
         ui.checkbox(&mut lighting.emission, "Emission");
     });
     let strengths = &mut controls.settings.strengths;
-    ui.add(Slider::new(&mut strengths.still, STRENGTH).text("indirect, on what is still"));
-    ui.add(Slider::new(&mut strengths.moving, STRENGTH).text("indirect, on what moves"));
+    for (strength, name, hint) in [
+        (&mut strengths.still, "Static", "Strength of indirect light, on what stands still"),
+        (&mut strengths.moving, "Dynamic", "Strength of indirect light, on what moves"),
+    ] {
+        ui.add(Slider::new(strength, STRENGTH).text(name)).on_hover_text(hint);
+    }
+    lumels(ui, &mut controls.settings);
     ui.separator();
     exposure(ui, &mut controls.exposure);
     choice(ui, "Tone map", &mut controls.tone_map, &ToneMap::ALL, |map| map.to_string());
@@ -122,6 +127,17 @@ pub(crate) fn show(
     asked
 }
 
+/// What one looks into lumels by, in the page's words.
+fn lumels(ui: &mut Ui, settings: &mut Settings) {
+    let looks = [LumelLook::Light, LumelLook::Lumels, LumelLook::Age];
+    choice(ui, "Show", &mut settings.look, &looks, |look| match look {
+        LumelLook::Light => "Light".into(),
+        LumelLook::Lumels => "Lumels, one square each".into(),
+        LumelLook::Age => "Age, green to red".into(),
+    });
+    ui.checkbox(&mut settings.pages, "Pages").on_hover_text("Show the pages that lumels lie on");
+}
+
 fn exposure(ui: &mut Ui, exposure: &mut Exposure) {
     ui.horizontal(|ui| {
         ui.label("Exposure");
@@ -147,7 +163,6 @@ fn drawing(ui: &mut Ui, controls: &mut Controls) {
         Transparency::Coverage => "coverage".into(),
         Transparency::Sorted => "sorted".into(),
     });
-    ui.checkbox(&mut settings.checkers, "Lumels as a checkerboard");
     let shadows = &mut settings.shadows;
     choice(ui, "Shadow maps", &mut shadows.resolution, &SHADOWS, |side| match side {
         0 => "none".into(),
@@ -249,4 +264,94 @@ pub(crate) fn keys(
     }
     asked.screenshot = pressed(Key::P);
     asked
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{Event, Modifiers, PointerButton, RawInput, Rect, Shape, pos2};
+
+    use super::*;
+
+    /// A panel, and a clock.
+    struct Panel {
+        context: egui::Context,
+        controls: Controls,
+        now: f64,
+    }
+
+    impl Panel {
+        fn new() -> Self {
+            let controls = Controls {
+                settings: Settings::default(),
+                offset: None,
+                window: None,
+                tone_map: ToneMap::Srgb,
+                exposure: Exposure::new(None),
+                panel: true,
+            };
+            Self { context: egui::Context::default(), controls, now: 0.0 }
+        }
+
+        /// A frame; the words that it shows, and where.
+        fn frame(&mut self, events: Vec<Event>) -> Vec<(String, Rect)> {
+            self.now += 0.5;
+            let screen_rect = Some(Rect::from_min_max(pos2(0.0, 0.0), pos2(400.0, 1200.0)));
+            let input =
+                RawInput { screen_rect, events, time: Some(self.now), ..RawInput::default() };
+            let (controls, facts) = (&mut self.controls, Facts::default());
+            let mut output = self.context.clone().run_ui(input, |ui| {
+                show(ui, controls, &mut Steering::Orbit, &facts);
+            });
+            // Nothing draws it.
+            output.textures_delta.clear();
+            let mut shapes: Vec<Shape> = output.shapes.into_iter().map(|s| s.shape).collect();
+            let mut words = Vec::new();
+            while let Some(shape) = shapes.pop() {
+                match shape {
+                    Shape::Vec(more) => shapes.extend(more),
+                    Shape::Text(text) => {
+                        words.push((text.galley.text().to_owned(), text.visual_bounding_rect()));
+                    }
+                    _ => {}
+                }
+            }
+            words
+        }
+
+        /// Clicks on a word.
+        fn click(&mut self, word: &str) {
+            let words = self.frame(vec![]);
+            let found = words.iter().find(|(shown, _)| shown == word);
+            let pos = found.unwrap_or_else(|| panic!("no {word} among {words:?}")).1.center();
+            let click = |pressed| Event::PointerButton {
+                pos,
+                button: PointerButton::Primary,
+                pressed,
+                modifiers: Modifiers::NONE,
+            };
+            self.frame(vec![Event::PointerMoved(pos)]);
+            self.frame(vec![click(true)]);
+            self.frame(vec![click(false)]);
+        }
+    }
+
+    #[test]
+    fn lumels_are_looked_into_by_the_words_of_the_page() {
+        let mut panel = Panel::new();
+        let mut shown = "Light";
+        for (word, look) in [
+            ("Lumels, one square each", LumelLook::Lumels),
+            ("Age, green to red", LumelLook::Age),
+            ("Light", LumelLook::Light),
+        ] {
+            panel.click(shown);
+            panel.click(word);
+            assert_eq!(panel.controls.settings.look, look);
+            shown = word;
+        }
+        for pages in [true, false] {
+            panel.click("Pages");
+            assert_eq!(panel.controls.settings.pages, pages);
+        }
+    }
 }

@@ -10,6 +10,7 @@ mod direct_light;
 mod environments;
 mod far;
 mod indirect_light;
+mod looks;
 mod lumels;
 mod lumels_directional;
 mod materials;

@@ -7,6 +7,7 @@
 #import shade/frame
 #import shade/frame_bindings
 #import shade/indirect
+#import shade/look
 #import shade/lumels
 #import shade/pass_bindings
 #import shade/sampling
@@ -162,6 +163,9 @@ fn shading_normal(in: Varying, p: Point, by_map: bool) -> vec3f {
     return transform_vector(instances[in.instance].normal_from_object, object_normal);
 }
 
+// How bright what one looks into lumels by is shown on surfaces seen edge on: their shapes stay visible.
+const EDGE_ON: f32 = 0.6;
+
 // What a point sends to the eye. The pattern of shadow samples is turned by `turn`.
 fn radiance_of(in: Varying, p: Point, faces_front: bool, turn: f32) -> vec3f {
     let plain = (material.flags & MATERIAL_LAMBERT) != 0u;
@@ -173,6 +177,14 @@ fn radiance_of(in: Varying, p: Point, faces_front: bool, turn: f32) -> vec3f {
     if dot(p.geometry, p.geometry) > 0.0 {
         geometric = normalize(p.geometry);
         geometric = select(geometric, -geometric, dot(geometric, v) < 0.0);
+    }
+
+    let rectangle = select(in.rectangles.y, in.rectangles.x, front);
+    let lumels = select(in.lumels.zw, in.lumels.xy, front) / in.one;
+    if frame.look != LOOK_LIGHT && rectangle != NO_LUMELS {
+        let page = rectangles[rectangle];
+        let color = look_color(page.layer, page.corner + lumels);
+        return color * mix(EDGE_ON, 1.0, dot(geometric, v)) / frame.pre_exposure;
     }
 
     var radiance = vec3f(0.0);
@@ -202,18 +214,11 @@ fn radiance_of(in: Varying, p: Point, faces_front: bool, turn: f32) -> vec3f {
             if OCCLUDED {
                 visible = ambient_visibility(in.clip, p.slopes);
             }
-            let lumels = in.lumels / in.one;
             let own = visible_normal(shading_normal(in, p, false), geometric, v);
-            var arriving = Lumels(in.rectangles.x, lumels.xy, own);
-            if !front {
-                arriving = Lumels(in.rectangles.y, lumels.zw, own);
-            }
+            let arriving = Lumels(rectangle, lumels, own);
             let strength = select(frame.moving, frame.still, instances[in.instance].still == 1u);
             radiance +=
                 strength * indirect_light(b, site, arriving, p.substance.roughness, occlusion, visible);
-            if (frame.parts & PART_CHECKERS) != 0u && is_dark_checker(arriving) {
-                radiance *= 0.25;
-            }
         }
     }
     return radiance;

@@ -18,15 +18,19 @@ struct Frame {
     // Indirect light of what is still, and of what moves, is multiplied by these.
     still: f32,
     moving: f32,
-    _pad0: u32,
+    // What surfaces with lumels show, see LOOK_*.
+    look: u32,
 }
 
 // Which light is drawn.
 const PART_EMISSION: u32 = 1u;
 const PART_DIRECT: u32 = 2u;
 const PART_INDIRECT: u32 = 4u;
-// Every other lumel is dark.
-const PART_CHECKERS: u32 = 8u;
+
+// What surfaces with lumels show: their light, their lumels, or how long ago the light of these came.
+const LOOK_LIGHT: u32 = 0u;
+const LOOK_LUMELS: u32 = 1u;
+const LOOK_AGE: u32 = 2u;
 
 // A shadow map: one layer of the array.
 struct ShadowView {

@@ -16,12 +16,6 @@ struct Lumels {
     normal: vec3f,
 }
 
-// Whether a point lies in one of every other lumel, as on a checkerboard.
-fn is_dark_checker(lumels: Lumels) -> bool {
-    let lumel = vec2i(floor(lumels.at));
-    return lumels.rectangle != NO_LUMELS && ((lumel.x + lumel.y) & 1) == 1;
-}
-
 // How much of a point's light its lumels make: 0 where it has none.
 fn lumel_share(lumels: Lumels) -> f32 {
     if lumels.rectangle == NO_LUMELS {
