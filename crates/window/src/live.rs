@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use lumencast_client::{Replica, Session};
-use lumencast_light::Light;
+use lumencast_light::{Light, LumelAges};
 use lumencast_scene::{Aabb, NamedView, Scene, Snapshot};
 use lumencast_transport::ConnectionState;
 
@@ -79,6 +79,10 @@ impl World for Live {
 
     fn light(&mut self, _anew: bool, take: &mut dyn FnMut(&Light)) {
         self.session.light(self.now, |light| take(&light));
+    }
+
+    fn lumel_ages(&self) -> Vec<LumelAges> {
+        self.session.lumel_ages(self.now)
     }
 
     fn facts(&self) -> Vec<(&'static str, String)> {

@@ -76,7 +76,7 @@ mod tests {
     use std::sync::Arc;
 
     use glam::Vec3;
-    use lumencast_light::Light;
+    use lumencast_light::{Light, LumelAges};
     use lumencast_picture::ToneMap;
     use lumencast_scene::{Aabb, NamedView, Scene, Snapshot};
     use lumencast_shade::Settings;
@@ -107,6 +107,10 @@ mod tests {
         }
 
         fn light(&mut self, _anew: bool, _take: &mut dyn FnMut(&Light)) {}
+
+        fn lumel_ages(&self) -> Vec<LumelAges> {
+            Vec::new()
+        }
 
         fn facts(&self) -> Vec<(&'static str, String)> {
             Vec::new()

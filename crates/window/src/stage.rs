@@ -8,7 +8,7 @@ use glam::UVec2;
 use lumencast_light::Offset;
 use lumencast_picture::Picture;
 use lumencast_scene::{Aabb, View};
-use lumencast_shade::{Drawn, Gpu, PassTimes, Renderer, Screen, Settings, Show, wgpu};
+use lumencast_shade::{Drawn, Gpu, LumelLook, PassTimes, Renderer, Screen, Settings, Show, wgpu};
 
 use crate::Options;
 use crate::camera::Camera;
@@ -163,7 +163,12 @@ impl Stage {
     fn meter(&mut self, now: f64) -> Result<(), WindowError> {
         let Device { renderer, screen, .. } = &mut self.device;
         while let Some(measured) = screen.measured(renderer.gpu())? {
-            self.controls.exposure.measured(measured.exposure, (now - self.metered) as f32);
+            let Controls { exposure, settings, .. } = &mut self.controls;
+            // What lumels are looked into by is as bright at any exposure: none would suit it.
+            let is_light = settings.look == LumelLook::Light && !settings.pages;
+            if is_light || !exposure.is_known() {
+                exposure.measured(measured.exposure, (now - self.metered) as f32);
+            }
             self.metered = now;
             self.time = measured.time;
         }
@@ -259,6 +264,9 @@ impl Stage {
         });
         taken?;
         self.lit = Some(wanted);
+        if settings.look == LumelLook::Age {
+            renderer.set_lumel_ages(self.world.lumel_ages());
+        }
         self.drawn = renderer.show(&self.camera.view(), &settings, screen, show, onto)?;
         // Those who draw the panel do not expect a device that is gone.
         renderer.gpu().poll("drawing")?;

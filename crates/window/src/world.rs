@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumencast_light::Light;
+use lumencast_light::{Light, Lightmap, LumelAges};
 use lumencast_scene::{Aabb, NamedView, Scene, Snapshot};
 
 /// A scene and its light.
@@ -25,6 +25,9 @@ pub trait World {
 
     /// Hands the light to `take` where it has changed since it was handed on last, or `anew`.
     fn light(&mut self, anew: bool, take: &mut dyn FnMut(&Light));
+
+    /// How long ago the light of lumels came.
+    fn lumel_ages(&self) -> Vec<LumelAges>;
 
     /// What there is to tell of the light: names and values.
     fn facts(&self) -> Vec<(&'static str, String)>;
@@ -52,14 +55,16 @@ pub struct Still {
     handed_on: bool,
     plays: bool,
     last: Option<f64>,
+    /// Seconds since it was first shown.
+    shown: f64,
 }
 
 impl Still {
     /// A scene under a field; `source` says where that comes from.
     pub fn new(scene: Scene, light: Light, source: String) -> Self {
         let views = scene.views();
-        let (handed_on, plays, last) = (false, true, None);
-        Self { scene, views, light, source, handed_on, plays, last }
+        let (handed_on, plays, last, shown) = (false, true, None, 0.0);
+        Self { scene, views, light, source, handed_on, plays, last, shown }
     }
 }
 
@@ -79,6 +84,7 @@ impl World for Still {
     fn update(&mut self, now: f64, _eye: Vec3) {
         let passed = self.last.map_or(0.0, |last| (now - last).max(0.0));
         self.last = Some(now);
+        self.shown += passed;
         if self.plays {
             self.scene.advance(passed);
         }
@@ -93,6 +99,12 @@ impl World for Still {
             take(&self.light);
             self.handed_on = true;
         }
+    }
+
+    /// All of it came when it was first shown.
+    fn lumel_ages(&self) -> Vec<LumelAges> {
+        let even = |lightmap: &Lightmap| LumelAges::even(lightmap.id, &lightmap.layout, self.shown);
+        self.light.lightmaps().map(even).collect()
     }
 
     fn facts(&self) -> Vec<(&'static str, String)> {
