@@ -267,6 +267,21 @@ pub(crate) fn keys(
 }
 
 #[cfg(test)]
+impl Controls {
+    /// The usual settings, with the panel or without.
+    pub(crate) fn usual(panel: bool) -> Self {
+        Self {
+            settings: Settings::default(),
+            offset: None,
+            window: None,
+            tone_map: ToneMap::Srgb,
+            exposure: Exposure::new(None),
+            panel,
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use egui::{Event, Modifiers, PointerButton, RawInput, Rect, Shape, pos2};
 
@@ -281,14 +296,7 @@ mod tests {
 
     impl Panel {
         fn new() -> Self {
-            let controls = Controls {
-                settings: Settings::default(),
-                offset: None,
-                window: None,
-                tone_map: ToneMap::Srgb,
-                exposure: Exposure::new(None),
-                panel: true,
-            };
+            let controls = Controls::usual(true);
             Self { context: egui::Context::default(), controls, now: 0.0 }
         }
 

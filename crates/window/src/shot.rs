@@ -77,12 +77,10 @@ mod tests {
 
     use glam::Vec3;
     use lumencast_light::{Light, LumelAges};
-    use lumencast_picture::ToneMap;
     use lumencast_scene::{Aabb, NamedView, Scene, Snapshot};
-    use lumencast_shade::Settings;
 
     use super::*;
-    use crate::{Controls, Exposure};
+    use crate::Controls;
 
     /// A world whose server has gone before it sent any light.
     struct Dark(Scene, Vec<NamedView>);
@@ -135,14 +133,7 @@ mod tests {
     fn a_world_that_stays_dark_is_not_waited_for_without_end() {
         let scene = Scene::builtin("cornell").unwrap();
         let views = scene.views();
-        let controls = Controls {
-            settings: Settings::default(),
-            offset: None,
-            window: None,
-            tone_map: ToneMap::Srgb,
-            exposure: Exposure::new(None),
-            panel: false,
-        };
+        let controls = Controls::usual(false);
         let screenshots = Path::new(env!("CARGO_MANIFEST_DIR")).join("never");
         let options = Options { size: UVec2::splat(8), view: None, controls, screenshots };
         let file = options.screenshots.join("never.png");
