@@ -13,8 +13,9 @@ const AGE_INTERVAL = 250;
 const AGES = [0.1, 10] as const;
 
 /**
- * Milliseconds without a frame after which new pictures are painted whole: as long as a passage takes at
- * most. What was painted before them is light of long ago, which other pictures have replaced unseen.
+ * Milliseconds without a frame after which new pictures are painted whole, and all at once: as long as a
+ * passage takes at most. What was painted before them is light of long ago, which other pictures have
+ * replaced unseen.
  */
 const REST = 500;
 
@@ -95,7 +96,9 @@ export class LumelPages {
     this.#look = look;
     const planned = lightmaps.flatMap((lightmap) => this.#planOf(lightmap, isAnew, hasRested, now));
     const strokes =
-      look === 'light' ? this.#paint(planned, isAnew) : planned.map((plan) => this.#flat(plan, now));
+      look === 'light'
+        ? this.#paint(planned, isAnew || hasRested)
+        : planned.map((plan) => this.#flat(plan, now));
     if (strokes.length === 0) return false;
     this.target.paint(strokes);
     this.#release();
@@ -130,8 +133,8 @@ export class LumelPages {
     return planned;
   }
 
-  /** Strokes of pictures: of as many as may be loaded now, those that waited longest first. */
-  #paint(planned: readonly Planned[], isAnew: boolean): Stroke[] {
+  /** Strokes of pictures: of all, or of as many as a frame may load, those that waited longest first. */
+  #paint(planned: readonly Planned[], loadsAll: boolean): Stroke[] {
     const isLoaded = ({ painted, region }: Planned) => painted.textures && painted.loaded === region.revision;
     const waiting = planned
       .filter((plan) => !isLoaded(plan))
@@ -140,7 +143,7 @@ export class LumelPages {
     for (const [i, { painted, region }] of waiting.entries()) {
       const { picture, revision } = region;
       bytes += bytesOf(picture);
-      if (i > 0 && bytes > LOAD && !isAnew) {
+      if (i > 0 && bytes > LOAD && !loadsAll) {
         painted.waited++;
         continue;
       }

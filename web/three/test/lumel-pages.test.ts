@@ -152,19 +152,32 @@ describe('pages', () => {
       [0, 1, 2].map((tile) =>
         region({ region: tile, revision, picture: halves(10 * revision + tile, large, scale) }),
       );
-    for (let revision = 1; revision <= 6; revision++) update(all(revision));
+    update(all(1));
+    painted = [];
+    for (let revision = 2; revision <= 7; revision++) update(all(revision));
     const seen = painted.map((strokes) => strokes.map(({ first }) => first! % 10));
     expect(seen).toEqual([[0], [1], [2], [0], [1], [2]]);
     // What has come last is what is painted, and in the end all is.
-    update(all(6));
-    update(all(6));
+    update(all(7));
+    update(all(7));
     expect(
       painted
         .slice(6)
         .flat()
         .map(({ first }) => first),
-    ).toEqual([60, 61]);
-    expect(update(all(6))).toBe(false);
+    ).toEqual([70, 71]);
+    expect(update(all(7))).toBe(false);
+  });
+
+  it('take in all pictures at once at first and after a rest', () => {
+    const large = (revision: number) =>
+      [0, 1, 2].map((tile) => region({ region: tile, revision, picture: halves(tile, 2 ** 18) }));
+    update(large(1), 0);
+    update(large(2), 501);
+    expect(shares()).toEqual([
+      [1, 1, 1],
+      [1, 1, 1],
+    ]);
   });
 
   it('are painted anew when their scale changes', () => {
