@@ -21,6 +21,8 @@ pub const MOST_PAGES: u32 = 8;
 const USUAL: u32 = 256;
 /// Sides of smaller pages, on one of which little scenes fit.
 const SMALLER: [u32; 3] = [128, 256, 512];
+/// Side of a page that nothing lies on yet.
+const EMPTY: u32 = 512;
 /// Rectangles begin at multiples of this, so that no block of a codec's transform belongs to two.
 pub(crate) const ALIGNMENT: i32 = 4;
 /// Share of a page that charts fill, about: the first guess.
@@ -41,6 +43,18 @@ pub struct LaidOut {
     pub texel: f32,
     /// Whether lumels are larger than they were asked for, since there are only so many pages.
     pub coarser: bool,
+}
+
+impl LaidOut {
+    /// A page that no surface lies on, for those that come later: of the size that is asked for, or
+    /// with room for lumels of that size.
+    pub fn empty(spec: LightmapSpec) -> Self {
+        let (size, texel) = match spec {
+            LightmapSpec::Size(size) => (size, LightmapSpec::TEXEL),
+            LightmapSpec::Texel(texel) => (EMPTY, texel),
+        };
+        Self { layout: Layout::new(size, 1, Vec::new()), texel, coarser: false }
+    }
 }
 
 /// The density of a scene that asks for none: a lumel every decimetre, or more of them where all of it

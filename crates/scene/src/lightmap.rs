@@ -15,13 +15,16 @@ pub enum LightmapSpec {
 }
 
 impl Default for LightmapSpec {
-    /// A decimetre.
+    /// A lumel every [`LightmapSpec::TEXEL`].
     fn default() -> Self {
-        Self::Texel(0.1)
+        Self::Texel(Self::TEXEL)
     }
 }
 
 impl LightmapSpec {
+    /// Side of a lumel where nothing else is asked for, metres.
+    pub const TEXEL: f32 = 0.1;
+
     /// Whether it makes sense; the reason when it does not.
     pub fn check(&self) -> Result<(), String> {
         match *self {

@@ -148,11 +148,7 @@ impl Tick {
         solver.set_lightmap(&scene.snapshot(), options.lightmap.as_ref());
         let published = Published::all(&solver, options.lumel_coding, Vec::new());
         let told_scales = vec![None; published.len()];
-        let share = match options.lightmap {
-            Some(_) => Budget::SHARE_BESIDE_LUMELS,
-            None => Budget::SHARE,
-        };
-        let budget = Budget::new(options.period, options.samples).filling(share);
+        let budget = Budget::new(options.period, options.samples).filling(share(&solver));
         let lumel_pace = LumelPace::new(options.period, options.lumel_samples);
         let last = Report::default();
         let unwrapping = Unwrapping::new(options.charts.clone());
@@ -367,6 +363,7 @@ impl Tick {
         // Their lumels are numbered anew.
         self.gathering.keep(|field| field != id);
         self.solver.extend_lightmap(scene, &newcomers, placed);
+        self.budget = self.budget.filling(share(&self.solver));
         self.lay_out(&[id], outlet);
     }
 
@@ -585,6 +582,11 @@ impl Tick {
         self.last = report.clone();
         report
     }
+}
+
+/// The share of the period that ticks aim to fill before lumels have the rest.
+fn share(solver: &Solver) -> f64 {
+    if solver.lumel_count() == 0 { Budget::SHARE } else { Budget::SHARE_BESIDE_LUMELS }
 }
 
 /// Cuts reasons where many edits are refused, so that a frame holds all refusals.

@@ -51,6 +51,9 @@ impl Unwrapping {
             self.under_way.take_if(|under_way| waits || under_way.thread.is_finished())?;
         let placed = match thread.join() {
             Ok(Ok(placed)) => {
+                for note in &placed.notes {
+                    tracing::warn!("{note}");
+                }
                 if placed.left_out > 0 {
                     let surfaces = placed.left_out;
                     tracing::warn!(surfaces, "no room for lumels: probes light them");

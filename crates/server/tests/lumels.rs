@@ -349,6 +349,11 @@ fn what_rests_has_lumels_again() {
     assert!(off < 0.1 * mean, "{off} of {mean}");
 }
 
+fn add(name: &str, source: InstanceSource, translation: Vec3) -> Edit {
+    let transform = Transform { translation: Some(translation), ..Transform::default() };
+    Edit::AddInstance { node: None, name: NodeName::new(name), source, parent: None, transform }
+}
+
 /// By how much the light of a surface is off on average, and the mean of what it should be.
 fn off_from_converged(stepped: &Stepped, scene: &Arc<Snapshot>, id: SurfaceId) -> (f32, f32) {
     let right = converged(scene);
@@ -364,6 +369,33 @@ fn off_from_converged(stepped: &Stepped, scene: &Arc<Snapshot>, id: SurfaceId) -
     (off, right.iter().sum::<f32>() / count)
 }
 
+/// Where no surface has lumels, those that are added get them.
+#[test]
+fn what_is_added_to_nothing_gets_lumels() {
+    let mut scene = Scene::builtin("cornell").expect("a built-in scene");
+    let meshes: Vec<_> = scene.nodes().filter_map(|node| Some((node.id, node.mesh?))).collect();
+    for (node, _) in &meshes {
+        scene.apply(&Edit::RemoveNode { node: *node }).expect("an edit");
+    }
+    let options = TickOptions {
+        lightmap: Some(LaidOut::empty(LightmapSpec::Size(96))),
+        lumel_coding: LumelCoding::Halves,
+        ..TickOptions::default()
+    };
+    let tracer = Box::new(CpuPathTracer::new(Options::default()).expect("threads"));
+    let tick = Tick::new(scene, tracer, options, Epoch(7)).expect("a tick");
+    let mut stepped = Stepped { tick, kept: Kept::default(), now: 0.0 };
+    stepped.steps(5);
+    let source = InstanceSource::Mesh(meshes[0].1);
+    stepped.edit(1, add("a wall", source, Vec3::ZERO));
+    let node = stepped.node("a wall").0;
+    let has =
+        |stepped: &Stepped| stepped.lightmap().layout.surfaces().iter().any(|s| s.id.node == node);
+    stepped.rest_until(has);
+    let lit = stepped.lightmap().irradiance.iter().filter(|e| luminance(**e) > 0.0).count();
+    assert!(lit > 0, "its lumels have light");
+}
+
 /// What is added is lit by probes until it has rested, and its surfaces are cut and gathered at; what
 /// lies on the pages already stays where it is.
 #[test]
@@ -373,15 +405,8 @@ fn what_is_added_gets_lumels() {
     let tall = stepped.node("tall box");
     let source = stepped.tick.scene().nodes().find(|n| n.id == tall).expect("a box").mesh;
     let before = stepped.lightmap().layout.clone();
-    let transform =
-        Transform { translation: Some(Vec3::new(-0.6, 0.4, 0.5)), ..Transform::default() };
-    let add = Edit::AddInstance {
-        node: None,
-        name: NodeName::new("another"),
-        source: InstanceSource::Mesh(source.expect("a mesh")),
-        parent: None,
-        transform,
-    };
+    let source = InstanceSource::Mesh(source.expect("a mesh"));
+    let add = add("another", source, Vec3::new(-0.6, 0.4, 0.5));
     stepped.edit(2, add.clone());
     let id = SurfaceId { node: stepped.node("another").0, ..SurfaceId::default() };
     let has = |stepped: &Stepped| stepped.lightmap().layout.surface(id).is_some();

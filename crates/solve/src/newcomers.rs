@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use lumencast_charts::{Extended, LaidOut, Store, extended, sheets};
+use lumencast_charts::{Extended, LaidOut, Sheets, Store, extended, sheets};
 use lumencast_gather::Gather;
-use lumencast_light::{FieldId, Layout};
+use lumencast_light::{FieldId, Layout, SurfaceId};
 use lumencast_scene::Snapshot;
 
 use crate::blend::BlendSettings;
@@ -32,6 +32,8 @@ pub struct Placed {
     pub(crate) lumels: LightmapSolver,
     /// Surfaces that there was no room for.
     pub left_out: usize,
+    /// What does not serve, by name, and why.
+    pub notes: Vec<String>,
 }
 
 impl Placed {
@@ -73,10 +75,10 @@ impl Newcomers {
         gatherer: &mut dyn Gather,
         goes_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Placed, SolveError> {
-        let Extended { laid_out, left_out } = self.lay_out(store, gatherer, goes_on)?;
+        let (Extended { laid_out, left_out }, notes) = self.lay_out(store, gatherer, goes_on)?;
         let lumels = LightmapSolver::new(self.field, &self.scene, &laid_out, self.settings)
             .with_slopes(self.directional);
-        Ok(Placed { lumels, left_out: left_out.len() })
+        Ok(Placed { lumels, left_out: left_out.len(), notes })
     }
 
     fn lay_out(
@@ -84,17 +86,18 @@ impl Newcomers {
         store: Option<&Store>,
         gatherer: &mut dyn Gather,
         goes_on: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Extended, SolveError> {
+    ) -> Result<(Extended, Vec<String>), SolveError> {
         let all = &self.scene.instances;
         let mut scene = Snapshot::clone(&self.scene);
         // Surfaces of others are cut already.
         for instance in &mut scene.instances {
             instance.still &= self.instances.contains(&(instance.node.0, instance.copy));
         }
-        let fronts = sheets(&scene, store, &|_| goes_on())?.sheets;
-        let sheets = with_backs(fronts, &self.scene, gatherer)?;
+        let Sheets { sheets, notes } = sheets(&scene, store, &|_| goes_on())?;
+        let sheets = with_backs(sheets, &self.scene, gatherer)?;
         let is_there =
             |node: u32, copy: u32| all.iter().any(|i| (i.node.0, i.copy) == (node, copy));
-        Ok(extended(&self.before, |surface| is_there(surface.node, surface.copy), &sheets)?)
+        let keeps = |surface: SurfaceId| is_there(surface.node, surface.copy);
+        Ok((extended(&self.before, keeps, &sheets)?, notes))
     }
 }

@@ -131,6 +131,12 @@ impl Solver {
         self.fields.iter().map(FieldSolver::probe_count).sum()
     }
 
+    /// Number of all lumels that surfaces cover.
+    pub fn lumel_count(&self) -> usize {
+        let lightmaps = self.fields.iter().filter_map(FieldSolver::as_lightmap);
+        lightmaps.map(LightmapSolver::lumel_count).sum()
+    }
+
     /// Number of probes inside walls.
     pub fn buried_count(&self) -> usize {
         self.fields.iter().map(FieldSolver::buried_count).sum()

@@ -102,7 +102,8 @@ impl LiveFieldsArguments {
         }
     }
 
-    /// The lumels of a scene, if there are to be some and it has surfaces for them.
+    /// The lumels of a scene, if there are to be some. Where it has no surfaces for them, there is room
+    /// for such as are added.
     pub(crate) fn lumels(
         &self,
         scene: &mut Scene,
@@ -111,10 +112,12 @@ impl LiveFieldsArguments {
         if !self.fields.contains(&FieldKind::Volume) {
             tell!("note: volumes are computed too, since probes light what moves");
         }
-        match self.fields.contains(&FieldKind::Lightmap) {
-            true => charting::lay_out(&scene.snapshot(), self.lightmap.spec(scene), gatherer),
-            false => Ok(None),
+        if !self.fields.contains(&FieldKind::Lightmap) {
+            return Ok(None);
         }
+        let spec = self.lightmap.spec(scene);
+        let laid_out = charting::lay_out(&scene.snapshot(), spec, gatherer)?;
+        Ok(Some(laid_out.unwrap_or_else(|| LaidOut::empty(spec.unwrap_or_default()))))
     }
 }
 
