@@ -55,6 +55,7 @@ export {
 } from './codec/volume-shape.js';
 export type * from './edit.js';
 export { irradianceOf } from './picture.js';
+export { LONGEST_PASSAGE } from './cache/passage.js';
 export { slopeOf, STEEPEST } from './slopes.js';
 export { fetchLight, openLight, type SavedOptions } from './saved.js';
 export { connect, type ConnectOptions } from './session.js';

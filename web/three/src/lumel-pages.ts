@@ -1,4 +1,4 @@
-import type { LightmapLight, LumelRegion } from '@lumencast/client';
+import { type LightmapLight, LONGEST_PASSAGE, type LumelRegion } from '@lumencast/client';
 import type { Texture } from 'three';
 import type { AtlasPlan } from './lumel-atlas.js';
 import { bytesOf, PicturePool, type PictureTextures } from './picture-textures.js';
@@ -13,11 +13,10 @@ const AGE_INTERVAL = 250;
 const AGES = [0.1, 10] as const;
 
 /**
- * Milliseconds without a frame after which new pictures are painted whole, and all at once: as long as a
- * passage takes at most. What was painted before them is light of long ago, which other pictures have
- * replaced unseen.
+ * Milliseconds without a frame after which new pictures are painted whole, and all at once. What was
+ * painted before them is light of long ago, which other pictures have replaced unseen.
  */
-const REST = 500;
+const REST = 1000 * LONGEST_PASSAGE;
 
 /**
  * Bytes of pictures that are brought to the device in a frame, unless one alone has more: about a

@@ -1,5 +1,5 @@
 /** Seconds that a change takes to show at most, however long the silence before it was. */
-const LONGEST = 0.5;
+export const LONGEST_PASSAGE = 0.5;
 
 /**
  * The way of a region's light from what was shown when its newest update came to that update. It takes as
@@ -16,7 +16,7 @@ export class Passage {
    */
   begin(now: number, made: number): void {
     // The first light is there at once.
-    this.seconds = this.began === undefined ? 0 : Math.min(Math.max(now - this.began, made), LONGEST);
+    this.seconds = this.began === undefined ? 0 : Math.min(Math.max(now - this.began, made), LONGEST_PASSAGE);
     this.began = now;
   }
 
