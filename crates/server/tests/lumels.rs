@@ -216,7 +216,7 @@ fn live_ticks_do_not_wait_for_lumels() {
         let patience = Duration::from_secs(10_000);
         let report =
             stepped.tick.step_within(stepped.now, Mail::default(), &mut stepped.kept, patience);
-        assert!(!report.late && report.rays > 0, "{report:?}");
+        assert!(report.rays > 0, "probes were waited for: {report:?}");
     }
 }
 
