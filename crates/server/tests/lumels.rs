@@ -82,8 +82,14 @@ impl Stepped {
             lightmap: Some(lumels(&scene.snapshot())),
             lumel_samples: Some(8192),
             lumel_coding,
+            // No machine is so slow that a tick is late by its own time.
+            period: 3600.0,
             ..TickOptions::default()
         };
+        Self::of(scene, gatherer, options)
+    }
+
+    fn of(scene: Scene, gatherer: Box<dyn Gather>, options: TickOptions) -> Self {
         let tick = Tick::new(scene, gatherer, options, Epoch(7)).expect("a tick");
         Self { tick, kept: Kept::default(), now: 0.0 }
     }
@@ -216,7 +222,7 @@ fn live_ticks_do_not_wait_for_lumels() {
         let patience = Duration::from_secs(10_000);
         let report =
             stepped.tick.step_within(stepped.now, Mail::default(), &mut stepped.kept, patience);
-        assert!(report.rays > 0, "probes were waited for: {report:?}");
+        assert!(!report.late && report.rays > 0, "{report:?}");
     }
 }
 
@@ -383,8 +389,7 @@ fn what_is_added_to_nothing_gets_lumels() {
         ..TickOptions::default()
     };
     let tracer = Box::new(CpuPathTracer::new(Options::default()).expect("threads"));
-    let tick = Tick::new(scene, tracer, options, Epoch(7)).expect("a tick");
-    let mut stepped = Stepped { tick, kept: Kept::default(), now: 0.0 };
+    let mut stepped = Stepped::of(scene, tracer, options);
     stepped.steps(5);
     let source = InstanceSource::Mesh(meshes[0].1);
     stepped.edit(1, add("a wall", source, Vec3::ZERO));
