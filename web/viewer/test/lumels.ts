@@ -45,12 +45,12 @@ export function settled(page: Page): Promise<void> {
   });
 }
 
-/** Meshes that lumels light in a picture drawn now. */
+/** Meshes that lumels would light in a picture of now. It takes no picture: in software one takes long. */
 export function lit(page: Page): Promise<number> {
   return page.evaluate(() => {
-    const { light, scene, viewer } = window.lumencast!;
+    const { camera, light, scene } = window.lumencast!;
     scene.updateMatrixWorld();
-    viewer.draw();
+    light.update(camera);
     return light.lumelMeshes;
   });
 }
