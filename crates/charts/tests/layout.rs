@@ -79,6 +79,9 @@ fn built_in_scenes_fill_one_page_of_their_own_size() {
         let laid_out = laid_out(&sheets, spec).unwrap();
         check(&snapshot, &laid_out);
         assert_eq!(laid_out.layout.pages, 1);
+        for (surface, sheet) in laid_out.layout.surfaces().iter().zip(&sheets) {
+            assert_eq!((surface.id, surface.charts.count()), (sheet.id, sheet.charts()), "{name}");
+        }
         assert_eq!(spec, LightmapSpec::Size(laid_out.layout.page_size));
         let covered: usize =
             laid_out.layout.surfaces().iter().map(|s| lumels(&s.charts).len()).sum();
@@ -213,6 +216,7 @@ fn backs_have_lumels_on_the_charts_that_they_name() {
     let laid_out = laid_out(&all, LightmapSpec::Size(256)).unwrap();
     let [_, back] = laid_out.layout.surfaces() else { panic!("two surfaces") };
     assert!(back.id.back);
+    assert_eq!(back.charts.count(), 1);
     for (number, triangle) in back.charts.triangles.iter().enumerate() {
         assert_eq!(*triangle != Charts::NOWHERE, front.chart_of(number) == Some(0));
     }

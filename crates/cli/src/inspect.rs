@@ -210,7 +210,7 @@ fn c0_statistics(volume: &ProbeVolume) -> Value {
     })
 }
 
-/// Surfaces of a lightmap, and the illuminance on lumels that surfaces cover, lux.
+/// Surfaces of a lightmap and their charts, and the illuminance on lumels that surfaces cover, lux.
 fn lightmap_statistics(lightmap: &Lightmap) -> Value {
     let layout = &lightmap.layout;
     let mut illuminances = Vec::new();
@@ -222,6 +222,8 @@ fn lightmap_statistics(lightmap: &Lightmap) -> Value {
     let sum: f64 = illuminances.iter().sum();
     json!({
         "surfaces": layout.surfaces().len(),
+        "backs": layout.surfaces().iter().filter(|surface| surface.id.back).count(),
+        "charts": layout.surfaces().iter().map(|surface| surface.charts.count()).sum::<usize>(),
         "lumels": illuminances.len(),
         "coverage": illuminances.len() as f64 / layout.lumel_count().max(1) as f64,
         "illuminance": {

@@ -201,6 +201,8 @@ fn lumels_are_baked_and_drawn() {
     let field = &report["fields"][1];
     assert_eq!((&field["kind"], &field["page_size"]), (&"lightmap".into(), &128.into()));
     let told = &field["lightmap"];
+    let of_scene = run(&["inspect", "cornell", "--charts", "--lightmap", "128", "--json"]).json();
+    assert_eq!(told["charts"], of_scene["lightmap"]["charts"]);
     assert!((0.3..1.0).contains(&told["coverage"].as_f64().expect("a share")), "{told}");
     assert!(told["illuminance"]["mean"].as_f64() > Some(0.1), "{told}");
     let page = linear(&pages.join("field1-page0.exr"));
