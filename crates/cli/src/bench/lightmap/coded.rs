@@ -24,6 +24,14 @@ pub(super) struct Coded {
     pub(super) decode_seconds: f64,
 }
 
+/// The same, and how it looks beside the reference.
+pub(super) struct Judged {
+    pub(super) coded: Coded,
+    pub(super) irradiance_db: f64,
+    /// By how many codes of a display both sides of seams differ; none where there are no seams.
+    pub(super) seam_codes: Option<f64>,
+}
+
 impl Coded {
     /// Every parameter, with colour at half the resolution and at full.
     pub(super) fn all(lightmap: &Lightmap) -> Result<Vec<Self>> {
@@ -84,17 +92,20 @@ impl Coded {
     pub(super) fn name(&self) -> &'static str {
         if self.stacked { "h264-stacked" } else { "h264" }
     }
+}
 
-    /// As JSON, with what was measured of `shown`.
-    pub(super) fn json(&self, irradiance_db: f64) -> Value {
+impl Judged {
+    pub(super) fn json(&self) -> Value {
+        let Self { coded, irradiance_db, seam_codes } = self;
         json!({
-            "coding": self.name(),
-            "qp": self.qp,
+            "coding": coded.name(),
+            "qp": coded.qp,
             "irradiance_db": irradiance_db,
-            "keyframe_bytes": self.bytes,
-            "slope_keyframe_bytes": self.slope_bytes,
-            "encode_ms": 1e3 * self.encode_seconds,
-            "decode_ms": 1e3 * self.decode_seconds,
+            "seam_codes_p99": seam_codes,
+            "keyframe_bytes": coded.bytes,
+            "slope_keyframe_bytes": coded.slope_bytes,
+            "encode_ms": 1e3 * coded.encode_seconds,
+            "decode_ms": 1e3 * coded.decode_seconds,
         })
     }
 }

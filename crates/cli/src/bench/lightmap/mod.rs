@@ -26,7 +26,7 @@ use lumencast_server::TickOptions;
 use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{GatherOptions, LightmapSolver, sides_of_seams, spread};
 
-use self::coded::Coded;
+use self::coded::{Coded, Judged};
 use self::directional::Directional;
 #[cfg(feature = "gpu")]
 use self::handover::Handover;
@@ -140,12 +140,14 @@ impl BenchLightmap {
         };
         let (as_gathered, filtered) = (psnr(&gathered), psnr(&lightmap));
 
-        let coded = Coded::all(&lightmap)?;
-        let coded_psnr: Vec<f64> = coded.iter().map(|coded| psnr(&coded.shown)).collect();
-        let coded: Vec<(Coded, f64)> = coded.into_iter().zip(coded_psnr).collect();
-        let sent = coded.iter().find(|(coded, _)| coded.is_default()).map(|(coded, _)| coded);
-        let shown = sent.map_or(&lightmap, |coded| &coded.shown);
-        let seam_codes = edges::codes(&sides_of_seams(&snapshot, shown), reference.white);
+        let judge = |coded: Coded| {
+            let seam_codes =
+                edges::codes(&sides_of_seams(&snapshot, &coded.shown), reference.white);
+            Judged { irradiance_db: psnr(&coded.shown), seam_codes, coded }
+        };
+        let coded: Vec<Judged> = Coded::all(&lightmap)?.into_iter().map(judge).collect();
+        let sent = coded.iter().find(|judged| judged.coded.is_default());
+        let shown = sent.map_or(&lightmap, |judged| &judged.coded.shown);
         let many = spread(&snapshot, &laid_out.layout, POISON_POINTS);
         let poison = edges::poisoned(shown, &many, reference.white);
 
@@ -154,7 +156,7 @@ impl BenchLightmap {
                 let places = directional::shaded(&snapshot, &places);
                 let receivers = places.iter().map(|shaded| shaded.receiver());
                 let shaded = self.reference(receivers, &snapshot, &mut tracer)?;
-                let coded = coded.iter().map(|(coded, _)| coded);
+                let coded = coded.iter().map(|judged| &judged.coded);
                 let references = [&reference, &shaded];
                 Some(Directional::judge(&lightmap, coded, &places, references))
             }
@@ -197,7 +199,6 @@ impl BenchLightmap {
             coded,
             seam_points: sides.len(),
             seam,
-            seam_codes,
             poison,
             directional,
             #[cfg(feature = "gpu")]

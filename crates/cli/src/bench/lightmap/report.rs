@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::coded::Coded;
+use super::coded::Judged;
 use super::directional::Directional;
 #[cfg(feature = "gpu")]
 use super::handover::Handover;
@@ -34,12 +34,10 @@ pub(super) struct Report {
     pub(super) as_gathered: f64,
     pub(super) filtered: f64,
     /// What clients are sent, and its irradiance, decibels.
-    pub(super) coded: Vec<(Coded, f64)>,
+    pub(super) coded: Vec<Judged>,
     pub(super) seam_points: usize,
-    /// By how much both sides of seams differ in the 99th percentile: a share of their light, and codes as
-    /// sent.
+    /// By which share of their light both sides of seams differ in the 99th percentile.
     pub(super) seam: Option<f64>,
-    pub(super) seam_codes: Option<f64>,
     /// Codes by which light from beyond charts changes points.
     pub(super) poison: f64,
     pub(super) directional: Option<Directional>,
@@ -54,7 +52,7 @@ pub(super) struct Report {
 impl Report {
     pub(super) fn json(&self) -> Value {
         let [layout, gather, filter] = self.seconds;
-        let coded = self.coded.iter().map(|(coded, db)| coded.json(*db));
+        let coded = self.coded.iter().map(Judged::json);
         #[cfg(feature = "gpu")]
         let handover = self.handover.as_ref().map(Handover::json);
         #[cfg(not(feature = "gpu"))]
@@ -78,7 +76,6 @@ impl Report {
             "seams": {
                 "points": self.seam_points,
                 "p99": self.seam,
-                "coded_codes_p99": self.seam_codes,
             },
             "poison_codes": self.poison,
             "directional": self.directional.as_ref().map(Directional::json),
@@ -106,9 +103,12 @@ impl Report {
             self.as_gathered,
             self.samples
         );
-        for (coded, db) in &self.coded {
+        for Judged { coded, irradiance_db, seam_codes } in &self.coded {
+            let seams =
+                seam_codes.map_or(String::new(), |codes| format!(", seams {codes:.1} codes"));
             say!(
-                "coded: {db:.1} dB by {}, qp {}, keyframe {:.1} KB, {:.1} ms, decoded in {:.1} ms",
+                "coded: {irradiance_db:.1} dB{seams} by {}, qp {}, keyframe {:.1} KB, {:.1} ms, decoded \
+                 in {:.1} ms",
                 coded.name(),
                 coded.qp,
                 coded.bytes as f64 / 1e3,
@@ -117,11 +117,7 @@ impl Report {
             );
         }
         if let Some(seam) = self.seam {
-            say!(
-                "seams: both sides differ by {:.2} % in the 99th percentile, as sent by {:.1} codes",
-                100.0 * seam,
-                self.seam_codes.unwrap_or_default()
-            );
+            say!("seams: both sides differ by {:.2} % in the 99th percentile", 100.0 * seam);
         }
         say!("light from beyond charts changes points by {:.1} codes at most", self.poison);
         if let Some(directional) = &self.directional {
