@@ -26,6 +26,7 @@ import {
   type Pixel,
   settle,
   shoot,
+  sum,
 } from './browser.js';
 import { freePort, lumencastProgram, Server } from './server.js';
 
@@ -581,7 +582,6 @@ declare global {
   }
 }
 
-const sum = ([r, g, b]: Pixel) => r + g + b;
 const total = (picture: readonly Pixel[], channel: number) =>
   picture.reduce((total, pixel) => total + pixel[channel], 0);
 const brightness = (picture: readonly Pixel[]) =>

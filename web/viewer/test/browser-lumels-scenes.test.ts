@@ -5,7 +5,7 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { buildPage, look, openPage, PATIENCE, type Pixel, settle } from './browser.js';
+import { buildPage, look, openPage, PATIENCE, type Pixel, settle, sum } from './browser.js';
 import { lit, setStrengths } from './lumels.js';
 import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
 
@@ -33,8 +33,6 @@ afterAll(async () => {
   await browser?.close();
   rmSync(folder, { recursive: true, force: true });
 });
-
-const sum = (pixel: Pixel) => pixel[0] + pixel[1] + pixel[2];
 
 /** The part of pixels that are bright in one picture, of those that are in another. */
 function shareLeft(before: readonly Pixel[], after: readonly Pixel[]): number {

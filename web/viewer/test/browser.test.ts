@@ -22,6 +22,7 @@ import {
   SHOTS,
   settle,
   shoot,
+  sum,
 } from './browser.js';
 import { freePort, lumencastProgram, Server, sharedScene } from './server.js';
 
@@ -70,7 +71,6 @@ describe('the page', () => {
 
   it('brightens what direct light does not reach', async () => {
     const [direct, indirect, both] = await looks(page, ['direct', 'indirect', 'both']);
-    const sum = ([r, g, b]: Pixel) => r + g + b;
     const shadowed = [...direct.keys()].filter((i) => sum(direct[i]) < 20 && sum(indirect[i]) > 20);
     expect(shadowed.length).toBeGreaterThan(5);
     for (const i of shadowed) expect(sum(both[i])).toBeGreaterThan(sum(direct[i]) + 10);
@@ -292,7 +292,6 @@ describe('the page', () => {
       }
       await page.evaluate(() => window.lumencast!.setMode('both'));
       await shoot(page, 'flashlight.png');
-      const sum = ([r, g, b]: Pixel) => r + g + b;
       const [first, then] = seen;
       expect(sum(first[0])).toBeGreaterThan(1.2 * sum(then[0]));
       expect(sum(then[1])).toBeGreaterThan(1.2 * sum(first[1]));

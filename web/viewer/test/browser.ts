@@ -59,6 +59,9 @@ export async function openPage(
 /** Red, green, blue, 0 to 255. */
 export type Pixel = [r: number, g: number, b: number];
 
+/** Red, green and blue together: how bright a pixel is. */
+export const sum = ([r, g, b]: Pixel) => r + g + b;
+
 type Shown = 'both' | 'direct' | 'indirect';
 
 /** Points of the picture on a grid, with one part of the light shown. */
@@ -86,9 +89,9 @@ export function looks(page: Page, parts: readonly Shown[]): Promise<Pixel[][]> {
 /** Mean difference of two pictures over their mean brightness. */
 export function difference(a: readonly Pixel[], b: readonly Pixel[]): number {
   const [va, vb] = [a.flat(), b.flat()];
-  const sum = va.reduce((total, value, i) => total + Math.abs(value - vb[i]), 0);
+  const apart = va.reduce((total, value, i) => total + Math.abs(value - vb[i]), 0);
   return (
-    sum /
+    apart /
     Math.max(
       va.reduce((total, value) => total + value),
       1,
