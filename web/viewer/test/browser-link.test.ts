@@ -132,7 +132,7 @@ describe.skipIf(!link)('a link that is too slow', () => {
 
       expect(await page.evaluate(() => window.watched!.lost)).toBe(0);
     },
-    150_000,
+    300_000,
   );
 });
 
