@@ -2,7 +2,6 @@
 //!
 //! The library is young: what it returns is checked, and a panic in it is an error.
 
-use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use bytemuck::{Pod, Zeroable};
@@ -11,6 +10,7 @@ use lumencast_light::{ChartVertex, Charts};
 use uvunwrap::{Atlas, Density, Error, MeshInput, Options, OutputMesh, Packing, Progress, Stage};
 
 use crate::error::ChartError;
+use crate::parts::parts;
 
 /// Charts of a primitive, at most: what has more is a cloud of splinters that fills pages with padding.
 pub(crate) const MOST_CHARTS: u32 = 1 << 16;
@@ -73,41 +73,8 @@ impl Shape<'_> {
     /// Number of parts that touch each other nowhere, where triangles share no position. A chart lies on
     /// one part alone.
     fn parts(&self) -> u32 {
-        let mut first_at = HashMap::new();
-        let mut parts = UnionFind((0..self.positions.len() as u32).collect());
-        let mut count = 0;
-        for triangle in self.triangles {
-            let [a, b, c] = triangle.map(|vertex| {
-                let at = self.positions[vertex as usize] + Vec3::ZERO;
-                *first_at.entry(at.to_array().map(f32::to_bits)).or_insert_with(|| {
-                    count += 1;
-                    vertex
-                })
-            });
-            count -= u32::from(parts.unite(a, b)) + u32::from(parts.unite(b, c));
-        }
-        count
-    }
-}
-
-/// Sets of numbers, by trees whose roots name them.
-struct UnionFind(Vec<u32>);
-
-impl UnionFind {
-    fn root(&mut self, mut of: u32) -> u32 {
-        while self.0[of as usize] != of {
-            let above = self.0[of as usize];
-            self.0[of as usize] = self.0[above as usize];
-            of = above;
-        }
-        of
-    }
-
-    /// Makes one set of two; whether they were two.
-    fn unite(&mut self, a: u32, b: u32) -> bool {
-        let [a, b] = [self.root(a), self.root(b)];
-        self.0[a.max(b) as usize] = a.min(b);
-        a != b
+        let place = |vertex: u32| (self.positions[vertex as usize] + Vec3::ZERO).to_array();
+        parts(self.triangles.iter().map(|triangle| triangle.map(|v| place(v).map(f32::to_bits))))
     }
 }
 

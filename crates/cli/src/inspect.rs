@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glam::Vec3;
-use lumencast_charts::lumels_on_pages;
+use lumencast_charts::{chart_count, lumels_on_pages};
 use lumencast_codec::{Catalog, FieldInfo, LightFile, SavedFile, Shape, UnknownField};
 use lumencast_light::{Field, Lightmap, ProbeVolume, luminance};
 use lumencast_picture::{Picture, ToneMap, exposure};
@@ -223,7 +223,7 @@ fn lightmap_statistics(lightmap: &Lightmap) -> Value {
     json!({
         "surfaces": layout.surfaces().len(),
         "backs": layout.surfaces().iter().filter(|surface| surface.id.back).count(),
-        "charts": layout.surfaces().iter().map(|surface| surface.charts.count()).sum::<usize>(),
+        "charts": layout.surfaces().iter().map(|surface| chart_count(&surface.charts)).sum::<usize>(),
         "lumels": illuminances.len(),
         "coverage": illuminances.len() as f64 / layout.lumel_count().max(1) as f64,
         "illuminance": {

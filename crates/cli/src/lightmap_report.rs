@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use lumencast_charts::{LaidOut, Sheets, laid_out, lumels, usual};
+use lumencast_charts::{LaidOut, Sheets, chart_count, laid_out, lumels, usual};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Charts, Surface};
 use lumencast_scene::{LightmapSpec, Scene};
@@ -38,7 +38,7 @@ pub(crate) fn lightmap_report(scene: &mut Scene, spec: Option<LightmapSpec>) -> 
         "coarser_than_asked": coarser,
         "surfaces": layout.surfaces().len(),
         "backs": layout.surfaces().iter().filter(|surface| surface.id.back).count(),
-        "charts": layout.surfaces().iter().map(|s: &Surface| s.charts.count()).sum::<usize>(),
+        "charts": layout.surfaces().iter().map(|s: &Surface| chart_count(&s.charts)).sum::<usize>(),
         "triangles_left_out": left_out,
         "lumels": covered,
         "coverage": covered as f32 / layout.lumel_count().max(1) as f32,

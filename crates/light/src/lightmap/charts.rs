@@ -1,7 +1,5 @@
 //! A surface cut into charts and laid out flat.
 
-use std::collections::HashMap;
-
 use glam::{UVec2, Vec2, Vec3};
 
 /// How the surface of a primitive is cut into charts, and where they lie on rectangles of lumels.
@@ -34,32 +32,6 @@ pub struct ChartVertex {
 impl Charts {
     /// What a triangle without lumels has.
     pub const NOWHERE: [u32; 3] = [u32::MAX; 3];
-
-    /// Number of charts: triangles that share a corner lie in one, and no two charts touch.
-    pub fn count(&self) -> usize {
-        let mut chart_at = HashMap::new();
-        // Of each chart found so far the one that it has turned out to be part of, or itself.
-        let mut part_of: Vec<usize> = Vec::new();
-        let mut count = 0;
-        for corners in (0..).zip(&self.triangles).filter_map(|(number, _)| self.corners(number)) {
-            let own = part_of.len();
-            part_of.push(own);
-            count += 1;
-            for ChartVertex { rectangle, at, .. } in corners {
-                let corner = (rectangle, at.to_array().map(f32::to_bits));
-                let mut whole = *chart_at.entry(corner).or_insert(own);
-                while part_of[whole] != whole {
-                    part_of[whole] = part_of[part_of[whole]];
-                    whole = part_of[whole];
-                }
-                if whole != own {
-                    part_of[whole] = own;
-                    count -= 1;
-                }
-            }
-        }
-        count
-    }
 
     /// The corners of a triangle; nothing where it has no lumels.
     pub fn corners(&self, triangle: u32) -> Option<[ChartVertex; 3]> {

@@ -41,8 +41,8 @@ use point::Point;
 pub use points::spread;
 use queue::Queue;
 use ripening::Ripening;
+pub use seams::SeamPoints;
 use seams::Seams;
-pub use seams::sides_of_seams;
 use slopes::Slopes;
 use sums::Sum;
 

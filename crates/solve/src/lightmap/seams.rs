@@ -201,15 +201,25 @@ fn project(x: &mut [Vec3], yields: &[f32], point: &[(u32, f32); 8], strength: f3
     }
 }
 
-/// The irradiance, lux, that both sides of a lightmap's seams read, at points spread over all seams.
-pub fn sides_of_seams(scene: &Snapshot, lightmap: &Lightmap) -> Vec<[Vec3; 2]> {
-    let seams = Seams::at(scene, &lightmap.layout, JUDGED);
-    let read = |taps: &[(u32, f32)]| -> Vec3 {
-        let light = |lumel: u32| lightmap.irradiance[seams.lumels[lumel as usize] as usize];
-        taps.iter().map(|(lumel, weight)| weight.abs() * light(*lumel)).sum()
-    };
-    let sides = |taps: &[(u32, f32); 8]| [read(&taps[..4]), read(&taps[4..])];
-    seams.points.iter().map(sides).collect()
+/// Points spread over all seams of a layout, at which these are judged.
+pub struct SeamPoints(Seams);
+
+impl SeamPoints {
+    /// Those of a layout's surfaces in a scene.
+    pub fn new(scene: &Snapshot, layout: &Layout) -> Self {
+        Self(Seams::at(scene, layout, JUDGED))
+    }
+
+    /// The irradiance, lux, that both sides read at each point of a lightmap of that layout.
+    pub fn sides(&self, lightmap: &Lightmap) -> Vec<[Vec3; 2]> {
+        let Seams { lumels, points } = &self.0;
+        let read = |taps: &[(u32, f32)]| -> Vec3 {
+            let light = |lumel: u32| lightmap.irradiance[lumels[lumel as usize] as usize];
+            taps.iter().map(|(lumel, weight)| weight.abs() * light(*lumel)).sum()
+        };
+        let sides = |taps: &[(u32, f32); 8]| [read(&taps[..4]), read(&taps[4..])];
+        points.iter().map(sides).collect()
+    }
 }
 
 /// The sides of a triangle's edges, with what names the edge: the positions of its ends, to the bit.

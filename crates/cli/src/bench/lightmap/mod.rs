@@ -24,7 +24,7 @@ use lumencast_light::{FieldId, Light, Lightmap, Place};
 use lumencast_scene::{Scene, Snapshot};
 use lumencast_server::TickOptions;
 use lumencast_solve::blend::BlendSettings;
-use lumencast_solve::{GatherOptions, LightmapSolver, sides_of_seams, spread};
+use lumencast_solve::{GatherOptions, LightmapSolver, SeamPoints, spread};
 
 use self::coded::{Coded, Judged};
 use self::directional::Directional;
@@ -129,7 +129,8 @@ impl BenchLightmap {
         solver.solve(true, &Light::default(), &mut lightmap);
         let filter_seconds = start.elapsed().as_secs_f64();
 
-        let sides = sides_of_seams(&snapshot, &lightmap);
+        let seams = SeamPoints::new(&snapshot, &laid_out.layout);
+        let sides = seams.sides(&lightmap);
         let seam = edges::relative(&sides);
 
         let places = spread(&snapshot, &laid_out.layout, POINTS);
@@ -141,8 +142,7 @@ impl BenchLightmap {
         let (as_gathered, filtered) = (psnr(&gathered), psnr(&lightmap));
 
         let judge = |coded: Coded| {
-            let seam_codes =
-                edges::codes(&sides_of_seams(&snapshot, &coded.shown), reference.white);
+            let seam_codes = edges::codes(&seams.sides(&coded.shown), reference.white);
             Judged { irradiance_db: psnr(&coded.shown), seam_codes, coded }
         };
         let coded: Vec<Judged> = Coded::all(&lightmap)?.into_iter().map(judge).collect();
