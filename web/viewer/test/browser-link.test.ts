@@ -83,11 +83,15 @@ describe.skipIf(!link)('a link that is too slow', () => {
       await layers(3);
       const measureAt = async (rate: number, ms = MEASURE) => {
         await link!.carry(rate);
-        // A page that has just begun may stall for a moment, and take fewer layers until it is over that.
-        if (rate === RATES.wide) await page.waitForTimeout(1000);
-        await layers(rate === RATES.wide ? 3 : 1);
-        // What had heaped up by then is to pass first.
-        if (rate !== RATES.wide) await page.waitForTimeout(ADAPT);
+        if (rate === RATES.wide) {
+          // A page that has just begun may stall for a moment, and take fewer layers until it is over that.
+          await page.waitForTimeout(1000);
+          await layers(3);
+        } else {
+          // What has heaped up until the upper layers are dropped is to pass first.
+          await layers(1);
+          await page.waitForTimeout(ADAPT);
+        }
         const figures = await page.evaluate((ms) => window.watched!.measure(ms), ms);
         console.log(row(transport, rate, figures));
         return figures;

@@ -103,17 +103,17 @@ const place = (on: Page) =>
   on.evaluate((z) => window.lumencast!.scene.getObjectByName('column_2')!.position.z - z, HOME[2]);
 
 /** The column's light by probes alone, none where it has lumels, and how many meshes have them then. */
-async function byProbes(along: number): Promise<[light: number, lit: number]> {
+async function byProbes(along: number): Promise<[light: number, meshes: number]> {
   const [x, y, z] = HOME;
   const at = await onScreen(page, [x, y + 1.5, z + along + 0.3]);
-  const [seen, lit] = await page.evaluate((at) => {
+  const [seen, meshes] = await page.evaluate((at) => {
     const { light, pixels } = window.lumencast!;
     light.strengths.static = 0;
     const seen = pixels([at]);
     light.strengths.static = 1;
     return [seen, light.lumelMeshes] as const;
   }, at);
-  return [brightness(seen), lit];
+  return [brightness(seen), meshes];
 }
 
 /** A hand on the column's handle for the z axis, which stands for it `away` from home. */
