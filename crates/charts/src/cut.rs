@@ -150,6 +150,8 @@ pub(crate) fn lay_out(
             Options { density, packing: Packing::Fast, padding: PADDING, ..Options::default() };
         generate(input, &options, &|_| true)
     };
+    // What is set in by half a lumel ends in the next one.
+    let most = most - 1;
     let mut atlas = pack(None)?;
     if atlas.width.max(atlas.height) > most {
         atlas = pack(Some(most))?;

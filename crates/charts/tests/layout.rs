@@ -179,6 +179,7 @@ fn a_primitive_may_have_several_rectangles() {
     let snapshot = stage.snapshot();
     let laid_out = laid_out(&cut(&snapshot).sheets, LightmapSpec::Texel(0.05)).unwrap();
     check(&snapshot, &laid_out);
+    assert!(!laid_out.coarser && laid_out.layout.pages < MOST_PAGES);
     let [surface] = laid_out.layout.surfaces() else { panic!("one surface") };
     assert!(surface.rectangles.len() > 1 && laid_out.layout.pages > 1);
 }
