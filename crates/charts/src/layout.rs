@@ -19,6 +19,9 @@ pub const PAGE: u32 = 1024;
 pub const MOST_PAGES: u32 = 8;
 /// Lumels a side of the page that scenes fill that ask for no density, at least.
 const USUAL: u32 = 256;
+/// Side of the smallest lumels that larger scenes get which ask for no density, metres. Light of twice as
+/// many lumels takes twice as long to compute.
+const FINEST: f64 = 0.07;
 /// Sides of smaller pages, on one of which little scenes fit.
 const SMALLER: [u32; 3] = [128, 256, 512];
 /// Side of a page that nothing lies on yet.
@@ -57,15 +60,33 @@ impl LaidOut {
     }
 }
 
-/// The density of a scene that asks for none: a lumel every decimetre, or more of them where all of it
-/// would not fill a page of 256².
-pub fn usual(sheets: &[Sheet]) -> LightmapSpec {
-    let area: f64 = sheets.iter().map(Sheet::area).sum();
-    let filled = (area / FILLED).sqrt() as f32 / USUAL as f32;
-    match LightmapSpec::default() {
-        LightmapSpec::Texel(texel) if filled < texel => LightmapSpec::Size(USUAL),
-        spec => spec,
+/// Lays out the sheets of a scene that asks for no density: with a lumel every decimetre, or with smaller
+/// ones of down to 7 cm where the pages which that takes have room for them. A scene that would not
+/// fill a page of 256² fills it.
+///
+/// # Errors
+/// As [`laid_out`].
+pub fn usual(sheets: &[Sheet]) -> Result<LaidOut, ChartError> {
+    let filled = (area(sheets) / FILLED).sqrt() / f64::from(USUAL);
+    if filled < f64::from(LightmapSpec::TEXEL) {
+        return laid_out(sheets, LightmapSpec::Size(USUAL));
     }
+    let usual = laid_out(sheets, LightmapSpec::default())?;
+    if usual.coarser {
+        return Ok(usual);
+    }
+    let Layout { page_size, pages, .. } = usual.layout;
+    let attempt = |density| at_density(sheets, density, page_size, pages);
+    let (layout, density) = match attempt(1.0 / FINEST)? {
+        Some(layout) => (layout, 1.0 / FINEST),
+        None => densest((usual.layout, 1.0 / f64::from(usual.texel)), 1.0 / FINEST, &attempt)?,
+    };
+    Ok(LaidOut { layout, texel: (1.0 / density) as f32, coarser: false })
+}
+
+/// Square metres.
+fn area(sheets: &[Sheet]) -> f64 {
+    sheets.iter().map(Sheet::area).sum()
 }
 
 /// Lays sheets out on pages: on one of a size, as densely as they fit, or with lumels of a size, on one
@@ -75,7 +96,7 @@ pub fn usual(sheets: &[Sheet]) -> LightmapSpec {
 /// [`ChartError::NoRoom`] where no density fits, [`ChartError::NoArea`] without sheets, and whatever the
 /// unwrapper finds wrong.
 pub fn laid_out(sheets: &[Sheet], spec: LightmapSpec) -> Result<LaidOut, ChartError> {
-    let area: f64 = sheets.iter().map(Sheet::area).sum();
+    let area = area(sheets);
     if !(area > 0.0 && area.is_finite()) {
         return Err(ChartError::NoArea);
     }
@@ -85,8 +106,7 @@ pub fn laid_out(sheets: &[Sheet], spec: LightmapSpec) -> Result<LaidOut, ChartEr
     };
     let lumels = f64::from(size) * f64::from(size) * f64::from(pages);
     let guess = (FILLED * lumels / area).sqrt();
-    let on = |density: f64, size, pages| at_density(sheets, density as f32, size, pages);
-    let attempt = |density| on(density, size, pages);
+    let attempt = |density| at_density(sheets, density, size, pages);
     let done = |layout, density: f64| {
         let coarser = asked.is_some_and(|asked| density < asked);
         Ok(LaidOut { layout, texel: (1.0 / density) as f32, coarser })
@@ -95,7 +115,7 @@ pub fn laid_out(sheets: &[Sheet], spec: LightmapSpec) -> Result<LaidOut, ChartEr
         let needed = asked * asked * area;
         let smaller = SMALLER.into_iter().filter(|size| f64::from(size * size) > needed);
         for (size, pages) in smaller.map(|size| (size, 1)).chain([(size, pages)]) {
-            if let Some(layout) = on(asked, size, pages)? {
+            if let Some(layout) = at_density(sheets, asked, size, pages)? {
                 return done(layout, asked);
             }
         }
@@ -117,21 +137,30 @@ pub fn laid_out(sheets: &[Sheet], spec: LightmapSpec) -> Result<LaidOut, ChartEr
             }
         }
     }
-    let (mut layout, mut density) = fits.ok_or(ChartError::NoRoom)?;
+    let (layout, density) = densest(fits.ok_or(ChartError::NoRoom)?, least_too_dense, &attempt)?;
+    done(layout, density)
+}
+
+/// The densest layout that is found between one that fits and a density at which none does.
+fn densest(
+    (mut layout, mut density): (Layout, f64),
+    mut too_dense: f64,
+    attempt: &dyn Fn(f64) -> Result<Option<Layout>, ChartError>,
+) -> Result<(Layout, f64), ChartError> {
     for _ in 0..HALVINGS {
-        let between = (density * least_too_dense).sqrt();
+        let between = (density * too_dense).sqrt();
         match attempt(between)? {
             Some(denser) => (layout, density) = (denser, between),
-            None => least_too_dense = between,
+            None => too_dense = between,
         }
     }
-    done(layout, density)
+    Ok((layout, density))
 }
 
 /// The layout at a density, lumels a metre; nothing where the pages have no room for it.
 fn at_density(
     sheets: &[Sheet],
-    density: f32,
+    density: f64,
     size: u32,
     pages: u32,
 ) -> Result<Option<Layout>, ChartError> {
@@ -147,7 +176,7 @@ fn at_density(
         })
         .collect();
     let charts: Vec<Result<Arc<Charts>, ChartError>> =
-        firsts.par_iter().map(|sheet| charts(sheet, density, size).map(Arc::new)).collect();
+        firsts.par_iter().map(|sheet| charts(sheet, density as f32, size).map(Arc::new)).collect();
     let mut laid: Vec<(&Sheet, Arc<Charts>)> = Vec::new();
     for (sheet, number) in sheets.iter().zip(charts_of) {
         match &charts[number] {

@@ -140,18 +140,29 @@ fn a_texel_is_as_large_as_it_is_asked_to_be() {
     assert!(((at(2.0, 0.5) - at(1.0, 0.5)).length() - 10.0).abs() < 1e-3);
 }
 
-/// What fills less than a page of 256² at a decimetre has finer lumels.
+/// Lumels are a decimetre large, or smaller where that takes no more of a page.
 #[test]
-fn little_scenes_fill_a_page() {
+fn scenes_that_ask_for_nothing_fill_their_pages() {
     let of = |side: f32| {
         let mut stage = Stage::default();
         let material = stage.material(grey());
         stage.quad(Vec3::ZERO, side * Vec3::X, side * Vec3::Y, material);
-        usual(&cut(&stage.snapshot()).sheets)
+        let snapshot = stage.snapshot();
+        let laid_out = usual(&cut(&snapshot).sheets).unwrap();
+        check(&snapshot, &laid_out);
+        assert!(laid_out.layout.pages == 1 && !laid_out.coarser);
+        (laid_out.layout.page_size, laid_out.texel)
     };
-    assert_eq!(of(0.01), LightmapSpec::Size(256));
-    assert_eq!(of(15.0), LightmapSpec::Size(256));
-    assert_eq!(of(30.0), LightmapSpec::Texel(0.1));
+    for little in [0.01, 15.0] {
+        let (size, texel) = of(little);
+        assert_eq!(size, 256);
+        assert!((0.7..1.0).contains(&(little / texel / size as f32)), "{texel}");
+    }
+    assert_eq!(of(30.0), (512, 0.07));
+    let (size, texel) = of(45.0);
+    assert_eq!(size, 512);
+    assert!((0.088..0.093).contains(&texel), "{texel}");
+    assert_eq!(of(100.0), (1024, 0.1), "as large as a page allows");
 }
 
 /// Nine surfaces of 100 × 100 m: at a decimetre each nearly fills a page.

@@ -38,7 +38,7 @@ pub(crate) fn lay_out(
         return Ok(None);
     }
     let all = with_backs(sheets, scene, gatherer)?;
-    match laid_out(&all, spec.unwrap_or_else(|| usual(&all))) {
+    match spec.map_or_else(|| usual(&all), |spec| laid_out(&all, spec)) {
         Ok(laid_out) => {
             if laid_out.coarser {
                 let size = 100.0 * laid_out.texel;

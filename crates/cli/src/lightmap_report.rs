@@ -26,7 +26,7 @@ pub(crate) fn lightmap_report(scene: &mut Scene, spec: Option<LightmapSpec>) -> 
     let looked = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let LaidOut { layout, texel, coarser } =
-        laid_out(&sheets, spec.unwrap_or_else(|| usual(&sheets)))?;
+        spec.map_or_else(|| usual(&sheets), |spec| laid_out(&sheets, spec))?;
     let laid_out = start.elapsed().as_secs_f64();
     let covered: usize = layout.surfaces().iter().map(|s: &Surface| lumels(&s.charts).len()).sum();
     let triangles = layout.surfaces().iter().flat_map(|surface| &surface.charts.triangles);

@@ -44,8 +44,10 @@ impl Subject {
         let snapshot = scene.snapshot();
         let mut tracer = CpuPathTracer::new(Options { levels: Levels::Two, ..Options::default() })?;
         let all = with_backs(sheets(&snapshot, None, &|_| true)?.sheets, &snapshot, &mut tracer)?;
-        let spec = scene.lightmap().unwrap_or_else(|| usual(&all));
-        let laid_out = laid_out(&all, spec)?;
+        let laid_out = match scene.lightmap() {
+            Some(spec) => laid_out(&all, spec)?,
+            None => usual(&all)?,
+        };
         Ok(Self { scene, laid_out, tracer, passes: 0 })
     }
 

@@ -11,7 +11,7 @@ pub(crate) struct LightmapArguments {
     #[arg(long, value_name = "SIZE", value_parser = size, conflicts_with = "texel")]
     lightmap: Option<LightmapSpec>,
     /// A lumel every so many metres, in place of the scene's own density. Where that has none, 0.1 or,
-    /// in little scenes, less.
+    /// where pages have room, less.
     #[arg(long, value_name = "METRES", value_parser = texel)]
     texel: Option<LightmapSpec>,
 }
