@@ -32,7 +32,7 @@ pub use error::ChartError;
 pub use extend::{Extended, extended};
 pub use layout::{LaidOut, MOST_PAGES, PAGE, laid_out, usual};
 pub use lumels::{Lumel, lumels, lumels_on_pages};
-pub use parts::chart_count;
+pub use parts::{UnionFind, chart_count};
 pub use raster::barycentric;
 pub use sheet::{Progress, Sheet, Sheets, sheets};
 pub use store::Store;

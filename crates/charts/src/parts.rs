@@ -33,18 +33,19 @@ pub(crate) fn parts<P: Eq + Hash>(triangles: impl Iterator<Item = [P; 3]>) -> u3
 }
 
 /// Sets of numbers, by trees whose roots name them.
-#[derive(Default)]
-struct UnionFind(Vec<u32>);
+#[derive(Clone, Debug, Default)]
+pub struct UnionFind(Vec<u32>);
 
 impl UnionFind {
     /// The number of a new set, of which it is all.
-    fn add(&mut self) -> u32 {
+    pub fn add(&mut self) -> u32 {
         let number = self.0.len() as u32;
         self.0.push(number);
         number
     }
 
-    fn root(&mut self, mut of: u32) -> u32 {
+    /// The number that names the set of a number.
+    pub fn root(&mut self, mut of: u32) -> u32 {
         while self.0[of as usize] != of {
             let above = self.0[of as usize];
             self.0[of as usize] = self.0[above as usize];
@@ -54,7 +55,7 @@ impl UnionFind {
     }
 
     /// Makes one set of two; whether they were two.
-    fn unite(&mut self, a: u32, b: u32) -> bool {
+    pub fn unite(&mut self, a: u32, b: u32) -> bool {
         let [a, b] = [self.root(a), self.root(b)];
         self.0[a.max(b) as usize] = a.min(b);
         a != b

@@ -11,15 +11,20 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use glam::{Vec2, Vec3};
+use lumencast_charts::UnionFind;
 use lumencast_light::{Layout, Lightmap, Surface};
 use lumencast_scene::Snapshot;
+use rayon::prelude::*;
 
+use super::blocks::Block;
 use super::places::{PlacedSurface, surfaces};
 
 /// m of a lumel without light of its own.
 const YIELDING: f32 = 1.0 / 16.0;
-/// Rounds over all points, forwards and backwards.
+/// Rounds over all points, forwards and backwards, at most, and the share of the light there by which the
+/// sides of no point differ any more after fewer.
 const ROUNDS: u32 = 24;
+const CLOSED: f32 = 1e-3;
 /// Share of a difference that a projection takes away: a little less than all where points ask for more
 /// than their lumels can give.
 const RELAXED: f32 = 0.8;
@@ -31,15 +36,28 @@ const SMOOTH: f32 = 1e-3;
 /// Edges whose sides lie nearer to each other on the page are inside a chart, lumels.
 const SAME: f32 = 1.0 / 128.0;
 
+/// How much each of a point's lumels counts there: those that one side reads above 0, those of the other
+/// below. Lumels are told by their place in a list.
+type Taps = [(u32, f32); 8];
+
+/// Points of seams.
+#[derive(Clone, Debug, Default)]
+struct Points {
+    /// The lumels that take part, by their index among those of all pages.
+    lumels: Vec<u32>,
+    points: Vec<Taps>,
+}
+
 /// The points at which seams are closed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Seams {
-    /// The lumels that take part, by their index among those of all pages.
-    lumels: Vec<u32>,
-    /// Of each point, the lumels that both sides read, by their index in `lumels`, and how much: those
-    /// of one side above 0, those of the other below.
-    points: Vec<[(u32, f32); 8]>,
+    all: Points,
+    /// Numbers of the points that read lumels of a block, block by block.
+    of_block: Vec<Vec<u32>>,
 }
+
+/// Some seams, in parts that share no lumel.
+pub(crate) struct Stitches(Vec<Points>);
 
 /// A side of an edge: its ends on a page, in the order of their positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,12 +70,96 @@ struct Side {
 impl Seams {
     /// The seams of a layout's surfaces in a scene.
     pub(crate) fn new(scene: &Snapshot, layout: &Layout) -> Self {
-        Self::at(scene, layout, POINTS)
+        let all = Points::of(scene, layout, POINTS);
+        let size = layout.page_size;
+        let block_of = |lumel: &u32| Block::of(*lumel, size).number(size);
+        let blocks: Vec<usize> = all.lumels.iter().map(block_of).collect();
+        let mut of_block = vec![Vec::new(); blocks.iter().max().map_or(0, |last| last + 1)];
+        for (point, number) in all.points.iter().zip(0..) {
+            for (lumel, _) in point {
+                let of_block: &mut Vec<u32> = &mut of_block[blocks[*lumel as usize]];
+                if of_block.last() != Some(&number) {
+                    of_block.push(number);
+                }
+            }
+        }
+        Self { all, of_block }
     }
 
-    /// The same, at so many points for each lumel of their length.
-    fn at(scene: &Snapshot, layout: &Layout, points: f32) -> Self {
-        let mut seams = Self::default();
+    /// Bytes of memory.
+    pub(crate) fn bytes(&self) -> usize {
+        let of_block: usize = self.of_block.iter().map(|points| size_of_val(&**points)).sum();
+        size_of_val(&*self.all.lumels) + size_of_val(&*self.all.points) + of_block
+    }
+
+    /// The seams that lumels of blocks take part in; blocks are told by their numbers.
+    pub(crate) fn about(&self, blocks: impl Iterator<Item = usize>) -> Stitches {
+        let of_blocks = blocks.filter_map(|block| self.of_block.get(block)).flatten();
+        let mut numbers: Vec<u32> = of_blocks.copied().collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let points = || numbers.iter().map(|number| &self.all.points[*number as usize]);
+        let mut sets = UnionFind::default();
+        let mut set_of = vec![None; self.all.lumels.len()];
+        for point in points() {
+            let of_lumels =
+                point.map(|(l, _)| *set_of[l as usize].get_or_insert_with(|| sets.add()));
+            for two in of_lumels.windows(2) {
+                sets.unite(two[0], two[1]);
+            }
+        }
+        let mut parts: Vec<Points> = Vec::new();
+        let (mut part_of, mut place_of) = (HashMap::new(), HashMap::new());
+        for point in points() {
+            let set =
+                point.iter().find_map(|(lumel, _)| set_of[*lumel as usize]).map(|s| sets.root(s));
+            let number = *part_of.entry(set).or_insert(parts.len());
+            if number == parts.len() {
+                parts.push(Points::default());
+            }
+            let part = &mut parts[number];
+            let own = point.map(|(lumel, weight)| {
+                let place = *place_of.entry(lumel).or_insert_with(|| {
+                    part.lumels.push(self.all.lumels[lumel as usize]);
+                    part.lumels.len() as u32 - 1
+                });
+                (place, weight)
+            });
+            part.points.push(own);
+        }
+        Stitches(parts)
+    }
+}
+
+impl Stitches {
+    /// Closes the seams of the light of all pages. `is_known` tells of a lumel whether its light is its
+    /// own. Lumels that take no part stay as they are.
+    pub(crate) fn close(&self, light: &mut [Vec3], is_known: impl Fn(u32) -> bool + Sync) {
+        self.close_above(0.0, light, is_known);
+    }
+
+    /// The same for what is told of light, such as slopes, which may be below 0.
+    pub(crate) fn close_signed(&self, told: &mut [Vec3], is_known: impl Fn(u32) -> bool + Sync) {
+        self.close_above(f32::NEG_INFINITY, told, is_known);
+    }
+
+    /// Closes seams, where nothing falls below `least`.
+    fn close_above(&self, least: f32, light: &mut [Vec3], is_known: impl Fn(u32) -> bool + Sync) {
+        let shown: &[Vec3] = light;
+        let closed = |part: &Points| part.closed(shown, &is_known, least);
+        let closed: Vec<Vec<Vec3>> = self.0.par_iter().map(closed).collect();
+        for (part, closed) in self.0.iter().zip(closed) {
+            for (lumel, closed) in part.lumels.iter().zip(closed) {
+                light[*lumel as usize] = closed;
+            }
+        }
+    }
+}
+
+impl Points {
+    /// Points of the seams of a layout's surfaces in a scene, so many for each lumel of their length.
+    fn of(scene: &Snapshot, layout: &Layout, density: f32) -> Self {
+        let mut all = Self::default();
         let mut known = HashMap::new();
         let mut open: HashMap<[[u32; 3]; 2], Side> = HashMap::new();
         let mut instance = None;
@@ -74,7 +176,7 @@ impl Seams {
                             Entry::Vacant(entry) => drop(entry.insert(side)),
                             Entry::Occupied(mut entry) => {
                                 let both = [*entry.get(), side];
-                                seams.add(layout, &mut known, both, points);
+                                all.add(layout, &mut known, both, density);
                                 entry.insert(side);
                             }
                         }
@@ -82,41 +184,7 @@ impl Seams {
                 }
             }
         }
-        seams
-    }
-
-    /// Number of points at which seams are closed.
-    #[cfg(test)]
-    fn len(&self) -> usize {
-        self.points.len()
-    }
-
-    /// Bytes of memory.
-    pub(crate) fn bytes(&self) -> usize {
-        size_of_val(&*self.lumels) + size_of_val(&*self.points)
-    }
-
-    /// The lumels that take part, by their index among those of all pages.
-    pub(crate) fn lumels(&self) -> &[u32] {
-        &self.lumels
-    }
-
-    /// Those that new lumels take part in.
-    pub(crate) fn about(&self, is_new: impl Fn(u32) -> bool) -> Self {
-        let new: Vec<bool> = self.lumels.iter().map(|lumel| is_new(*lumel)).collect();
-        let is_about = |point: &&[(u32, f32); 8]| point.iter().any(|(l, _)| new[*l as usize]);
-        let mut about = Self::default();
-        let mut known = vec![None; self.lumels.len()];
-        for point in self.points.iter().filter(is_about) {
-            about.points.push(point.map(|(lumel, weight)| {
-                let number = *known[lumel as usize].get_or_insert_with(|| {
-                    about.lumels.push(self.lumels[lumel as usize]);
-                    about.lumels.len() as u32 - 1
-                });
-                (number, weight)
-            }));
-        }
-        about
+        all
     }
 
     /// Adds an edge, if it is a seam. `known` has the places of lumels in the list of those that take
@@ -126,7 +194,7 @@ impl Seams {
         layout: &Layout,
         known: &mut HashMap<u32, u32>,
         [one, other]: [Side; 2],
-        points: f32,
+        density: f32,
     ) {
         let alike = |k: usize| one.normals[k].distance_squared(other.normals[k]) < SMOOTH;
         let apart = |k: usize| one.ends[k].distance(other.ends[k]);
@@ -135,7 +203,7 @@ impl Seams {
             return;
         }
         let length = |side: Side| side.ends[0].distance(side.ends[1]);
-        let count = (points * length(one).max(length(other))).ceil().max(1.0) as u32;
+        let count = (density * length(one).max(length(other))).ceil().max(1.0) as u32;
         let mut local = |(lumel, weight): (usize, f32)| {
             let lumel = lumel as u32;
             let number = *known.entry(lumel).or_insert_with(|| {
@@ -154,70 +222,64 @@ impl Seams {
         }
     }
 
-    /// Closes the seams of the light of all pages. `known`: of each lumel that takes part whether its
-    /// light is its own. Lumels that take no part stay as they are.
-    pub(crate) fn apply(&self, light: &mut [Vec3], known: &[bool]) {
-        self.close(light, known, 0.0);
-    }
-
-    /// The same for what is told of light, such as slopes, which may be below 0.
-    pub(crate) fn apply_signed(&self, told: &mut [Vec3], known: &[bool]) {
-        self.close(told, known, f32::NEG_INFINITY);
-    }
-
-    /// Closes seams, where nothing falls below `least`.
-    fn close(&self, light: &mut [Vec3], known: &[bool], least: f32) {
-        if self.points.is_empty() {
-            return;
-        }
-        let yields = |is_known: &bool| if *is_known { 1.0 } else { 1.0 / YIELDING };
-        let yields: Vec<f32> = known.iter().map(yields).collect();
+    /// What lumels have once both sides of each point read the same, and nothing is below `least`.
+    fn closed(&self, light: &[Vec3], is_known: impl Fn(u32) -> bool, least: f32) -> Vec<Vec3> {
+        let yields = |lumel: &u32| if is_known(*lumel) { 1.0 } else { 1.0 / YIELDING };
+        let yields: Vec<f32> = self.lumels.iter().map(yields).collect();
         let mut x: Vec<Vec3> = self.lumels.iter().map(|lumel| light[*lumel as usize]).collect();
-        let strength = |point: &[(u32, f32); 8]| -> f32 {
+        let strength = |point: &Taps| -> f32 {
             point.iter().map(|(lumel, weight)| weight * weight * yields[*lumel as usize]).sum()
         };
         let strengths: Vec<f32> = self.points.iter().map(strength).collect();
+        let points = || self.points.iter().zip(&strengths);
         for _ in 0..ROUNDS {
-            let points = || self.points.iter().zip(&strengths);
-            let mut close = |(point, strength): (_, &f32)| {
+            let mut is_closed = true;
+            for (point, strength) in points() {
+                is_closed &= project(&mut x, &yields, point, *strength, least);
+            }
+            if is_closed {
+                break;
+            }
+            for (point, strength) in points().rev() {
                 project(&mut x, &yields, point, *strength, least);
-            };
-            points().for_each(&mut close);
-            points().rev().for_each(&mut close);
+            }
         }
-        for (lumel, value) in self.lumels.iter().zip(x) {
-            light[*lumel as usize] = value;
-        }
+        x
     }
 }
 
-/// Brings both sides of a point together.
-fn project(x: &mut [Vec3], yields: &[f32], point: &[(u32, f32); 8], strength: f32, least: f32) {
-    let apart: Vec3 = point.iter().map(|(lumel, weight)| *weight * x[*lumel as usize]).sum();
+/// Brings both sides of a point together; whether they were next to equal.
+fn project(x: &mut [Vec3], yields: &[f32], point: &Taps, strength: f32, least: f32) -> bool {
+    let read = |taps: &[(u32, f32)]| -> Vec3 {
+        taps.iter().map(|(lumel, weight)| *weight * x[*lumel as usize]).sum()
+    };
+    let (one, minus_other) = (read(&point[..4]), read(&point[4..]));
+    let (apart, level) = (one + minus_other, one.abs().max(minus_other.abs()));
     let step = RELAXED / strength.max(f32::MIN_POSITIVE) * apart;
     for (lumel, weight) in point {
         let lumel = *lumel as usize;
         x[lumel] = (x[lumel] - weight * yields[lumel] * step).max(Vec3::splat(least));
     }
+    apart.abs().max_element() <= CLOSED * level.max_element()
 }
 
 /// Points spread over all seams of a layout, at which these are judged.
-pub struct SeamPoints(Seams);
+pub struct SeamPoints(Points);
 
 impl SeamPoints {
     /// Those of a layout's surfaces in a scene.
     pub fn new(scene: &Snapshot, layout: &Layout) -> Self {
-        Self(Seams::at(scene, layout, JUDGED))
+        Self(Points::of(scene, layout, JUDGED))
     }
 
     /// The irradiance, lux, that both sides read at each point of a lightmap of that layout.
     pub fn sides(&self, lightmap: &Lightmap) -> Vec<[Vec3; 2]> {
-        let Seams { lumels, points } = &self.0;
+        let Points { lumels, points } = &self.0;
         let read = |taps: &[(u32, f32)]| -> Vec3 {
             let light = |lumel: u32| lightmap.irradiance[lumels[lumel as usize] as usize];
             taps.iter().map(|(lumel, weight)| weight.abs() * light(*lumel)).sum()
         };
-        let sides = |taps: &[(u32, f32); 8]| [read(&taps[..4]), read(&taps[4..])];
+        let sides = |taps: &Taps| [read(&taps[..4]), read(&taps[4..])];
         points.iter().map(sides).collect()
     }
 }
@@ -270,6 +332,11 @@ mod tests {
     /// Two squares of a plane, side by side at x = 1, one primitive of four triangles; each is a chart
     /// of 4 × 4 lumels and of another scale on the page.
     fn halves(bend: f32) -> (Snapshot, Layout) {
+        halves_at(Vec2::new(15.6, 12.1), 32, bend)
+    }
+
+    /// The same with the second one at another place of a page of another size.
+    fn halves_at(second: Vec2, page_size: u32, bend: f32) -> (Snapshot, Layout) {
         let mut stage = Stage::default();
         let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
         let mut scenery = Stage::default();
@@ -292,10 +359,8 @@ mod tests {
             ends.into_iter().zip(first..).map(move |((x, y), k)| at(k, low.x + x, low.y + y))
         };
         let charts = Charts {
-            sizes: vec![UVec2::splat(32)],
-            vertices: square(0, Vec2::splat(3.2), 4.3)
-                .chain(square(4, Vec2::new(15.6, 12.1), 7.7))
-                .collect(),
+            sizes: vec![UVec2::splat(page_size)],
+            vertices: square(0, Vec2::splat(3.2), 4.3).chain(square(4, second, 7.7)).collect(),
             triangles: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]],
         };
         let surface = Surface {
@@ -303,7 +368,7 @@ mod tests {
             charts: Arc::new(charts),
             rectangles: vec![Rectangle::default()],
         };
-        (Snapshot::clone(&stage.snapshot()), Layout::new(32, 1, vec![surface]))
+        (Snapshot::clone(&stage.snapshot()), Layout::new(page_size, 1, vec![surface]))
     }
 
     /// What both sides of the seam read, from end to end.
@@ -326,13 +391,13 @@ mod tests {
     fn both_sides_read_the_same_and_the_rest_stays() {
         let (scene, layout) = halves(0.0);
         let seams = Seams::new(&scene, &layout);
-        assert!((10..=40).contains(&seams.len()), "{}", seams.len());
+        let count = seams.all.points.len();
+        assert!((10..=40).contains(&count), "{count}");
         let light = |k: usize| Vec3::splat(if k % 32 < 12 { 1.0 } else { 1.2 });
         let noise = |k: usize| 0.1 * ((k * 7919) % 13) as f32 / 13.0;
         let before: Vec<Vec3> = (0..32 * 32).map(|k| light(k) + noise(k)).collect();
         let mut after = before.clone();
-        let known: Vec<bool> = seams.lumels().iter().map(|lumel| lumel % 32 != 8).collect();
-        seams.apply(&mut after, &known);
+        seams.about(0..1).close(&mut after, |lumel| lumel % 32 != 8);
         let (was, is) = (worst(&read(&layout, &before)), worst(&read(&layout, &after)));
         assert!(was > 0.1 && is < 0.01, "{was} → {is}");
         let changed = before.iter().zip(&after).filter(|(a, b)| a != b).count();
@@ -345,33 +410,48 @@ mod tests {
     #[test]
     fn edges_that_are_sharp_are_left_alone() {
         let (scene, layout) = halves(1.0);
-        assert_eq!(Seams::new(&scene, &layout).len(), 0);
+        assert!(Seams::new(&scene, &layout).all.points.is_empty());
     }
 
-    /// Where some lumels are new, seams are closed there alone.
+    /// Where some blocks are new, seams are closed there alone.
     #[test]
-    fn seams_are_closed_about_new_lumels() {
-        let (scene, layout) = halves(0.0);
+    fn seams_are_closed_about_new_blocks() {
+        // The second square lies in two blocks, one above the other.
+        let (scene, layout) = halves_at(Vec2::new(15.6, 60.1), 128, 0.0);
         let seams = Seams::new(&scene, &layout);
-        assert_eq!(seams.about(|_| false).len(), 0);
-        assert_eq!(seams.about(|_| true).len(), seams.len());
-        let some = seams.about(|lumel| lumel / 32 > 16);
-        assert!(0 < some.len() && some.len() < seams.len(), "{}", some.len());
-        let before: Vec<Vec3> =
-            (0..32 * 32).map(|k| Vec3::splat(if k % 32 < 12 { 1.0 } else { 1.2 })).collect();
+        let count = |seams: &Stitches| seams.0.iter().map(|part| part.points.len()).sum::<usize>();
+        assert_eq!(count(&seams.about(0..0)), 0);
+        assert_eq!(count(&seams.about(0..4)), seams.all.points.len());
+        let some = seams.about(2..4);
+        assert!(0 < count(&some) && count(&some) < seams.all.points.len(), "{}", count(&some));
+        let light = |k: usize| Vec3::splat(if k % 128 < 12 { 1.0 } else { 1.2 });
+        let before: Vec<Vec3> = (0..128 * 128).map(light).collect();
         let mut after = before.clone();
-        some.apply(&mut after, &vec![true; some.lumels().len()]);
+        some.close(&mut after, |_| true);
         let [was, is] = [&before, &after].map(|light| read(&layout, light));
         let closed = is.iter().filter(|[a, b]| (a - b).abs() < 0.01).count();
         assert!(worst(&was) > 0.1 && (5..45).contains(&closed), "{closed} of 51");
     }
 
     #[test]
+    fn seams_that_share_no_lumel_are_closed_apart() {
+        let point = |first: u32| {
+            std::array::from_fn(|k| (first + k as u32, if k < 4 { 0.25 } else { -0.25 }))
+        };
+        let points = vec![point(0), point(20), point(4), point(16)];
+        let all = Points { lumels: (100..128).collect(), points };
+        let seams = Seams { all, of_block: vec![vec![0, 1, 2, 3]] };
+        let Stitches(parts) = seams.about(0..1);
+        let lumels: Vec<Vec<u32>> = parts.iter().map(|part| part.lumels.clone()).collect();
+        assert_eq!(parts.iter().map(|part| part.points.len()).collect::<Vec<_>>(), [2, 2]);
+        assert_eq!(lumels, [(100..112).collect::<Vec<_>>(), (120..128).chain(116..120).collect()]);
+    }
+
+    #[test]
     fn light_without_seams_stays() {
         let (scene, layout) = halves(0.0);
         let mut even = vec![Vec3::splat(2.0); 32 * 32];
-        let seams = Seams::new(&scene, &layout);
-        seams.apply(&mut even, &vec![true; seams.lumels().len()]);
+        Seams::new(&scene, &layout).about(0..1).close(&mut even, |_| true);
         assert!(even.iter().all(|e| e.abs_diff_eq(Vec3::splat(2.0), 1e-5)));
     }
 }

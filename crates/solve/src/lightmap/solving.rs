@@ -47,18 +47,12 @@ impl LightmapSolver {
                 self.put(block, &solved, shown);
             }
         }
-        let numbers: Vec<usize> = news.iter().map(|block| block.number(size)).collect();
-        let mut is_new = vec![false; numbers.last().map_or(0, |last| last + 1)];
-        numbers.into_iter().for_each(|number| is_new[number] = true);
-        let number = |lumel| Block::of(lumel, size).number(size);
-        let seams =
-            self.seams.about(|lumel| is_new.get(number(lumel)).is_some_and(|is_new| *is_new));
-        let of = |lumel: &u32| self.known(beyond::own(self.receiver_of[*lumel as usize])?);
-        let is_known = |lumel: &u32| of(lumel).is_some_and(|lumel| lumel.is_known());
-        let known: Vec<bool> = seams.lumels().iter().map(is_known).collect();
-        seams.apply(&mut shown.irradiance, &known);
+        let seams = self.seams.about(news.iter().map(|block| block.number(size)));
+        let of = |lumel| self.known(beyond::own(self.receiver_of[lumel as usize])?);
+        let is_known = |lumel| of(lumel).is_some_and(|lumel: Noisy| lumel.is_known());
+        seams.close(&mut shown.irradiance, is_known);
         if let Some(slopes) = &mut shown.slopes {
-            seams.apply_signed(slopes, &known);
+            seams.close_signed(slopes, is_known);
         }
     }
 
