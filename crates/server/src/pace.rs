@@ -1,5 +1,7 @@
 //! Keeping time: when the next tick is due, and how many samples fit into it.
 
+use std::ops::RangeInclusive;
+
 /// The beat of a fixed rate that is never made up for: a tick that ends after the next one was due
 /// is followed at once, and the beat goes on from there.
 #[derive(Clone, Copy, Debug)]
@@ -130,7 +132,8 @@ impl Budget {
     }
 }
 
-/// Chooses how many samples lumels take in a tick. They fill what the rest of it leaves.
+/// Chooses how many samples lumels take in a tick, and how many blocks of them are solved. They fill what
+/// the rest of it leaves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LumelPace {
     period: f64,
@@ -149,6 +152,10 @@ impl LumelPace {
     const LEAST: u64 = 1024;
     /// Largest growth from one tick to the next.
     const RISE: f64 = 1.5;
+    /// Solving a block takes about as long as so many samples.
+    const SAMPLES_A_BLOCK: u64 = 700;
+    /// Blocks that are solved in a tick, at most.
+    const BLOCKS: RangeInclusive<u64> = 2..=24;
 
     /// Begins with few samples; or always takes so many.
     pub(crate) fn new(period: f64, fixed: Option<u64>) -> Self {
@@ -159,6 +166,12 @@ impl LumelPace {
     /// Samples of the next tick.
     pub(crate) fn samples(&self) -> u64 {
         self.samples
+    }
+
+    /// Blocks to be solved in this tick, at most: as long as sampling takes.
+    pub(crate) fn blocks(&self) -> usize {
+        let blocks = self.samples / Self::SAMPLES_A_BLOCK;
+        blocks.clamp(*Self::BLOCKS.start(), *Self::BLOCKS.end()) as usize
     }
 
     /// Takes note of a job of so many samples that took so many seconds.
@@ -265,7 +278,9 @@ mod tests {
         let mut fixed = LumelPace::new(PERIOD, Some(77));
         fixed.record(77, 1.0);
         fixed.finish(1.0);
-        assert_eq!(fixed.samples(), 77);
+        assert_eq!((fixed.samples(), fixed.blocks()), (77, 2));
+        assert_eq!(LumelPace::new(PERIOD, Some(7000)).blocks(), 10);
+        assert_eq!(LumelPace::new(PERIOD, Some(1 << 40)).blocks(), 24);
     }
 
     #[test]

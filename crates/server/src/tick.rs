@@ -508,7 +508,8 @@ impl Tick {
             }
         }
         if !brought.is_empty() {
-            self.solver.solve(FIT_EFFORT);
+            self.solver.solve_volumes(FIT_EFFORT);
+            self.solver.solve_lightmaps(self.lumel_pace.blocks());
         }
     }
 

@@ -10,6 +10,7 @@ use lumencast_scene::{Snapshot, VolumeSpec};
 
 use crate::blend::BlendSettings;
 use crate::error::SolveError;
+use crate::lightmap::BLOCKS_AT_ONCE;
 use crate::noise;
 use crate::options::GatherOptions;
 use crate::request::{Request, Turn};
@@ -151,11 +152,11 @@ pub fn bake(
         pass: LUMEL_PASS,
         most: effort.lumel_samples,
         noise: effort.noise,
-        solve: Solver::solve_lightmaps,
+        solve: |solver| solver.solve_lightmaps(BLOCKS_AT_ONCE),
     });
     let lumels = lumels.map(|course| course.run(&mut all, scene, gatherer, &mut progress));
     let lumels = lumels.transpose()?;
-    all.solve_lightmaps();
+    all.solve_lightmaps(BLOCKS_AT_ONCE);
     Ok(Baked { fields: all.into_fields(), probes, lumels })
 }
 

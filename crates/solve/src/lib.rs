@@ -43,7 +43,7 @@ mod walls;
 
 pub use bake::{Bake, Baked, Done, Effort, Receivers, Spent, bake};
 pub use error::SolveError;
-pub use lightmap::{LightmapSolver, SeamPoints, spread, with_backs};
+pub use lightmap::{BLOCKS_AT_ONCE, LightmapSolver, SeamPoints, spread, with_backs};
 pub use newcomers::{Newcomers, Placed};
 pub use options::{FitOptions, GatherOptions};
 pub use placement::{Survey, default_volume, survey, volumes};

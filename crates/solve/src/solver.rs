@@ -11,7 +11,7 @@ use lumencast_scene::{Snapshot, VolumeSpec};
 use crate::error::SolveError;
 use crate::field::FieldSolver;
 use crate::fit::{FitSettings, Part, fit};
-use crate::lightmap::LightmapSolver;
+use crate::lightmap::{BLOCKS_AT_ONCE, LightmapSolver};
 use crate::newcomers::{Newcomers, Placed};
 use crate::options::GatherOptions;
 use crate::request::{Asked, Request, Turn, What};
@@ -232,11 +232,11 @@ impl Solver {
     /// Makes light of what has been taken in.
     pub fn solve(&mut self, effort: FitEffort) {
         self.solve_volumes(effort);
-        self.solve_lightmaps();
+        self.solve_lightmaps(BLOCKS_AT_ONCE);
     }
 
     /// What arrives at the probes or, where they are fitted, the fit of all of them.
-    pub(crate) fn solve_volumes(&mut self, effort: FitEffort) {
+    pub fn solve_volumes(&mut self, effort: FitEffort) {
         let Self { fields, light, .. } = self;
         let volumes: Vec<&VolumeSolver> =
             fields.iter().filter_map(FieldSolver::as_volume).collect();
@@ -262,14 +262,17 @@ impl Solver {
         fit(light, &parts, &FitSettings { rounds, steps, ..FitSettings::default() });
     }
 
-    /// What arrives at lumels, filtered on the surface.
-    pub(crate) fn solve_lightmaps(&mut self) {
+    /// What arrives at lumels, filtered on the surface. Where light is live, `most` blocks of 64² of
+    /// them are solved, in turn.
+    pub fn solve_lightmaps(&mut self, most: usize) {
         let fields = std::mem::take(&mut self.light).into_fields();
         let (lightmaps, volumes): (Vec<Field>, Vec<Field>) =
             fields.into_iter().partition(|field| field.as_lightmap().is_some());
         let probes = Light::new(volumes);
         self.light = Light::new(lightmaps);
-        self.each_lightmap(|lightmap, published| lightmap.solve(true, &probes, published));
+        self.each_lightmap(|lightmap, published| {
+            lightmap.solve_some(most, true, &probes, published);
+        });
         let lightmaps = std::mem::take(&mut self.light).into_fields();
         self.light = Light::new(probes.into_fields().into_iter().chain(lightmaps));
     }

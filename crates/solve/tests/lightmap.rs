@@ -1,6 +1,8 @@
 //! Light at lumels, beside what is known in closed form.
 
+use std::collections::HashSet;
 use std::f32::consts::PI;
+use std::sync::Arc;
 
 use glam::{Affine3A, Quat, UVec3, Vec3};
 use lumencast_charts::{LaidOut, Sheet, laid_out, sheets};
@@ -13,7 +15,6 @@ use lumencast_solve::{
     FitEffort, GatherOptions, LightmapSolver, Request, Solver, Turn, spread, with_backs,
 };
 use lumencast_testkit::scenes::{Stage, lambert};
-use std::sync::Arc;
 
 /// All updates are averaged.
 const MEAN: BlendSettings = BlendSettings { ratio: f32::MIN_POSITIVE, significance: f32::INFINITY };
@@ -162,6 +163,41 @@ fn a_glance_at_all_pages_lights_them() {
     assert!(worst(&lightmap, &scene, 3.0) > 0.5, "nothing has been gathered");
     gather(&mut solver, &mut lightmap, &scene, 2 * lumels);
     assert!(worst(&lightmap, &scene, 3.0) < 0.08, "{}", worst(&lightmap, &scene, 3.0));
+}
+
+/// However many blocks wait, no more are solved at a time than are asked for, and all of them in the end.
+#[test]
+fn blocks_are_solved_a_few_at_a_time() {
+    const SIDE: usize = 256;
+    const BLOCK: usize = 64;
+    let scene = Arc::new(furnace(1.0));
+    let all = sheets(&scene, None, &|_| true).expect("charts").sheets;
+    let laid_out = laid_out(&all, LightmapSpec::Size(SIDE as u32)).expect("a layout");
+    let mut solver = Solver::new(&[], GatherOptions::default()).expect("no volumes");
+    solver.set_lightmap(&scene, Some(&laid_out));
+    let field = solver.ids().next().expect("lumels");
+    // Enough for a glance at all of them.
+    let lumels = Some(4 * solver.lumel_count() as u64);
+    let turn = Turn { previous: None, samples: 1, lumels, pass: 0 };
+    let Request { job, asked } = solver.job(field, &scene, turn).expect("a job");
+    let mut tracer = tracer();
+    let ticket = tracer.submit(job);
+    solver.take(&asked, &tracer.wait(ticket).expect("light"));
+    let light =
+        |solver: &Solver| solver.light().lightmaps().next().expect("lumels").irradiance.clone();
+    let (mut before, mut solved) = (light(&solver), HashSet::new());
+    for _ in 0..(SIDE / BLOCK).pow(2) {
+        solver.solve_lightmaps(2);
+        let after = light(&solver);
+        let changed = (0..SIDE * SIDE).filter(|k| before[*k] != after[*k]);
+        let changed: HashSet<_> = changed.map(|k| (k % SIDE / BLOCK, k / SIDE / BLOCK)).collect();
+        assert!(changed.len() <= 2, "{changed:?}");
+        solved.extend(changed);
+        before = after;
+    }
+    assert!(solved.len() > 8, "{}", solved.len());
+    let read = irradiances(&scene, solver.light().lightmaps().next().expect("lumels"), 500);
+    assert!(read.iter().all(|irradiance| irradiance.x > 0.0));
 }
 
 /// Lumels that nothing is known of show the light of probes, until samples tell of all about them.

@@ -44,6 +44,7 @@ use ripening::Ripening;
 pub use seams::SeamPoints;
 use seams::Seams;
 use slopes::Slopes;
+pub use solving::BLOCKS_AT_ONCE;
 use sums::Sum;
 
 /// What a lumel has in place of a receiver where no surface covers it.

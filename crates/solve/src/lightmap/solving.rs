@@ -10,8 +10,11 @@ use super::blocks::{BLOCK, Block};
 use super::filter::{Noisy, REACH, filter};
 use super::{LightmapSolver, NO_RECEIVER, beyond, fill};
 
-/// So many blocks whose light is another are solved at a time where light is live, and so many of others.
-const NEWS_AT_ONCE: usize = 12;
+/// So many blocks are solved at a time where light is live, unless told otherwise.
+pub const BLOCKS_AT_ONCE: usize = 16;
+/// One of so many is left to blocks whose light is the same.
+const LEFT: usize = 4;
+/// At most so many of those are solved at a time.
 const DUE_AT_ONCE: usize = 4;
 /// More of these where there are many blocks: none waits for more than so many turns.
 const DUE_WITHIN: usize = 64;
@@ -31,7 +34,18 @@ impl LightmapSolver {
     /// is known yet, the light of `probes` is shown, if there are any. `shown` is what [`Self::dark`] made, with
     /// all that has been solved since.
     pub fn solve(&mut self, filtered: bool, probes: &Light, shown: &mut Lightmap) {
-        let mut news = self.next();
+        self.solve_some(BLOCKS_AT_ONCE, filtered, probes, shown);
+    }
+
+    /// The same for `most` blocks where light is live.
+    pub(crate) fn solve_some(
+        &mut self,
+        most: usize,
+        filtered: bool,
+        probes: &Light,
+        shown: &mut Lightmap,
+    ) {
+        let mut news = self.next(most);
         news.iter().for_each(|block| self.ripening.solved(*block));
         let beside = news.iter().filter_map(|block| self.beside.get(block)).flatten();
         let beside: Vec<Block> = beside.copied().collect();
@@ -56,17 +70,17 @@ impl LightmapSolver {
         }
     }
 
-    /// Blocks to be solved now. Where light is live these are some, in turn: most of them such whose light
-    /// is another.
-    fn next(&mut self) -> BTreeSet<Block> {
+    /// Blocks to be solved now. Where light is live these are `most`, in turn: most of them such whose
+    /// light is another.
+    fn next(&mut self, most: usize) -> BTreeSet<Block> {
         if !self.in_turns {
             self.due.take_all();
             return self.news.take_all();
         }
-        let mut next = self.news.take(NEWS_AT_ONCE);
+        let mut next = self.news.take(most - most.div_ceil(LEFT));
         let others = DUE_AT_ONCE.max(self.readers.len().div_ceil(DUE_WITHIN));
         next.iter().chain(self.news.all()).for_each(|block| self.due.remove(block));
-        next.extend(self.due.take(others));
+        next.extend(self.due.take(others.min(most - next.len())));
         next
     }
 
