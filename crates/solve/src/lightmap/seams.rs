@@ -109,17 +109,17 @@ impl Seams {
             }
         }
         let mut parts: Vec<Points> = Vec::new();
-        let (mut part_of, mut place_of) = (HashMap::new(), HashMap::new());
+        let (mut part_of, mut place_of) = (HashMap::new(), vec![None; self.all.lumels.len()]);
         for point in points() {
-            let set =
-                point.iter().find_map(|(lumel, _)| set_of[*lumel as usize]).map(|s| sets.root(s));
+            // All lumels of a point are of one set.
+            let set = set_of[point[0].0 as usize].map(|set| sets.root(set));
             let number = *part_of.entry(set).or_insert(parts.len());
             if number == parts.len() {
                 parts.push(Points::default());
             }
             let part = &mut parts[number];
             let own = point.map(|(lumel, weight)| {
-                let place = *place_of.entry(lumel).or_insert_with(|| {
+                let place = *place_of[lumel as usize].get_or_insert_with(|| {
                     part.lumels.push(self.all.lumels[lumel as usize]);
                     part.lumels.len() as u32 - 1
                 });
