@@ -10,6 +10,7 @@ use lumencast_light::{ChartVertex, Charts};
 use uvunwrap::{Atlas, Density, Error, MeshInput, Options, OutputMesh, Packing, Progress, Stage};
 
 use crate::error::ChartError;
+use crate::lumels::{LOOKED_AT, overlaps};
 use crate::parts::parts;
 
 /// Charts of a primitive, at most: what has more is a cloud of splinters that fills pages with padding.
@@ -24,6 +25,10 @@ const GRID: f32 = 256.0;
 /// Lumels that charts are laid out on first. They are laid out anew at the density that is asked for:
 /// here they only need to be told apart.
 const FIRST_LUMELS: f64 = 65_536.0;
+
+/// Charts of the unwrapper may overlap by this share of their area: it folds few and thin triangles, in a
+/// 30,000th of the Breakfast room's.
+const OVERLAPPING: f32 = 0.01;
 
 /// A surface to cut.
 #[derive(Clone, Debug)]
@@ -113,11 +118,23 @@ pub(crate) fn cut(shape: &Shape<'_>, watch: Watch<'_>) -> Result<Cut, ChartError
         if has_chart { *triangle } else { Charts::NOWHERE }
     });
     let triangles: Vec<[u32; 3]> = triangles.collect();
+    if uv.is_none() && overlapping(&vertices, &triangles, metres) > OVERLAPPING {
+        return Err(ChartError::Unwrap("the unwrapper returned charts that overlap".into()));
+    }
     // Triangles too thin for coordinates in single precision have no chart.
     if triangles.iter().all(|triangle| *triangle == Charts::NOWHERE) {
         return Err(ChartError::NoArea);
     }
     Ok(Cut { vertices, triangles, charts: atlas.chart_count })
+}
+
+/// The share of places on charts, which lie on so many metres, that belong to two triangles.
+fn overlapping(vertices: &[CutVertex], triangles: &[[u32; 3]], metres: Vec2) -> f32 {
+    let scale = LOOKED_AT as f32 / metres.max_element();
+    let placed = triangles.iter().filter(|triangle| **triangle != Charts::NOWHERE);
+    let lumels = |triangle: &[u32; 3]| triangle.map(|v| scale * vertices[v as usize].at);
+    let found = overlaps(placed.map(lumels), UVec2::splat(LOOKED_AT));
+    found.twice as f32 / found.all.max(1) as f32
 }
 
 /// Lays the charts of a surface out at a density, those that `keep` names. They share one rectangle as

@@ -9,7 +9,7 @@ use lumencast_light::{Charts, Layout, Rectangle, Surface};
 use lumencast_scene::LightmapSpec;
 use rayon::prelude::*;
 
-use crate::cut::{Shape, lay_out};
+use crate::cut::{PADDING, Shape, lay_out};
 use crate::error::ChartError;
 use crate::sheet::Sheet;
 
@@ -34,6 +34,13 @@ const FILLED: f64 = 0.6;
 const STEP: f64 = 1.15;
 /// Halvings of what is left of that step.
 const HALVINGS: u32 = 3;
+/// The same where only rectangles are packed.
+const FINE_HALVINGS: u32 = 6;
+/// Charts are packed at so many densities at most: first at this many times the one that their rectangles
+/// promise room for, since more lumels are packed the more tightly, then each time lower by this.
+const ATTEMPTS: u32 = 4;
+const FIRST: f64 = 1.05;
+const BACK: f64 = 1.025;
 /// Densities below this share of the first guess are not tried.
 const LEAST_SHARE: f64 = 1e-3;
 
@@ -60,46 +67,91 @@ impl LaidOut {
     }
 }
 
-/// Lays out the sheets of a scene that asks for no density: with a lumel every decimetre, or with smaller
-/// ones of down to 7 cm where the pages which that takes have room for them. A scene that would not
-/// fill a page of 256² fills it.
-///
-/// # Errors
-/// As [`laid_out`].
-pub fn usual(sheets: &[Sheet]) -> Result<LaidOut, ChartError> {
-    let filled = (area(sheets) / FILLED).sqrt() / f64::from(USUAL);
-    if filled < f64::from(LightmapSpec::TEXEL) {
-        return laid_out(sheets, LightmapSpec::Size(USUAL));
-    }
-    let usual = laid_out(sheets, LightmapSpec::default())?;
-    if usual.coarser {
-        return Ok(usual);
-    }
-    let Layout { page_size, pages, .. } = usual.layout;
-    let attempt = |density| at_density(sheets, density, page_size, pages);
-    let (layout, density) = match attempt(1.0 / FINEST)? {
-        Some(layout) => (layout, 1.0 / FINEST),
-        None => densest((usual.layout, 1.0 / f64::from(usual.texel)), 1.0 / FINEST, &attempt)?,
-    };
-    Ok(LaidOut { layout, texel: (1.0 / density) as f32, coarser: false })
-}
-
-/// Square metres.
-fn area(sheets: &[Sheet]) -> f64 {
-    sheets.iter().map(Sheet::area).sum()
-}
-
 /// Lays sheets out on pages: on one of a size, as densely as they fit, or with lumels of a size, on one
 /// smaller page or up to [`MOST_PAGES`] pages of [`PAGE`]², or with the smallest lumels that fit these.
+///
+/// Where nothing is asked for, lumels are a decimetre large, or as small as 7 cm where the pages which that
+/// takes have room for them. What would not fill a page of 256² fills it.
 ///
 /// # Errors
 /// [`ChartError::NoRoom`] where no density fits, [`ChartError::NoArea`] without sheets, and whatever the
 /// unwrapper finds wrong.
-pub fn laid_out(sheets: &[Sheet], spec: LightmapSpec) -> Result<LaidOut, ChartError> {
-    let area = area(sheets);
+pub fn laid_out(
+    sheets: &[Sheet],
+    spec: impl Into<Option<LightmapSpec>>,
+) -> Result<LaidOut, ChartError> {
+    let area: f64 = sheets.iter().map(Sheet::area).sum();
     if !(area > 0.0 && area.is_finite()) {
         return Err(ChartError::NoArea);
     }
+    match spec.into() {
+        Some(spec) => by_spec(sheets, area, spec),
+        None => usual(sheets, area),
+    }
+}
+
+/// Lays out the sheets of a scene that asks for no density: with a lumel every decimetre, or with smaller
+/// ones of down to 7 cm where the pages which that takes have room for them. A scene that would not
+/// fill a page of 256² fills it.
+fn usual(sheets: &[Sheet], area: f64) -> Result<LaidOut, ChartError> {
+    let filled = (area / FILLED).sqrt() / f64::from(USUAL);
+    if filled < f64::from(LightmapSpec::TEXEL) {
+        return by_spec(sheets, area, LightmapSpec::Size(USUAL));
+    }
+    let usual = by_spec(sheets, area, LightmapSpec::default())?;
+    if usual.coarser {
+        return Ok(usual);
+    }
+    let Layout { page_size, pages, .. } = usual.layout;
+    let charts: usize = sheets.iter().map(Sheet::charts).sum();
+    let promised = roomiest(&usual, (area / charts as f64).sqrt());
+    let mut density = (promised * FIRST).min(1.0 / FINEST);
+    for _ in 0..ATTEMPTS {
+        if density * f64::from(usual.texel) <= 1.0 {
+            break;
+        }
+        if let Some(layout) = at_density(sheets, density, page_size, pages)? {
+            return Ok(LaidOut { layout, texel: (1.0 / density) as f32, coarser: false });
+        }
+        density /= BACK;
+    }
+    Ok(usual)
+}
+
+/// The density, up to [`FINEST`], at which the pages of a layout have room for its rectangles, if these grow
+/// as their charts do: their sides, but not what lies between charts. `side` is the mean of charts' sides,
+/// metres.
+fn roomiest(LaidOut { layout, texel, .. }: &LaidOut, side: f64) -> f64 {
+    let sizes: Vec<UVec2> =
+        layout.surfaces().iter().flat_map(|surface| &surface.charts.sizes).copied().collect();
+    let lumels = |density: f64| side * density + f64::from(PADDING);
+    let least = 1.0 / f64::from(*texel);
+    let fits = |density: f64| {
+        let grown =
+            |size: &UVec2| (size.as_dvec2() * lumels(density) / lumels(least)).ceil().as_uvec2();
+        let parts = sizes.iter().flat_map(|size| tiled(grown(size), layout.page_size));
+        pack(&parts.collect::<Vec<UVec2>>(), layout.page_size, layout.pages).is_some()
+    };
+    let (mut density, mut too_dense) = (least, 1.0 / FINEST);
+    if fits(too_dense) {
+        return too_dense;
+    }
+    for _ in 0..FINE_HALVINGS {
+        let between = f64::sqrt(density * too_dense);
+        if fits(between) { density = between } else { too_dense = between }
+    }
+    density
+}
+
+/// A rectangle in parts that are no larger than a page.
+fn tiled(size: UVec2, page: u32) -> impl Iterator<Item = UVec2> {
+    let along =
+        move |length: u32| (0..length.div_ceil(page)).map(move |k| (length - k * page).min(page));
+    along(size.y).flat_map(move |y| along(size.x).map(move |x| UVec2::new(x, y)))
+}
+
+/// See [`laid_out`]; sheets have so many square metres.
+fn by_spec(sheets: &[Sheet], area: f64, spec: LightmapSpec) -> Result<LaidOut, ChartError> {
     let (pages, size, asked) = match spec {
         LightmapSpec::Size(size) => (1, size, None),
         LightmapSpec::Texel(texel) => (MOST_PAGES, PAGE, Some(1.0 / f64::from(texel))),
@@ -137,24 +189,15 @@ pub fn laid_out(sheets: &[Sheet], spec: LightmapSpec) -> Result<LaidOut, ChartEr
             }
         }
     }
-    let (layout, density) = densest(fits.ok_or(ChartError::NoRoom)?, least_too_dense, &attempt)?;
-    done(layout, density)
-}
-
-/// The densest layout that is found between one that fits and a density at which none does.
-fn densest(
-    (mut layout, mut density): (Layout, f64),
-    mut too_dense: f64,
-    attempt: &dyn Fn(f64) -> Result<Option<Layout>, ChartError>,
-) -> Result<(Layout, f64), ChartError> {
+    let (mut layout, mut density) = fits.ok_or(ChartError::NoRoom)?;
     for _ in 0..HALVINGS {
-        let between = (density * too_dense).sqrt();
+        let between = (density * least_too_dense).sqrt();
         match attempt(between)? {
             Some(denser) => (layout, density) = (denser, between),
-            None => too_dense = between,
+            None => least_too_dense = between,
         }
     }
-    Ok((layout, density))
+    done(layout, density)
 }
 
 /// The layout at a density, lumels a metre; nothing where the pages have no room for it.
@@ -200,18 +243,27 @@ pub(crate) fn charts(sheet: &Sheet, density: f32, most: u32) -> Result<Charts, C
     lay_out(&sheet.cut, &shape, &|chart| sheet.keeps(chart), density, most)
 }
 
-/// Gives every rectangle a place, the tallest first.
+/// Gives every rectangle a place.
 fn place(laid: &[(&Sheet, Arc<Charts>)], size: u32, pages: u32) -> Option<Layout> {
+    let sizes: Vec<UVec2> = laid.iter().flat_map(|(_, charts)| &charts.sizes).copied().collect();
+    let (mut rectangles, pages) = pack(&sizes, size, pages)?;
+    let surfaces = laid.iter().map(|(sheet, charts)| Surface {
+        id: sheet.id,
+        charts: charts.clone(),
+        rectangles: rectangles.drain(..charts.sizes.len()).collect(),
+    });
+    Some(Layout::new(size, pages, surfaces.collect()))
+}
+
+/// Packs rectangles of these sizes onto pages, the tallest first. Tells where they lie, and how many pages
+/// they take; nothing where there is no room.
+fn pack(sizes: &[UVec2], size: u32, pages: u32) -> Option<(Vec<Rectangle>, u32)> {
     let options = AllocatorOptions { alignment: size2(ALIGNMENT, ALIGNMENT), ..Default::default() };
     let mut allocators: Vec<AtlasAllocator> = Vec::new();
-    let mut open: Vec<(usize, usize, UVec2)> = Vec::new();
-    let mut places: Vec<Vec<Rectangle>> = Vec::new();
-    for (surface, (_, charts)) in laid.iter().enumerate() {
-        places.push(vec![Rectangle::default(); charts.sizes.len()]);
-        open.extend(charts.sizes.iter().enumerate().map(|(r, size)| (surface, r, *size)));
-    }
-    open.sort_by_key(|(_, _, size)| (std::cmp::Reverse(size.y), std::cmp::Reverse(size.x)));
-    for (surface, rectangle, wanted) in open {
+    let mut open: Vec<(usize, &UVec2)> = sizes.iter().enumerate().collect();
+    open.sort_by_key(|(_, size)| (std::cmp::Reverse(size.y), std::cmp::Reverse(size.x)));
+    let mut places = vec![Rectangle::default(); sizes.len()];
+    for (rectangle, wanted) in open {
         let wanted = size2(wanted.x as i32, wanted.y as i32);
         let mut found = allocators.iter_mut().zip(0..).find_map(|(page, number)| {
             page.allocate(wanted).map(|allocation| (number, allocation.rectangle.min))
@@ -223,13 +275,8 @@ fn place(laid: &[(&Sheet, Arc<Charts>)], size: u32, pages: u32) -> Option<Layout
             allocators.push(page);
         }
         let (page, corner) = found?;
-        let corner = UVec2::new(corner.x as u32, corner.y as u32);
-        places[surface][rectangle] = Rectangle { page, corner };
+        places[rectangle] =
+            Rectangle { page, corner: UVec2::new(corner.x as u32, corner.y as u32) };
     }
-    let surfaces = laid.iter().zip(places).map(|((sheet, charts), rectangles)| Surface {
-        id: sheet.id,
-        charts: charts.clone(),
-        rectangles,
-    });
-    Some(Layout::new(size, allocators.len() as u32, surfaces.collect()))
+    Some((places, allocators.len() as u32))
 }

@@ -1,8 +1,7 @@
 //! Surfaces of a scene cut into charts, and laid out on pages of lumels.
 //!
 //! [`sheets`] cuts the still surfaces, once for all equal ones, and keeps what it made in a [`Store`].
-//! [`laid_out`] gives them places on pages, at a density; [`usual`] chooses one. [`extended`] finds room
-//! for more. [`lumels`] tells where each lumel lies on its surface.
+//! [`laid_out`] gives them places on pages, at a density. [`extended`] finds room for more. [`lumels`] tells where each lumel lies on its surface.
 //!
 //! ```
 //! use lumencast_charts::{laid_out, lumels, sheets};
@@ -30,7 +29,7 @@ mod store;
 
 pub use error::ChartError;
 pub use extend::{Extended, extended};
-pub use layout::{LaidOut, MOST_PAGES, PAGE, laid_out, usual};
+pub use layout::{LaidOut, MOST_PAGES, PAGE, laid_out};
 pub use lumels::{Lumel, lumels, lumels_on_pages};
 pub use parts::{UnionFind, chart_count};
 pub use raster::barycentric;

@@ -11,11 +11,9 @@ use rayon::prelude::*;
 
 use crate::cut::{Cut, Shape, cut};
 use crate::error::ChartError;
-use crate::lumels::overlaps;
+use crate::lumels::{LOOKED_AT, overlaps};
 use crate::store::{Key, Store};
 
-/// Lumels a side on which a file's own coordinates are looked at for overlaps.
-const LOOKED_AT: u32 = 1024;
 /// Coordinates so far outside of [0, 1] are inside.
 const BORDER: f32 = 1e-4;
 /// Scales that differ by less than this share are the same, so that instances share charts.
@@ -259,7 +257,7 @@ fn own_coordinates(primitive: &Primitive) -> Result<Option<&[Vec2]>, &'static st
         return Err("leave the square from 0 to 1");
     }
     let lumels = |triangle: &[u32; 3]| triangle.map(|v| LOOKED_AT as f32 * uv[v as usize]);
-    if overlaps(primitive.triangles.iter().map(lumels), UVec2::splat(LOOKED_AT)) > 0 {
+    if overlaps(primitive.triangles.iter().map(lumels), UVec2::splat(LOOKED_AT)).twice > 0 {
         return Err("overlap");
     }
     Ok(Some(uv))

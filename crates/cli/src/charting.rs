@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::Result;
-use lumencast_charts::{ChartError, LaidOut, Progress, Sheets, Store, laid_out, usual};
+use lumencast_charts::{ChartError, LaidOut, Progress, Sheets, Store, laid_out};
 use lumencast_gather::Gather;
 use lumencast_scene::{LightmapSpec, Snapshot};
 use lumencast_solve::with_backs;
@@ -38,7 +38,7 @@ pub(crate) fn lay_out(
         return Ok(None);
     }
     let all = with_backs(sheets, scene, gatherer)?;
-    match spec.map_or_else(|| usual(&all), |spec| laid_out(&all, spec)) {
+    match laid_out(&all, spec) {
         Ok(laid_out) => {
             if laid_out.coarser {
                 let size = 100.0 * laid_out.texel;

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use lumencast_charts::{LaidOut, Sheets, chart_count, laid_out, lumels, usual};
+use lumencast_charts::{LaidOut, Sheets, chart_count, laid_out, lumels};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Charts, Surface};
 use lumencast_scene::{LightmapSpec, Scene};
@@ -25,8 +25,7 @@ pub(crate) fn lightmap_report(scene: &mut Scene, spec: Option<LightmapSpec>) -> 
     let sheets = with_backs(sheets, &scene.snapshot(), &mut tracer)?;
     let looked = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let LaidOut { layout, texel, coarser } =
-        spec.map_or_else(|| usual(&sheets), |spec| laid_out(&sheets, spec))?;
+    let LaidOut { layout, texel, coarser } = laid_out(&sheets, spec)?;
     let laid_out = start.elapsed().as_secs_f64();
     let covered: usize = layout.surfaces().iter().map(|s: &Surface| lumels(&s.charts).len()).sum();
     let triangles = layout.surfaces().iter().flat_map(|surface| &surface.charts.triangles);

@@ -13,7 +13,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumencast_charts::{LaidOut, laid_out, lumels_on_pages, sheets, usual};
+use lumencast_charts::{LaidOut, laid_out, lumels_on_pages, sheets};
 use lumencast_gather::path_trace::{CpuPathTracer, Levels, Options};
 use lumencast_gather::{Budget, Gather, Job};
 use lumencast_light::{FieldId, Light, Lightmap, luminance};
@@ -44,10 +44,7 @@ impl Subject {
         let snapshot = scene.snapshot();
         let mut tracer = CpuPathTracer::new(Options { levels: Levels::Two, ..Options::default() })?;
         let all = with_backs(sheets(&snapshot, None, &|_| true)?.sheets, &snapshot, &mut tracer)?;
-        let laid_out = match scene.lightmap() {
-            Some(spec) => laid_out(&all, spec)?,
-            None => usual(&all)?,
-        };
+        let laid_out = laid_out(&all, scene.lightmap())?;
         Ok(Self { scene, laid_out, tracer, passes: 0 })
     }
 
