@@ -129,6 +129,13 @@ impl Stepped {
         self.tick.light().lightmaps().next().expect("lumels")
     }
 
+    /// The mesh of the tall box.
+    fn tall_box(&self) -> InstanceSource {
+        let tall = self.node("tall box");
+        let mesh = self.tick.scene().nodes().find(|node| node.id == tall).expect("a box").mesh;
+        InstanceSource::Mesh(mesh.expect("a mesh"))
+    }
+
     /// The shape that the catalog has now.
     fn shape(&self) -> LightmapShape {
         let catalog = self.tick.catalog();
@@ -407,11 +414,8 @@ fn what_is_added_to_nothing_gets_lumels() {
 fn what_is_added_gets_lumels() {
     let mut stepped = Stepped::new();
     stepped.steps(5);
-    let tall = stepped.node("tall box");
-    let source = stepped.tick.scene().nodes().find(|n| n.id == tall).expect("a box").mesh;
     let before = stepped.lightmap().layout.clone();
-    let source = InstanceSource::Mesh(source.expect("a mesh"));
-    let add = add("another", source, Vec3::new(-0.6, 0.4, 0.5));
+    let add = add("another", stepped.tall_box(), Vec3::new(-0.6, 0.4, 0.5));
     stepped.edit(2, add.clone());
     let id = SurfaceId { node: stepped.node("another").0, ..SurfaceId::default() };
     let has = |stepped: &Stepped| stepped.lightmap().layout.surface(id).is_some();
@@ -437,4 +441,27 @@ fn what_is_added_gets_lumels() {
     assert!(!has(&stepped));
     stepped.steps(3);
     assert_eq!(stepped.lightmap().layout.surfaces(), before.surfaces());
+}
+
+/// Clients that know an old layout read no lumels of what came later: a place is used again once all know
+/// that what lay there is gone.
+#[test]
+fn a_place_is_free_some_time_after_what_lay_there_went() {
+    let mut stepped = Stepped::new();
+    let mesh = stepped.tall_box();
+    let id =
+        |stepped: &Stepped, name| SurfaceId { node: stepped.node(name).0, ..SurfaceId::default() };
+    let place = |stepped: &Stepped, id| {
+        stepped.lightmap().layout.surface(id).map(|surface| surface.rectangles.clone())
+    };
+    stepped.edit(1, add("first", mesh.clone(), Vec3::new(-0.6, 0.4, 0.5)));
+    let first = id(&stepped, "first");
+    stepped.rest_until(|stepped| place(stepped, first).is_some());
+    let before = place(&stepped, first);
+    stepped.edit(2, add("second", mesh, Vec3::new(0.6, 0.4, 0.5)));
+    let second = id(&stepped, "second");
+    stepped.steps((1.5 / PERIOD) as usize);
+    stepped.edit(3, Edit::RemoveNode { node: NodeId(first.node) });
+    stepped.rest_until(|stepped| place(stepped, second).is_some());
+    assert_eq!(place(&stepped, second), before);
 }

@@ -14,7 +14,8 @@ use super::point::Point;
 use super::sums::Sum;
 use super::{InstanceId, LightmapSolver, Moved, beyond, instance_of};
 
-/// What has moved gets lumels again once it has rested for so many seconds of scene time.
+/// What has moved gets lumels again once it has rested for so many seconds of scene time. What is gone
+/// leaves its place to others after as long.
 const RESTING: f64 = 2.0;
 
 impl LightmapSolver {
@@ -67,9 +68,14 @@ impl LightmapSolver {
         }
     }
 
-    /// Instances without lumels that have rested long enough to get some.
+    /// Instances without lumels that have rested long enough to get some. They wait until clients know what
+    /// is gone, since they may get its place.
     pub(crate) fn newcomers(&self, time: f64) -> Vec<InstanceId> {
-        let rested = self.newcomers.iter().filter(|(_, at)| time - at.since >= RESTING);
+        let rests = |since: f64| time - since >= RESTING;
+        if self.moved.values().any(|moved| moved.at.is_none() && !rests(moved.since)) {
+            return Vec::new();
+        }
+        let rested = self.newcomers.iter().filter(|(_, at)| rests(at.since));
         rested.map(|(id, _)| *id).collect()
     }
 
