@@ -12,53 +12,16 @@ use glam::{Quat, UVec3, Vec3};
 use lumencast_charts::{laid_out, sheets};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_light::{Grid, Light, Offset, Order};
-use lumencast_scene::{LightKind, LightmapSpec, Material, PunctualLight, Snapshot, VolumeSpec};
+use lumencast_scene::{LightmapSpec, Snapshot, VolumeSpec};
 use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{Bake, Effort, FitOptions, GatherOptions, bake, spread};
-use lumencast_testkit::scenes::{Stage, lambert};
+use lumencast_testkit::walls::{ROOM, parted_room, two_rooms};
 
-/// Sides of each of the two rooms, metres.
-const ROOM: Vec3 = Vec3::new(5.0, 3.0, 5.0);
 /// Thicknesses of the wall, metres.
 const WALLS: [f32; 5] = [0.0, 0.02, 0.05, 0.1, 0.2];
 
 /// A side of a lumel, metres.
 const TEXEL: f32 = 0.1;
-const LAMP: PunctualLight = PunctualLight {
-    kind: LightKind::Point { radius: 0.0 },
-    color: Vec3::ONE,
-    intensity: 100.0,
-    range: None,
-};
-
-/// Two rooms side by side along x, the wall about x = 0, a lamp in the left one.
-fn rooms(wall: f32) -> Arc<Snapshot> {
-    let mut stage = Stage::default();
-    let grey = lambert(Vec3::splat(0.6), Vec3::ZERO);
-    let sheet = stage.material(Material { double_sided: true, ..grey.clone() });
-    let grey = stage.material(grey);
-    let middle = 0.5 * (ROOM.x + wall);
-    if wall == 0.0 {
-        stage.room(Vec3::ZERO, ROOM.with_x(2.0 * ROOM.x), grey);
-        let corner = Vec3::new(0.0, -0.5 * ROOM.y, -0.5 * ROOM.z);
-        stage.quad(corner, Vec3::Y * ROOM.y, Vec3::Z * ROOM.z, sheet);
-    } else {
-        stage.room(Vec3::NEG_X * middle, ROOM, grey);
-        stage.room(Vec3::X * middle, ROOM, grey);
-    }
-    stage.light(LAMP, Vec3::new(-middle, 0.8, 0.3), Vec3::NEG_Y);
-    stage.snapshot()
-}
-
-/// One room, parted by a wall that stands on its floor; the lamp is in the left half.
-fn parted(wall: f32) -> Arc<Snapshot> {
-    let mut stage = Stage::default();
-    let grey = stage.material(lambert(Vec3::splat(0.6), Vec3::ZERO));
-    stage.room(Vec3::ZERO, ROOM.with_x(2.0 * ROOM.x + wall), grey);
-    stage.room(Vec3::ZERO, -ROOM.with_x(wall), grey);
-    stage.light(LAMP, Vec3::new(-0.5 * (ROOM.x + wall), 0.8, 0.3), Vec3::NEG_Y);
-    stage.snapshot()
-}
 
 /// The light of the dark side's lumels, a share of that of the lit side's: the mean over all surfaces,
 /// and over those farther than two lumels from the wall.
@@ -94,7 +57,7 @@ fn main() {
     );
     println!("| --- | --- | --- | --- | --- | --- |");
     for wall in WALLS {
-        let scene = rooms(wall);
+        let scene = two_rooms(wall);
         let size = ROOM.with_x(2.0 * ROOM.x + wall);
         let resolution = size.round().as_uvec3();
         let grid = Grid { center: Vec3::ZERO, rotation: Quat::IDENTITY, size, resolution };
@@ -114,7 +77,7 @@ fn main() {
         let fitted = leaked(Some(FitOptions { points: 256 }), Offset::Cells(0.125), &mut tracer);
         let [lumels, _] = leaked_at_lumels(&scene, wall, &mut tracer);
         let one_floor = match wall > 0.0 {
-            true => leaked_at_lumels(&parted(wall), wall, &mut tracer)
+            true => leaked_at_lumels(&parted_room(wall), wall, &mut tracer)
                 .map(|share| format!("{share:.2} %")),
             false => ["–"; 2].map(str::to_owned),
         };

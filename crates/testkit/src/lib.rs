@@ -6,5 +6,6 @@ pub mod mapped;
 pub mod rooms;
 pub mod scenes;
 pub mod vectors;
+pub mod walls;
 
 pub use link::{Conditions, Link};
