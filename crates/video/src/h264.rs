@@ -172,3 +172,43 @@ fn picture(decoded: &DecodedYUV<'_>) -> Picture {
         ],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use openh264_sys2::{
+        CAMERA_VIDEO_REAL_TIME, CONSTANT_ID, ENCODER_OPTION_SVC_ENCODE_PARAM_EXT,
+        MEDIUM_COMPLEXITY, RC_QUALITY_MODE, SEncParamExt,
+    };
+
+    use super::*;
+
+    /// The library may have its own mind: it is asked for the settings that it goes by.
+    #[test]
+    fn the_library_goes_by_the_settings_that_are_chosen() {
+        let mut encoder = H264Encoder::new(64, 32, Qp(18)).expect("an encoder");
+        let chroma = [vec![128; 32 * 16], vec![128; 32 * 16]];
+        let picture = Picture { width: 64, height: 32, luma: vec![90; 64 * 32], chroma };
+        encoder.encode(&picture, true).expect("a unit");
+        let mut has = SEncParamExt::default();
+        #[expect(unsafe_code, reason = "the wrapper does not tell settings")]
+        // SAFETY: the option takes a pointer to these parameters, and writes them before it returns.
+        let result = unsafe {
+            let api = encoder.encoder.raw_api();
+            api.get_option(ENCODER_OPTION_SVC_ENCODE_PARAM_EXT, (&raw mut has).cast())
+        };
+        assert_eq!(result, 0);
+        assert!(!has.bEnableFrameSkip && !has.bEnableSceneChangeDetect);
+        assert!(!has.bEnableAdaptiveQuant && !has.bEnableBackgroundDetection);
+        assert!(!has.bEnableLongTermReference && !has.bEnableDenoise);
+        assert_eq!((has.iMinQp, has.iMaxQp, has.iRCMode), (18, 18, RC_QUALITY_MODE));
+        assert_eq!((has.iTargetBitrate, has.fMaxFrameRate), (200_000_000, 30.0));
+        assert_eq!(
+            (has.iUsageType, has.iComplexityMode),
+            (CAMERA_VIDEO_REAL_TIME, MEDIUM_COMPLEXITY)
+        );
+        assert_eq!((has.uiIntraPeriod, has.eSpsPpsIdStrategy), (0, CONSTANT_ID));
+        assert_eq!(has.iMultipleThreadIdc, 1);
+        let [layer, ..] = has.sSpatialLayers;
+        assert!(layer.bVideoSignalTypePresent && layer.bFullRange, "full range");
+    }
+}
