@@ -36,6 +36,7 @@ fn fields_are_judged_by_the_reference() {
     let bench = |more: &[&str]| {
         let mut all = vec!["bench", "peers", text(&scenes), "--references", text(&references)];
         all.extend(["--scene", "cornell", "--volume", "4x4x4", "--probe-samples", "512"]);
+        all.extend(["--indirect-spp", "64"]);
         all.extend(more);
         run(&all)
     };
@@ -55,7 +56,7 @@ fn fields_are_judged_by_the_reference() {
     ]);
     assert_eq!(ran.code, Some(0), "{ran:?}");
 
-    let ran = bench(&["--fit", "16", "--json", "-o", text(&pictures)]);
+    let ran = bench(&["--fit", "16", "--lumel-samples", "16", "--json", "-o", text(&pictures)]);
     assert_eq!(ran.code, Some(0), "{ran:?}");
     let report = ran.json();
     let table = &report["scenes"][0];
@@ -76,12 +77,20 @@ fn fields_are_judged_by_the_reference() {
         );
         assert!(field["faults"].as_array().is_some_and(|faults| faults.len() > 2), "{field}");
     }
-    for name in ["reference", "4x4x4-gathered", "4x4x4-fitted", "4x4x4-fitted-difference"] {
+    // Of the indirect part alone, after the filter: a probe cell of half a metre knows less than lumels.
+    let indirect = |row: usize| table["fields"][row]["indirect"]["filtered"].as_f64().expect("dB");
+    assert_eq!(table["fields"][2]["lumels"]["page_size"], 256);
+    assert!(indirect(1) > 15.0 && indirect(2) > indirect(1) + 3.0, "{table}");
+    for name in
+        ["reference", "4x4x4-gathered", "4x4x4-lumels", "4x4x4-fitted", "4x4x4-fitted-difference"]
+    {
         let path = pictures.join(format!("cornell-{name}.png"));
         assert_eq!(Loaded::read(&path).expect("a picture").linear().width(), 320);
     }
-    let words = bench(&["--fit", "0"]).stdout;
+    let words = bench(&["--fit", "0", "--lumel-samples", "0"]).stdout;
     assert!(words.contains("published: 33.8 (35.1) dB") && !words.contains("fitted"), "{words}");
+    let three = "three.js r187, LightMapper: 36.5 (38.9) dB, indirect part 34.3 (37.4) dB";
+    assert!(words.contains(three) && !words.contains("a lumel every"), "{words}");
     run(&["bench", "peers", text(&folder.0), "--references", text(&references)])
         .failed_saying(&["CornellBoxPoint.glb", "not there"]);
 }

@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
+use lumencast_charts::LaidOut;
+use lumencast_gather::path_trace::{CpuPathTracer, Levels, MaterialModel, Options};
 use lumencast_gather::reference::Parts;
 use lumencast_light::Light;
 use lumencast_picture::{Picture, ToneMap};
@@ -21,16 +22,20 @@ use lumencast_solve::Effort;
 use super::drawing::{cells, draw};
 use super::judge::{Judge, covered};
 use super::traced::{self, SIZE, Traced};
-use crate::arguments::{Reading, ReadingArguments, VolumeArgument};
+use crate::arguments::{LightmapArguments, Reading, ReadingArguments, VolumeArgument, Wanted};
+use crate::charting;
 use crate::light_source::Computed;
 use crate::{camera, out_file, output, warnings};
 use reference::References;
-use report::{Fault, Field, Report, Table};
+use report::{Fault, Field, Lumels, Report, Table};
 pub(super) use subjects::SUBJECTS;
 use subjects::{PlaceOfFault, Subject};
 
 /// Samples a probe: 64 updates of 512.
 const PROBE_SAMPLES: u32 = 64 * 512;
+
+/// Samples a lumel.
+const LUMEL_SAMPLES: u32 = 64;
 
 /// Judges our pictures as those of the published implementation were judged: 320×180, all materials
 /// Lambert, against Mitsuba 3.
@@ -41,7 +46,8 @@ Examples:
   lumencast bench peers ../shared/scenes --references refs --scene sponza --volume 30x18x21 --fit 64 -o pictures
 
 Grids are the published ones, over the scenes' bounds, unless others are given. Each is judged as its
-light is gathered and, unless --fit is 0, fitted to surfaces. References are pictures by Mitsuba 3 of
+light is gathered and, unless --fit is 0, fitted to surfaces, and the last one once more with lumels on
+all still surfaces. References are pictures by Mitsuba 3 of
 1024 samples a pixel and 4 bounces, of the first camera. Probes have 3 bounces and 64 × 512 samples
 unless told otherwise. PSNR is of codes v^(1/2.2) clamped to 0 to 1 at exposure 1, over pixels that
 show nothing but surfaces; in brackets after a filter of 4×4 pixels. The indirect part is the picture's
@@ -66,6 +72,12 @@ pub(crate) struct BenchPeers {
     #[arg(long, value_name = "N", default_value_t = PROBE_SAMPLES,
           value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     probe_samples: u32,
+    /// Samples a lumel, where the last grid stands below lumels of still surfaces; 0 for probes alone.
+    #[arg(long, value_name = "N", default_value_t = LUMEL_SAMPLES,
+          value_parser = clap::value_parser!(u32).range(0..=1 << 20))]
+    lumel_samples: u32,
+    #[command(flatten)]
+    lightmap: LightmapArguments,
     /// Bounces of the probes.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=64))]
     bounces: u32,
@@ -108,6 +120,7 @@ impl BenchPeers {
         let report = Report {
             adapter: renderer.gpu().name(),
             probe_samples: self.probe_samples,
+            lumel_samples: self.lumel_samples,
             bounces: self.bounces,
             scenes: tables,
         };
@@ -142,34 +155,28 @@ impl BenchPeers {
         renderer.set_scene(&snapshot);
         let direct = draw(renderer, view, settings, Lighting::DIRECT)?;
 
-        let published = [VolumeArgument { resolution: subject.cells, place: None }];
-        let grids = if self.volumes.is_empty() { &published[..] } else { &self.volumes };
-        let readings = self.reading.compared();
         let mut fields = Vec::new();
-        for grid in grids {
-            let grid = grid.in_scene(&scene).context("--volume")?;
-            for reading in &readings {
-                let light = self.light(&snapshot, grid, *reading)?;
-                renderer.set_light(&light)?;
-                let picture = draw(renderer, view, settings, Lighting::FIELD)?;
-                let how = if reading.fit.is_some() { "fitted" } else { "gathered" };
-                let name = format!("{}-{how}", cells(&grid));
-                self.write(subject, &name, &picture)?;
-                self.write(subject, &format!("{name}-difference"), &judge.difference(&picture))?;
-                fields.push(Field {
-                    grid: cells(&grid),
-                    order: grid.order,
-                    fit: reading.fit.map(|fit| fit.points),
-                    psnr: judge.psnr(&picture)?,
-                    indirect: indirect.psnr(&draw(
-                        renderer,
-                        view,
-                        settings,
-                        Lighting::INDIRECT,
-                    )?)?,
-                    faults: faults(subject, &judge, &picture),
-                });
-            }
+        for Way { grid, reading, lumels } in self.ways(subject, &mut scene)? {
+            renderer.set_light(&self.light(&snapshot, grid, reading, lumels.clone())?)?;
+            let picture = draw(renderer, view, settings, Lighting::FIELD)?;
+            let how = match (&lumels, reading.fit) {
+                (Some(_), _) => "lumels",
+                (None, Some(_)) => "fitted",
+                (None, None) => "gathered",
+            };
+            let name = format!("{}-{how}", cells(&grid));
+            self.write(subject, &name, &picture)?;
+            self.write(subject, &format!("{name}-difference"), &judge.difference(&picture))?;
+            let indirect_part = draw(renderer, view, settings, Lighting::INDIRECT)?;
+            fields.push(Field {
+                grid: cells(&grid),
+                order: grid.order,
+                fit: reading.fit.map(|fit| fit.points),
+                lumels: lumels.as_ref().map(Lumels::of),
+                psnr: judge.psnr(&picture)?,
+                indirect: indirect.psnr(&indirect_part)?,
+                faults: faults(subject, &judge, &picture),
+            });
         }
         Ok(Table {
             scene: subject.name,
@@ -179,14 +186,43 @@ impl BenchPeers {
         })
     }
 
-    fn light(&self, snapshot: &Arc<Snapshot>, grid: VolumeSpec, reading: Reading) -> Result<Light> {
+    /// Each grid in each reading; the last of them once more below lumels.
+    fn ways(&self, subject: &Subject, scene: &mut Scene) -> Result<Vec<Way>> {
+        let published = [VolumeArgument { resolution: subject.cells, place: None }];
+        let grids = if self.volumes.is_empty() { &published[..] } else { &self.volumes };
+        let mut ways = Vec::new();
+        for grid in grids {
+            let grid = grid.in_scene(scene).context("--volume")?;
+            let readings = self.reading.compared().into_iter();
+            ways.extend(readings.map(|reading| Way { grid, reading, lumels: None }));
+        }
+        if self.lumel_samples > 0
+            && let Some(&Way { grid, reading, .. }) = ways.last()
+        {
+            let mut looks = CpuPathTracer::new(Options::default())?;
+            let spec = self.lightmap.spec(scene);
+            let lumels = charting::lay_out(&scene.snapshot(), spec, &mut looks)?;
+            ways.push(Way { grid, reading, lumels });
+        }
+        Ok(ways)
+    }
+
+    fn light(
+        &self,
+        snapshot: &Arc<Snapshot>,
+        grid: VolumeSpec,
+        reading: Reading,
+        lightmap: Option<LaidOut>,
+    ) -> Result<Light> {
         let materials = MaterialModel::Lambert;
         let tracing = Options { materials, threads: None, levels: Levels::One };
-        let effort = Effort::of_samples(self.probe_samples);
+        let lumel_samples = self.lumel_samples.max(1);
+        let effort = Effort { lumel_samples, ..Effort::of_samples(self.probe_samples) };
         let (bounces, clamp) = (self.bounces, f32::INFINITY);
         let computed = Computed { effort, bounces, clamp, reading, tracing };
         let mut gatherer = computed.gatherer()?;
-        Ok(Light::new(computed.volumes(snapshot, &[grid], &mut *gatherer)?.fields))
+        let wanted = Wanted { volumes: vec![grid], lightmap, directional: false };
+        Ok(Light::new(computed.light(snapshot, &wanted, &mut *gatherer)?.fields))
     }
 
     fn write(&self, subject: &Subject, name: &str, picture: &Picture) -> Result<()> {
@@ -194,6 +230,14 @@ impl BenchPeers {
         let path = folder.join(format!("{}-{name}.png", subject.name));
         Ok(picture.write_png(path, ToneMap::Gamma, 1.0)?)
     }
+}
+
+/// A way to hold indirect light.
+struct Way {
+    grid: VolumeSpec,
+    reading: Reading,
+    /// Lumels of still surfaces, where they take light from these.
+    lumels: Option<LaidOut>,
 }
 
 fn faults(subject: &'static Subject, judge: &Judge, picture: &Picture) -> Vec<Fault> {

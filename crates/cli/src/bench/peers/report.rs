@@ -2,6 +2,7 @@
 
 use std::fmt::{self, Write};
 
+use lumencast_charts::LaidOut;
 use lumencast_light::Order;
 use serde::Serialize;
 
@@ -12,6 +13,7 @@ use crate::bench::judge::{Deviation, Psnr};
 pub(super) struct Report {
     pub(super) adapter: String,
     pub(super) probe_samples: u32,
+    pub(super) lumel_samples: u32,
     pub(super) bounces: u32,
     pub(super) scenes: Vec<Table>,
 }
@@ -32,10 +34,34 @@ pub(super) struct Field {
     pub(super) order: Order,
     /// Points a probe that it is fitted to, if it is.
     pub(super) fit: Option<u32>,
+    /// Lumels that still surfaces take their light from in place of probes.
+    pub(super) lumels: Option<Lumels>,
     pub(super) psnr: Psnr,
     /// Of its indirect part alone, beside the path tracer's.
     pub(super) indirect: Psnr,
     pub(super) faults: Vec<Fault>,
+}
+
+/// How many lumels there are, and how large they are.
+#[derive(Serialize)]
+pub(super) struct Lumels {
+    pages: u32,
+    page_size: u32,
+    /// Metres.
+    texel: f32,
+}
+
+impl Lumels {
+    pub(super) fn of(LaidOut { layout, texel, .. }: &LaidOut) -> Self {
+        Self { pages: layout.pages, page_size: layout.page_size, texel: *texel }
+    }
+}
+
+impl fmt::Display for Lumels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { pages, page_size, texel } = self;
+        write!(f, "{pages} × {page_size}², a lumel every {:.1} cm", 100.0 * texel)
+    }
 }
 
 #[derive(Serialize)]
@@ -52,8 +78,10 @@ impl Report {
             // Writing to a string does not fail.
             let _ = table.write(&mut text);
         }
-        let (samples, adapter) = (self.probe_samples, &self.adapter);
-        text + &format!("{samples} samples a probe, {} bounces; {adapter}\n", self.bounces)
+        let Self { adapter, probe_samples, lumel_samples, bounces, .. } = self;
+        text + &format!(
+            "{probe_samples} samples a probe, {lumel_samples} a lumel, {bounces} bounces; {adapter}\n"
+        )
     }
 }
 
@@ -71,8 +99,9 @@ impl Table {
                 Some(points) => format!("fitted to {points} points a probe"),
                 None => "as gathered".to_owned(),
             };
+            let lumels = field.lumels.as_ref().map_or_else(String::new, |of| format!(", {of}"));
             let order = u8::from(field.order);
-            writeln!(out, "  {} L{order}, {how}: {}, {above:+.1}", field.grid, field.psnr)?;
+            writeln!(out, "  {} L{order}, {how}{lumels}: {}, {above:+.1}", field.grid, field.psnr)?;
             writeln!(out, "    indirect part {}", field.indirect)?;
             for Fault { fault, deviation: Deviation { mean, rms } } in &field.faults {
                 let [r, g, b] = mean.to_array();
