@@ -341,6 +341,12 @@ impl Cells {
         self.cells.partition_point(|cell| cell.receivers.end <= receiver)
     }
 
+    /// Whether a receiver is one of those that a block's first turns take.
+    pub(crate) fn is_of_first_turns(&self, receiver: u32) -> bool {
+        let Cell { receivers, first_turns, .. } = &self.cells[self.cell_of(receiver)];
+        receiver - receivers.start < *first_turns
+    }
+
     /// The receivers of a cell.
     pub(crate) fn receivers_of(&self, cell: usize) -> Range<usize> {
         let Range { start, end } = self.cells[cell].receivers;

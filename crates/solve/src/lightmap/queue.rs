@@ -21,6 +21,14 @@ impl Queue {
         self.blocks.remove(block);
     }
 
+    pub(crate) fn len(&self) -> usize {
+        self.blocks.len()
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.blocks.is_empty()
+    }
+
     /// All that wait.
     pub(crate) fn all(&self) -> impl Iterator<Item = &Block> {
         self.blocks.iter()

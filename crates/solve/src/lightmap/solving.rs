@@ -77,24 +77,29 @@ impl LightmapSolver {
             self.due.take_all();
             return self.news.take_all();
         }
-        let mut next = self.news.take(most - most.div_ceil(LEFT));
+        let left = most.div_ceil(LEFT).min(self.due.len());
+        let mut next = self.news.take(most - left);
         let others = DUE_AT_ONCE.max(self.readers.len().div_ceil(DUE_WITHIN));
         next.iter().chain(self.news.all()).for_each(|block| self.due.remove(block));
         next.extend(self.due.take(others.min(most - next.len())));
         next
     }
 
-    /// Lets blocks that nothing is known of show the light of probes, some at a time, until samples come.
+    /// Lets blocks that nothing is known of show the light of probes, some at a time, until samples come;
+    /// again where no other blocks wait.
     fn show_probes(&mut self, probes: &Light, shown: &mut Lightmap) {
         if probes.volumes().next().is_none() {
             return;
         }
-        let Self { dark, unknown, ripening, .. } = self;
+        let Self { dark, unknown, ripening, news, .. } = self;
         dark.retain(|block| !ripening.is_solved(block));
         unknown.retain(|block| !ripening.is_solved(block));
-        let next: Vec<Block> = match dark.is_empty() {
-            true => unknown.drain(..UNKNOWN_AT_ONCE.min(unknown.len())).collect(),
-            false => dark.drain(..DARK_AT_ONCE.min(dark.len())).collect(),
+        let next: Vec<Block> = if !dark.is_empty() {
+            dark.drain(..DARK_AT_ONCE.min(dark.len())).collect()
+        } else if news.is_empty() {
+            unknown.drain(..UNKNOWN_AT_ONCE.min(unknown.len())).collect()
+        } else {
+            Vec::new()
         };
         unknown.extend(&next);
         let told: Vec<Vec<Vec3>> =
@@ -104,13 +109,15 @@ impl LightmapSolver {
         }
     }
 
-    /// The irradiance of probes at the lumels of a block, row by row.
+    /// The irradiance of probes at the lumels of a block, row by row: at those of a block's first turns, and
+    /// between them.
     fn told_by_probes(&self, block: &Block, probes: &Light) -> Vec<Vec3> {
         let size = self.layout.page_size;
         let receiver = |number: u32| {
             let at = block.corner() + UVec2::new(number % BLOCK, number / BLOCK);
             let is_on_page = at.max_element() < size;
-            beyond::own(is_on_page.then(|| self.receiver_of[self.layout.index(block.page, at)])?)
+            let entry = is_on_page.then(|| self.receiver_of[self.layout.index(block.page, at)])?;
+            beyond::own(entry).filter(|receiver| self.cells.is_of_first_turns(*receiver))
         };
         let told = |receiver: u32| {
             let point = &self.points[receiver as usize];
