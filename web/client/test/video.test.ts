@@ -5,6 +5,7 @@ import type { Planes } from '../src/api.js';
 import type { VideoFormat } from '../src/cache/picture-decoder.js';
 import { codecOf } from '../src/video/access-unit.js';
 import { DecoderPool, type DecoderWorker, videoDecoders } from '../src/video/decoders.js';
+import { MOST_BYTES, MOST_KEPT } from '../src/video/group.js';
 import { planesOf, type RawPicture } from '../src/video/planes.js';
 import { RegionDecoder } from '../src/video/region-decoder.js';
 import { type Answer, DecoderService, type Question } from '../src/video/service.js';
@@ -15,7 +16,7 @@ const FORMAT: VideoFormat = { coding: 'h264', pageSize: 20 };
 
 beforeEach(() => {
   FakeVideoDecoder.made = [];
-  FakeVideoDecoder.fails = undefined;
+  FakeVideoDecoder.fails = () => false;
   FakeVideoDecoder.open = 0;
   vi.stubGlobal('VideoDecoder', FakeVideoDecoder);
   vi.stubGlobal('EncodedVideoChunk', FakeChunk);
@@ -70,20 +71,38 @@ describe('planes', () => {
 });
 
 describe('a decoder of a region', () => {
-  let now: number;
   let decoder: RegionDecoder;
 
   beforeEach(() => {
-    now = 0;
-    decoder = new RegionDecoder(FORMAT, () => now);
+    vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout'] });
+    decoder = new RegionDecoder(FORMAT);
+  });
+
+  afterEach(() => {
+    decoder.close();
+    expect(vi.getTimerCount(), 'timers of a decoder that is closed').toBe(0);
+    vi.useRealTimers();
   });
 
   const made = () => FakeVideoDecoder.made;
   const newest = () => made()[made().length - 1];
+  const kinds = () => made().map(({ config }) => config?.hardwareAcceleration);
+  const marks = () => newest().chunks.map(({ data }) => data[data.length - 1]);
+  const key = (mark: number) => decoder.decode(accessUnit(true, mark), true);
+  const delta = (mark: number) => decoder.decode(accessUnit(false, mark), false);
+  /** Pictures have been copied. */
+  const copied = () => new Promise<void>((resolve) => setImmediate(resolve));
 
   /** The oldest picture that has not come. */
   function output(from = newest(), picture = rawPage('I420', FORMAT)): void {
     from.output(from.chunks.shift()!, picture);
+  }
+
+  /** The oldest picture that has not come, of which the first lumel is the last byte of its unit. */
+  function outputMarked(): void {
+    const picture = rawPage('I420', FORMAT);
+    picture.bytes[0] = marks()[0];
+    output(newest(), picture);
   }
 
   it('is made for the codec of the first keyframe, for little delay', async () => {
@@ -123,76 +142,161 @@ describe('a decoder of a region', () => {
     expect((await decoded[2])?.width).toBe(20);
   });
 
-  it('that fails gives nothing until the next keyframe, which another kind decodes', async () => {
-    const lost = [decoder.decode(accessUnit(true, 1), true), decoder.decode(accessUnit(false, 2), false)];
+  it('that fails is replaced at once, by one that begins with the group', async () => {
+    const before = [key(1), delta(2)];
+    for (let i = 0; i < 2; i++) output();
+    await Promise.all(before);
+    const decoded = [delta(3), delta(4)];
+    made()[0].fail();
+    expect(kinds()).toEqual(['no-preference', 'prefer-software']);
+    decoded.push(delta(5));
+    expect(marks()).toEqual([1, 2, 3, 4, 5]);
+    expect(newest().chunks.map(({ type }) => type)).toEqual(['key', 'delta', 'delta', 'delta', 'delta']);
+    while (newest().chunks.length > 0) outputMarked();
+    expect((await Promise.all(decoded)).map((planes) => planes?.y[0])).toEqual([3, 4, 5]);
+    // The other way round in the next group.
+    const next = key(6);
     newest().fail();
-    lost.push(decoder.decode(accessUnit(false, 3), false));
+    expect([kinds()[2], marks()]).toEqual(['no-preference', [6]]);
+    outputMarked();
+    expect((await next)?.y[0]).toBe(6);
+  });
+
+  it('that fails while nothing waits is replaced too', async () => {
+    const first = key(1);
+    output();
+    await first;
+    newest().fail();
+    expect(vi.getTimerCount()).toBe(0);
+    const second = delta(2);
+    expect([kinds()[1], marks()]).toEqual(['prefer-software', [1, 2]]);
+    while (newest().chunks.length > 0) outputMarked();
+    expect((await second)?.y[0]).toBe(2);
+  });
+
+  it('that fails in a group has no pictures of the groups before', async () => {
+    const [lost, decoded] = [key(1), key(2)];
+    newest().fail();
+    expect(await lost).toBeUndefined();
+    expect(marks()).toEqual([2]);
+    outputMarked();
+    expect((await decoded)?.y[0]).toBe(2);
+  });
+
+  it.each([
+    ['fail', () => newest().fail()],
+    ['give nothing', () => void vi.advanceTimersByTime(1000)],
+  ])('of which both kinds %s gives nothing until the next keyframe', async (_, end) => {
+    const lost = [key(1), delta(2)];
+    end();
+    expect(kinds()).toEqual(['no-preference', 'prefer-software']);
+    end();
+    lost.push(delta(3));
     expect(await Promise.all(lost)).toEqual([undefined, undefined, undefined]);
-    const next = decoder.decode(accessUnit(true, 4), true);
-    expect(newest().config?.hardwareAcceleration).toBe('prefer-software');
-    output();
-    expect((await next)?.width).toBe(20);
-    newest().fail();
-    const last = decoder.decode(accessUnit(true, 5), true);
-    expect(newest().config?.hardwareAcceleration).toBe('no-preference');
-    decoder.close();
-    expect(await last).toBeUndefined();
-  });
-
-  it.each(['configure', 'decode'] as const)('that fails to %s is given up', async (fails) => {
-    FakeVideoDecoder.fails = fails;
-    expect(await decoder.decode(accessUnit(true, 1), true)).toBeUndefined();
-    expect(await decoder.decode(accessUnit(false, 2), false)).toBeUndefined();
-    FakeVideoDecoder.fails = undefined;
-    const next = decoder.decode(accessUnit(true, 3), true);
-    expect(newest().config?.hardwareAcceleration).toBe('prefer-software');
+    expect([made().length, newest().state, vi.getTimerCount()]).toEqual([2, 'closed', 0]);
+    const next = key(4);
+    expect(kinds()[2]).toBe('no-preference');
+    // Both are tried again.
+    end();
+    expect([kinds()[3], marks()]).toEqual(['prefer-software', [4]]);
     output();
     expect((await next)?.width).toBe(20);
   });
 
-  it('whose pictures lie otherwise in memory is given up', async () => {
+  it.each(['configure', 'decode'] as const)('that fails to %s is replaced', async (failing) => {
+    FakeVideoDecoder.fails = (call, kind) => call === failing && kind === 'no-preference';
+    const decoded = key(1);
+    expect([made().length, made()[0].state, marks()]).toEqual([2, 'closed', [1]]);
+    output();
+    expect((await decoded)?.width).toBe(20);
+    FakeVideoDecoder.fails = (call) => call === failing;
+    expect(await decoder.decode(accessUnit(true, 2, [0x4d, 0x00, 0x28]), true)).toBeUndefined();
+    expect(await delta(3)).toBeUndefined();
+    FakeVideoDecoder.fails = () => false;
+    const next = key(4);
+    output();
+    expect((await next)?.width).toBe(20);
+  });
+
+  it('whose pictures lie otherwise in memory is replaced', async () => {
     for (const picture of [
       { ...rawPage('I420', FORMAT), format: 'RGBA' },
       { ...rawPage('I420', FORMAT), format: null },
       rawPage('I420', { ...FORMAT, pageSize: 16 }),
     ]) {
-      const decoded = decoder.decode(accessUnit(true, 1), true);
+      const decoded = key(1);
       const from = newest();
       output(from, picture);
-      expect(await decoded).toBeUndefined();
+      await copied();
       expect(from.state).toBe('closed');
+      output();
+      expect((await decoded)?.width).toBe(20);
     }
   });
 
-  it('that gives nothing for a second is replaced at the next keyframe', async () => {
-    const lost = [decoder.decode(accessUnit(true, 1), true)];
-    now = 1000;
-    lost.push(decoder.decode(accessUnit(false, 2), false));
-    now = 1001;
-    lost.push(decoder.decode(accessUnit(false, 3), false));
-    expect(await Promise.all(lost)).toEqual([undefined, undefined, undefined]);
-    expect(newest().state).toBe('closed');
-    const next = decoder.decode(accessUnit(true, 4), true);
-    expect(newest().config?.hardwareAcceleration).toBe('prefer-software');
-    output();
-    expect((await next)?.width).toBe(20);
+  it('that gives nothing for a second is replaced, though no unit comes', async () => {
+    const first = key(1);
+    vi.advanceTimersByTime(900);
+    const second = delta(2);
+    vi.advanceTimersByTime(99);
+    expect(kinds()).toEqual(['no-preference']);
+    vi.advanceTimersByTime(1);
+    expect(kinds()).toEqual(['no-preference', 'prefer-software']);
+    expect(made()[0].state).toBe('closed');
+    expect(marks()).toEqual([1, 2]);
+    // The new one has a second of its own.
+    vi.advanceTimersByTime(999);
+    for (let i = 0; i < 2; i++) outputMarked();
+    expect((await Promise.all([first, second])).map((planes) => planes?.y[0])).toEqual([1, 2]);
+    // It stays.
+    void key(3);
+    expect(made().length).toBe(2);
   });
 
   it('that gives something is not, however late it is', async () => {
     const decoded = Array.from({ length: 30 }, (_, i) => {
-      now = 100 * i;
-      const picture = decoder.decode(accessUnit(i === 0, i), i === 0);
+      const picture = i === 0 ? key(i) : delta(i);
+      vi.advanceTimersByTime(100);
       if (i % 5 === 4) output();
       return picture;
     });
     while (newest().chunks.length > 0) output();
     expect((await Promise.all(decoded)).every((picture) => picture?.width === 20)).toBe(true);
-    expect(made().length).toBe(1);
     // Nor one that had nothing to do.
-    now = 60_000;
-    const last = decoder.decode(accessUnit(false, 30), false);
+    expect(vi.getTimerCount()).toBe(0);
+    vi.advanceTimersByTime(60_000);
+    const last = delta(30);
+    vi.advanceTimersByTime(999);
     output();
     expect((await last)?.width).toBe(20);
+    expect(made().length).toBe(1);
+  });
+
+  it.each([
+    ['of as many units as are kept is', MOST_KEPT, 0, true],
+    ['of more units is not', MOST_KEPT + 1, 0, false],
+    ['of more bytes is not', 2, MOST_BYTES, false],
+  ])('that fails in a group %s replaced at once', async (_, units, bytes, replaced) => {
+    const first = key(0);
+    output();
+    await first;
+    for (let i = 1; i + 1 < units; i++) {
+      const decoded = delta(i);
+      output();
+      await decoded;
+    }
+    const unit = new Uint8Array(accessUnit(false, 9).length + bytes);
+    unit.set(accessUnit(false, 9));
+    const last = decoder.decode(unit, false);
+    newest().fail();
+    expect(made().length).toBe(replaced ? 2 : 1);
+    if (replaced) expect(newest().chunks.length).toBe(units);
+    while (replaced && newest().chunks.length > 0) output();
+    expect((await last)?.width).toBe(replaced ? 20 : undefined);
+    const next = key(1);
+    expect(kinds()).toEqual(['no-preference', 'prefer-software']);
+    output();
+    expect((await next)?.width).toBe(20);
   });
 
   it('takes no more than a group of units at a time', async () => {
@@ -203,6 +307,16 @@ describe('a decoder of a region', () => {
     expect(newest().config?.hardwareAcceleration).toBe('no-preference');
     output();
     expect((await next)?.width).toBe(20);
+  });
+
+  it('waits for nothing once it is closed', async () => {
+    const lost = key(1);
+    expect(vi.getTimerCount()).toBe(1);
+    decoder.close();
+    expect(vi.getTimerCount()).toBe(0);
+    vi.advanceTimersByTime(10_000);
+    expect(await lost).toBeUndefined();
+    expect(made().length).toBe(1);
   });
 
   it('closes pictures that come too late', async () => {

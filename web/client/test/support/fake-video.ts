@@ -18,13 +18,17 @@ export class FakeChunk {
   constructor({ type, timestamp, data }: { type: string; timestamp: number; data: Uint8Array }) {
     [this.type, this.timestamp, this.data] = [type, timestamp, data];
   }
+
+  get byteLength(): number {
+    return this.data.length;
+  }
 }
 
 /** A decoder of WebCodecs of which a test holds the other end. */
 export class FakeVideoDecoder {
   static made: FakeVideoDecoder[] = [];
-  /** How the next ones fail, if they do. */
-  static fails: 'configure' | 'decode' | undefined;
+  /** Whether a call fails, of decoders with this `hardwareAcceleration`. */
+  static fails: (call: 'configure' | 'decode', kind: string) => boolean = () => false;
   state: 'unconfigured' | 'configured' | 'closed' = 'unconfigured';
   config: { codec: string; hardwareAcceleration: string; optimizeForLatency: boolean } | undefined;
   readonly chunks: FakeChunk[] = [];
@@ -36,14 +40,16 @@ export class FakeVideoDecoder {
   }
 
   configure(config: NonNullable<FakeVideoDecoder['config']>): void {
-    if (FakeVideoDecoder.fails === 'configure') throw new TypeError('no such codec');
+    if (FakeVideoDecoder.fails('configure', config.hardwareAcceleration))
+      throw new TypeError('no such codec');
     this.config = config;
     this.state = 'configured';
   }
 
   decode(chunk: FakeChunk): void {
-    if (this.state !== 'configured') throw new TypeError(`a decoder that is ${this.state}`);
-    if (FakeVideoDecoder.fails === 'decode') throw new TypeError('no such chunk');
+    if (this.state !== 'configured' || !this.config) throw new TypeError(`a decoder that is ${this.state}`);
+    if (FakeVideoDecoder.fails('decode', this.config.hardwareAcceleration))
+      throw new TypeError('no such chunk');
     this.chunks.push(chunk);
   }
 
