@@ -1,26 +1,28 @@
 //! Lumels while a scene is live: stepped by hand, without network.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+mod common;
+
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::time::Duration;
 
+use common::{PERIOD, dim, mail, tracer};
 use glam::Vec3;
 use lumencast_charts::{LaidOut, laid_out, lumels_on_pages, sheets};
 use lumencast_codec::{
-    Catalog, EncodedRegion, Epoch, FrameHead, LayoutResource, LightmapShape, LumelCoding,
-    LumelDecoder, Qp, Resource, ResourceHash, read_charts,
+    Catalog, EncodedRegion, FrameHead, LayoutResource, LightmapShape, LumelCoding, LumelDecoder,
+    Qp, Resource, ResourceHash, read_charts,
 };
-use lumencast_gather::path_trace::{CpuPathTracer, Options};
+use lumencast_gather::path_trace::CpuPathTracer;
 use lumencast_gather::{Gather, Gathered, Job, Progress, Receiver, Ticket};
 use lumencast_light::{Layout, Lightmap, SurfaceId, luminance};
 use lumencast_scene::{
-    AnimationId, Edit, InstanceSource, LightSpec, LightmapSpec, NodeId, NodeName, Playback, Scene,
-    Snapshot, Transform,
+    AnimationId, Edit, InstanceSource, LightmapSpec, NodeId, NodeName, Playback, Scene, Snapshot,
+    Transform,
 };
-use lumencast_server::{Mail, Outlet, Received, SampleRange, Tick, TickOptions};
+use lumencast_server::{Mail, Outlet, SampleRange, TickOptions};
 use lumencast_solve::{Bake, Effort, GatherOptions, bake, spread};
 
-const PERIOD: f64 = 0.04;
 /// Ticks of a second and more, in which light has followed a change.
 const LONG: usize = 40;
 
@@ -53,11 +55,7 @@ impl Outlet for Kept {
     }
 }
 
-struct Stepped {
-    tick: Tick,
-    kept: Kept,
-    now: f64,
-}
+type Stepped = common::Stepped<Kept>;
 
 impl Stepped {
     /// A cornell that stands still, with a small page.
@@ -67,8 +65,7 @@ impl Stepped {
 
     /// The same, whose lumels are sent so.
     fn coded(lumel_coding: LumelCoding) -> Self {
-        let tracer = CpuPathTracer::new(Options::default()).expect("threads");
-        let mut stepped = Self::gathering(lumel_coding, Box::new(tracer));
+        let mut stepped = Self::gathering(lumel_coding, Box::new(tracer()));
         let playback = Playback { playing: Some(false), ..Playback::default() };
         stepped.edit(1, Edit::SetAnimation { animation: AnimationId(0), playback });
         stepped
@@ -89,20 +86,6 @@ impl Stepped {
         Self::of(scene, gatherer, options)
     }
 
-    fn of(scene: Scene, gatherer: Box<dyn Gather>, options: TickOptions) -> Self {
-        let tick = Tick::new(scene, gatherer, options, Epoch(7)).expect("a tick");
-        Self { tick, kept: Kept::default(), now: 0.0 }
-    }
-
-    fn step(&mut self, mail: Mail) {
-        self.tick.step(self.now, mail, &mut self.kept);
-        self.now += PERIOD;
-    }
-
-    fn steps(&mut self, n: usize) {
-        (0..n).for_each(|_| self.step(Mail::default()));
-    }
-
     /// Steps until something is so, which takes two seconds of rest and not many ticks more.
     fn rest_until(&mut self, is_so: impl Fn(&Self) -> bool) {
         self.steps((2.0 / PERIOD) as usize - 2);
@@ -116,13 +99,7 @@ impl Stepped {
     }
 
     fn edit(&mut self, seq: u64, edit: Edit) {
-        let received = Received { client: "a".into(), seq, edit, temporary: false };
-        let acks = BTreeMap::from([("a".into(), seq)]);
-        self.step(Mail { edits: vec![received], acks, ..Mail::default() });
-    }
-
-    fn node(&self, name: &str) -> NodeId {
-        self.tick.scene().nodes().find(|node| node.name == name).expect(name).id
+        self.step(mail(seq, edit));
     }
 
     fn lightmap(&self) -> &Lightmap {
@@ -155,8 +132,7 @@ fn converged(scene: &Arc<Snapshot>) -> Lightmap {
     let effort = Effort::of_samples(512);
     let (lightmap, options) = (Some(&lightmap), GatherOptions::default());
     let wanted = Bake { scene, volumes: &[], lightmap, effort, options };
-    let mut tracer = CpuPathTracer::new(Options::default()).expect("threads");
-    let baked = bake(wanted, &mut tracer, |_| ()).expect("light");
+    let baked = bake(wanted, &mut tracer(), |_| ()).expect("light");
     baked.fields[0].as_lightmap().expect("lumels").clone()
 }
 
@@ -172,10 +148,6 @@ fn difference(lightmap: &Lightmap, right: &Lightmap) -> f32 {
         }
     }
     (squares / count as f32).sqrt() / (sum / count as f32)
-}
-
-fn dim(node: NodeId, intensity: f32) -> Edit {
-    Edit::SetLight { node, light: LightSpec { intensity: Some(intensity), ..LightSpec::default() } }
 }
 
 fn moved(node: NodeId, x: f32) -> Edit {
@@ -220,8 +192,7 @@ impl Gather for Reluctant {
 /// Ticks wait for probes, and never for lumels, however long these take.
 #[test]
 fn live_ticks_do_not_wait_for_lumels() {
-    let inner = CpuPathTracer::new(Options::default()).expect("threads");
-    let reluctant = Reluctant { inner, lumels: HashSet::new() };
+    let reluctant = Reluctant { inner: tracer(), lumels: HashSet::new() };
     let mut stepped = Stepped::gathering(LumelCoding::Halves, Box::new(reluctant));
     for _ in 0..5 {
         stepped.now += PERIOD;
@@ -395,8 +366,7 @@ fn what_is_added_to_nothing_gets_lumels() {
         lumel_coding: LumelCoding::Halves,
         ..TickOptions::default()
     };
-    let tracer = Box::new(CpuPathTracer::new(Options::default()).expect("threads"));
-    let mut stepped = Stepped::of(scene, tracer, options);
+    let mut stepped = Stepped::of(scene, Box::new(tracer()), options);
     stepped.steps(5);
     let source = InstanceSource::Mesh(meshes[0].1);
     stepped.edit(1, add("a wall", source, Vec3::ZERO));
