@@ -65,14 +65,20 @@ fn a_window_opens_and_shows_a_picture() {
 #[test]
 fn pictures_of_a_field_and_a_server_need_no_display() {
     let folder = Folder::new("view");
-    let field = folder.0.join("cornell.light");
-    let field = field.to_str().expect("text");
-    let baked = run(&["bake", "cornell", "--volume", "3x3x3", "--samples", "64", "-o", field]);
-    assert_eq!(baked.code, Some(0), "{baked:?}");
+    let [field, probes] = ["lumels", "probes"].map(|name| {
+        let path = folder.0.join(format!("{name}.light"));
+        path.to_str().expect("text").to_owned()
+    });
+    let bake = ["bake", "cornell", "--volume", "3x3x3", "--samples", "64", "-o"];
+    for own in [&[&*field][..], &[&probes, "--fields", "volume"]] {
+        let baked = run(&[&bake[..], own].concat());
+        assert_eq!(baked.code, Some(0), "{baked:?}");
+    }
     let server = Serving::start("cornell", &["--volume", "3x3x3"]);
     let url = format!("http://{}/cornell", server.address);
     for (name, what) in [
-        ("saved", &["cornell", "--light", field][..]),
+        ("saved", &["cornell", "--light", &field][..]),
+        ("probes", &["cornell", "--light", &probes]),
         ("here", &["cornell", "--volume", "3x3x3"]),
         ("server", &[&url]),
     ] {
@@ -86,6 +92,14 @@ fn pictures_of_a_field_and_a_server_need_no_display() {
         let (red, green) = colored(&picture);
         assert!(red > 1000 && green > 1000, "{name}: {red} red and {green} green pixels");
     }
+    // Lumels take the place of probes on what stands still.
+    let [saved, probes] = ["saved", "probes"].map(|name| {
+        let path = folder.0.join(format!("{name}.png"));
+        Loaded::read(&path).expect("a picture").linear()
+    });
+    let both = saved.pixels().iter().zip(probes.pixels());
+    let others = both.filter(|(a, b)| (0..3).any(|k| (a[k] - b[k]).abs() > 0.02)).count();
+    assert!(others > 2000, "{others} pixels differ");
 }
 
 /// The edit that puts a scene under a picture reads it after the scene was loaded.
