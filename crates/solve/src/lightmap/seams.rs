@@ -60,10 +60,7 @@ pub(crate) struct Seams {
 }
 
 /// Some seams, in parts that share no lumel.
-pub(crate) struct Stitches {
-    parts: Vec<Points>,
-    rounds: u32,
-}
+pub(crate) struct Stitches(Vec<Points>);
 
 /// A side of an edge: its ends on a page, in the order of their positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,9 +95,8 @@ impl Seams {
         size_of_val(&*self.all.lumels) + size_of_val(&*self.all.points) + of_block
     }
 
-    /// The seams that lumels of blocks take part in, to be closed in so many rounds at most; blocks are told
-    /// by their numbers.
-    pub(crate) fn about(&self, blocks: impl Iterator<Item = usize>, rounds: u32) -> Stitches {
+    /// The seams that lumels of blocks take part in; blocks are told by their numbers.
+    pub(crate) fn about(&self, blocks: impl Iterator<Item = usize>) -> Stitches {
         let of_blocks = blocks.filter_map(|block| self.of_block.get(block)).flatten();
         let mut numbers: Vec<u32> = of_blocks.copied().collect();
         numbers.sort_unstable();
@@ -134,28 +130,44 @@ impl Seams {
             });
             part.points.push(own);
         }
-        Stitches { parts, rounds }
+        Stitches(parts)
     }
 }
 
 impl Stitches {
-    /// Closes the seams of the light of all pages. `is_known` tells of a lumel whether its light is its
-    /// own. Lumels that take no part stay as they are.
-    pub(crate) fn close(&self, light: &mut [Vec3], is_known: impl Fn(u32) -> bool + Sync) {
-        self.close_above(0.0, light, is_known);
+    /// Closes the seams of the light of all pages, in so many rounds at most. `is_known` tells of a lumel
+    /// whether its light is its own. Lumels that take no part stay as they are.
+    pub(crate) fn close(
+        &self,
+        rounds: u32,
+        light: &mut [Vec3],
+        is_known: impl Fn(u32) -> bool + Sync,
+    ) {
+        self.close_above(0.0, rounds, light, is_known);
     }
 
     /// The same for what is told of light, such as slopes, which may be below 0.
-    pub(crate) fn close_signed(&self, told: &mut [Vec3], is_known: impl Fn(u32) -> bool + Sync) {
-        self.close_above(f32::NEG_INFINITY, told, is_known);
+    pub(crate) fn close_signed(
+        &self,
+        rounds: u32,
+        told: &mut [Vec3],
+        is_known: impl Fn(u32) -> bool + Sync,
+    ) {
+        self.close_above(f32::NEG_INFINITY, rounds, told, is_known);
     }
 
     /// Closes seams, where nothing falls below `least`.
-    fn close_above(&self, least: f32, light: &mut [Vec3], is_known: impl Fn(u32) -> bool + Sync) {
+    fn close_above(
+        &self,
+        least: f32,
+        rounds: u32,
+        light: &mut [Vec3],
+        is_known: impl Fn(u32) -> bool + Sync,
+    ) {
         let shown: &[Vec3] = light;
-        let closed = |part: &Points| part.closed(shown, &is_known, least, self.rounds);
-        let closed: Vec<Vec<Vec3>> = self.parts.par_iter().map(closed).collect();
-        for (part, closed) in self.parts.iter().zip(closed) {
+        let closed = |part: &Points| part.closed(shown, &is_known, least, rounds);
+        let closed: Vec<Vec<Vec3>> = self.0.par_iter().map(closed).collect();
+        for (part, closed) in self.0.iter().zip(closed) {
             for (lumel, closed) in part.lumels.iter().zip(closed) {
                 light[*lumel as usize] = closed;
             }
@@ -416,7 +428,7 @@ mod tests {
         let noise = |k: usize| 0.1 * ((k * 7919) % 13) as f32 / 13.0;
         let before: Vec<Vec3> = (0..32 * 32).map(|k| light(k) + noise(k)).collect();
         let mut after = before.clone();
-        seams.about(0..1, LIVE_ROUNDS).close(&mut after, |lumel| lumel % 32 != 8);
+        seams.about(0..1).close(LIVE_ROUNDS, &mut after, |lumel| lumel % 32 != 8);
         let (was, is) = (worst(&read(&layout, &before)), worst(&read(&layout, &after)));
         assert!(was > 0.1 && is < 0.01, "{was} → {is}");
         let changed = before.iter().zip(&after).filter(|(a, b)| a != b).count();
@@ -438,16 +450,15 @@ mod tests {
         // The second square lies in two blocks, one above the other.
         let (scene, layout) = halves_at(Vec2::new(15.6, 60.1), 128, 0.0);
         let seams = Seams::new(&scene, &layout);
-        let count =
-            |seams: &Stitches| seams.parts.iter().map(|part| part.points.len()).sum::<usize>();
-        assert_eq!(count(&seams.about(0..0, LIVE_ROUNDS)), 0);
-        assert_eq!(count(&seams.about(0..4, LIVE_ROUNDS)), seams.all.points.len());
-        let some = seams.about(2..4, LIVE_ROUNDS);
+        let count = |seams: &Stitches| seams.0.iter().map(|part| part.points.len()).sum::<usize>();
+        assert_eq!(count(&seams.about(0..0)), 0);
+        assert_eq!(count(&seams.about(0..4)), seams.all.points.len());
+        let some = seams.about(2..4);
         assert!(0 < count(&some) && count(&some) < seams.all.points.len(), "{}", count(&some));
         let light = |k: usize| Vec3::splat(if k % 128 < 12 { 1.0 } else { 1.2 });
         let before: Vec<Vec3> = (0..128 * 128).map(light).collect();
         let mut after = before.clone();
-        some.close(&mut after, |_| true);
+        some.close(LIVE_ROUNDS, &mut after, |_| true);
         let [was, is] = [&before, &after].map(|light| read(&layout, light));
         let closed = is.iter().filter(|[a, b]| (a - b).abs() < 0.01).count();
         assert!(worst(&was) > 0.1 && (5..45).contains(&closed), "{closed} of 51");
@@ -461,7 +472,7 @@ mod tests {
         let points = vec![point(0), point(20), point(4), point(16)];
         let all = Points { lumels: (100..128).collect(), points };
         let seams = Seams { all, of_block: vec![vec![0, 1, 2, 3]] };
-        let Stitches { parts, .. } = seams.about(0..1, LIVE_ROUNDS);
+        let Stitches(parts) = seams.about(0..1);
         let lumels: Vec<Vec<u32>> = parts.iter().map(|part| part.lumels.clone()).collect();
         assert_eq!(parts.iter().map(|part| part.points.len()).collect::<Vec<_>>(), [2, 2]);
         assert_eq!(lumels, [(100..112).collect::<Vec<_>>(), (120..128).chain(116..120).collect()]);
@@ -483,7 +494,7 @@ mod tests {
         let mut light: Vec<Vec3> =
             (0..2 * CHARTS).map(|lumel| Vec3::splat(1.0 + (lumel / 2) as f32)).collect();
         let mean = 0.5 * (1.0 + CHARTS as f32);
-        Stitches { parts: vec![part], rounds: 100 }.close(&mut light, |_| true);
+        Stitches(vec![part]).close(100, &mut light, |_| true);
         assert!(light.iter().all(|light| (light.x / mean - 1.0).abs() < 0.01), "{light:?}");
     }
 
@@ -491,7 +502,7 @@ mod tests {
     fn light_without_seams_stays() {
         let (scene, layout) = halves(0.0);
         let mut even = vec![Vec3::splat(2.0); 32 * 32];
-        Seams::new(&scene, &layout).about(0..1, LIVE_ROUNDS).close(&mut even, |_| true);
+        Seams::new(&scene, &layout).about(0..1).close(LIVE_ROUNDS, &mut even, |_| true);
         assert!(even.iter().all(|e| e.abs_diff_eq(Vec3::splat(2.0), 1e-5)));
     }
 }

@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use super::blocks::{BLOCK, Block};
 use super::filter::{Noisy, REACH, filter};
-use super::{LightmapSolver, NO_RECEIVER, beyond, fill, seams};
+use super::seams::{LIVE_ROUNDS, ROUNDS};
+use super::{LightmapSolver, NO_RECEIVER, beyond, fill};
 
 /// So many blocks are solved at a time where light is live, unless told otherwise.
 pub const BLOCKS_AT_ONCE: usize = 16;
@@ -61,13 +62,13 @@ impl LightmapSolver {
                 self.put(block, &solved, shown);
             }
         }
-        let rounds = if self.in_turns { seams::LIVE_ROUNDS } else { seams::ROUNDS };
-        let seams = self.seams.about(news.iter().map(|block| block.number(size)), rounds);
+        let seams = self.seams.about(news.iter().map(|block| block.number(size)));
+        let rounds = if self.in_turns { LIVE_ROUNDS } else { ROUNDS };
         let of = |lumel| self.known(beyond::own(self.receiver_of[lumel as usize])?);
         let is_known = |lumel| of(lumel).is_some_and(|lumel: Noisy| lumel.is_known());
-        seams.close(&mut shown.irradiance, is_known);
+        seams.close(rounds, &mut shown.irradiance, is_known);
         if let Some(slopes) = &mut shown.slopes {
-            seams.close_signed(slopes, is_known);
+            seams.close_signed(rounds, slopes, is_known);
         }
     }
 
