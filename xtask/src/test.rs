@@ -25,10 +25,10 @@ impl Test {
         step("web: types", npm(&["run", "check"]))?;
         step("web: tests", npm(&["test"]))?;
         step("web: page", npm(&["run", "build"]))?;
-        let clippy = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
-        step("lints", cargo(&clippy))?;
-        let fuzz = ["check", "-p", "lumencast-fuzz", "--features", "libfuzzer", "--bins"];
-        step("fuzz targets", cargo(&fuzz))?;
+        let clippy = ["clippy", "--workspace", "--all-targets"];
+        let fuzz = ["--features", "lumencast-fuzz/libfuzzer"];
+        let lints = [&clippy[..], &fuzz, &["--", "-D", "warnings"]].concat();
+        step("lints, of fuzz targets too", cargo(&lints))?;
         let mut tests = cargo(&["nextest", "run", "--workspace"]);
         match oracles::embree() {
             Ok(library) => drop(tests.env("LUMENCAST_EMBREE", library)),
@@ -49,7 +49,7 @@ impl Test {
         heading("licences and sources of dependencies");
         licences::check()?;
         if !self.no_browser {
-            step("the program", cargo(&["build", "-p", "lumencast-cli"]))?;
+            // The program that the tests were built with.
             let mut browser = npm(&["run", "test:browser"]);
             browser.env("LUMENCAST_BIN", target_dir().join("debug/lumencast"));
             // Others than root may be forbidden to make the slow link; then its test is left out.

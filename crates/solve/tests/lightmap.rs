@@ -351,7 +351,7 @@ fn noise_is_filtered_across_charts() {
             solver.solve(true, &Light::default(), &mut lightmap);
             lightmap
         };
-        let [noisy, right] = [8, 2048].map(light);
+        let [noisy, right] = [8, 512].map(light);
         let places = spread(&scene, &laid_out.layout, 2000);
         let squares: f32 = places
             .iter()
