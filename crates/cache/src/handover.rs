@@ -18,12 +18,6 @@ pub(crate) struct Handover {
     seen: f64,
 }
 
-/// How much of a surface's light its lumels make where it has come so far from probes to lumels: slowly
-/// at both ends. Where a display's codes are dense, in the dark, an even passage would be seen to jump.
-pub fn shown_share(way: f32) -> f32 {
-    way * way * (3.0 - 2.0 * way)
-}
-
 /// A surface on its way.
 #[derive(Clone, Debug)]
 struct Passing {
@@ -53,8 +47,7 @@ impl Handover {
         let leaving = self.passing.values().filter(|passing| !passing.comes);
         let leaving = leaving.map(|passing| passing.surface.clone());
         let surfaces = newest.surfaces().iter().cloned().chain(leaving).collect();
-        let shares =
-            self.passing.iter().map(|(id, passing)| (*id, shown_share(passing.way as f32)));
+        let shares = self.passing.iter().map(|(id, passing)| (*id, passing.way as f32));
         let layout = Layout::new(newest.page_size, newest.pages, surfaces);
         Arc::new(layout.with_shares(shares.collect()))
     }
@@ -125,14 +118,14 @@ mod tests {
         for frame in 1..=15u8 {
             let shown = handover.show(&one, 8.0 + f64::from(frame) / 60.0);
             let [Some(1.0), Some(share)] = shares(&shown) else { panic!("{:?}", shares(&shown)) };
-            let right = shown_share(1.0 - f32::from(frame) / 30.0);
+            let right = 1.0 - f32::from(frame) / 30.0;
             assert!((share - right).abs() < 1e-4 && share < last, "{share} for {right}");
             last = share;
         }
         assert!((last - 0.5).abs() < 1e-4, "half-way");
         let back = handover.show(&both, 8.25);
         assert!((back.share(id(2)) - last).abs() < 1e-4, "it turns where it is");
-        assert!((handover.show(&both, 8.35).share(id(2)) - shown_share(0.7)).abs() < 1e-3);
+        assert!((handover.show(&both, 8.35).share(id(2)) - 0.7).abs() < 1e-3);
         assert!(Arc::ptr_eq(&handover.show(&both, 8.6), &both));
         handover.show(&one, 9.0);
         assert_eq!(shares(&handover.show(&one, 9.51)), [Some(1.0), None]);

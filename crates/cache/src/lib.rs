@@ -33,5 +33,4 @@ mod volume;
 pub use cache::{Cache, CurrentLight};
 pub use edits::SceneEvent;
 pub use error::CacheError;
-pub use handover::shown_share;
 pub use received::Received;

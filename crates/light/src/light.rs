@@ -8,10 +8,15 @@ use crate::sh::{Sh, convolve};
 use crate::zh::{self, Bands};
 use crate::{Field, FieldId, Lightmap, Offset, Order, Place, ProbeVolume};
 
+/// The exponent of a display's codes.
+const GAMMA: f32 = 2.2;
+
 /// The light of a scene: fields, of which the finer volumes are laid over the coarser, and lightmaps
 /// over all of them.
 ///
-/// Where a surface has lumels, its irradiance is theirs alone. All other light is that of volumes.
+/// Where a surface has lumels, its irradiance is theirs alone. All other light is that of volumes. A
+/// surface that passes from one to the other does so by even steps of a display's codes
+/// ([`Layout::share`](crate::Layout::share)).
 ///
 /// Where a volume ends, light passes smoothly into the next coarser one over the outermost half
 /// cell, or into those that abut: on a shared face the mean of both counts. Beyond all volumes the
@@ -160,8 +165,8 @@ impl Light {
         })
     }
 
-    /// The lumels' irradiance at a place, lux, and how much of its light they make; `None` where it has
-    /// none.
+    /// The lumels' irradiance at a place, lux, and how far the place has come from probes to them, 0 to 1;
+    /// `None` where it has none.
     pub fn at_lumels(&self, place: &Place) -> Option<(Vec3, f32)> {
         let on = place.on.as_ref()?;
         self.lightmaps().find_map(|lightmap| {
@@ -189,13 +194,21 @@ impl Light {
     }
 }
 
-/// Light of lumels as far as they make it, and of probes for the rest.
+/// Light of probes, of lumels, or on the way from one to the other.
 fn mixed(lumels: Option<(Vec3, f32)>, probes: impl FnOnce() -> Option<Vec3>) -> Option<Vec3> {
     match lumels {
         None => probes(),
         Some((light, share)) if share >= 1.0 => Some(light),
-        Some((light, share)) => Some(probes().map_or(light, |probes| probes.lerp(light, share))),
+        Some((light, share)) => {
+            Some(probes().map_or(light, |probes| between(probes, light, share)))
+        }
     }
+}
+
+/// Light on the way from one to another: its codes on a display of gamma 2.2 change evenly.
+fn between(from: Vec3, to: Vec3, way: f32) -> Vec3 {
+    let code = |light: Vec3| light.max(Vec3::ZERO).powf(GAMMA.recip());
+    code(from).lerp(code(to), way).powf(GAMMA)
 }
 
 /// The size of a volume's cells, cubic metres: finer volumes lie over coarser ones. Other kinds come
@@ -350,6 +363,13 @@ mod tests {
         let behind = Place { on: Some(back), ..place };
         assert!((light.irradiance_at(&behind).x - PI).abs() < 1e-3, "the volume's");
         assert!((light.radiance(&behind, Vec3::X).unwrap().x - 1.0).abs() < 1e-3);
+        let passing = light.lightmaps().next().unwrap();
+        let layout = Layout::clone(&passing.layout).with_shares([(surface, 0.25)].into());
+        let passing = Lightmap { layout: Arc::new(layout), ..passing.clone() };
+        let passing = Light::new([Field::from(passing), light.fields()[0].clone()]);
+        let code = |light: f32| light.powf(1.0 / 2.2);
+        let right = (0.75 * code(PI) + 0.25 * code(6.0)).powf(2.2);
+        assert!((passing.irradiance_at(&place).x - right).abs() < 1e-3, "a quarter of the way");
         let dark = Light::new(light.lightmaps().cloned());
         assert_eq!(dark.radiance(&behind, Vec3::X), None);
         assert_eq!(dark.irradiance_at(&behind), Vec3::ZERO);

@@ -70,7 +70,7 @@ struct Side<'a> {
     surface: &'a Surface,
     /// The layers of the first pages: of light, and of slopes.
     first_layers: [u32; 2],
-    /// How much of the light the lumels make.
+    /// How far it has come from probes to lumels.
     share: f32,
 }
 

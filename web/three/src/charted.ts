@@ -24,8 +24,8 @@ export const FIRST = 2;
 export const NO_LUMELS = -1;
 
 /**
- * The attribute that tells how much of a geometry's diffuse light its lumels make, 0 to 1; probes make the
- * rest. It has a value for each copy that is drawn in one go: a mesh that is no InstancedMesh has one.
+ * The attribute that tells how far a geometry's diffuse light has come from probes to its lumels, 0 to 1. It
+ * has a value for each copy that is drawn in one go: a mesh that is no InstancedMesh has one.
  */
 export const LUMEL_SHARE = 'lumelShare';
 

@@ -1,3 +1,9 @@
+/**
+ * The exponent of a display's codes. On the way from probes to lumels, light passes by even steps of these: an
+ * even passage of light itself would be seen to jump where it comes out of black.
+ */
+export const GAMMA = 2.2;
+
 /** Milliseconds in which a surface passes from probes to lumels, or back. */
 const PASSAGE = 500;
 
@@ -8,12 +14,4 @@ const PASSAGE = 500;
 export function laterWay(way: number, comes: boolean, milliseconds: number): number {
   const step = Math.max(milliseconds, 0) / PASSAGE;
   return comes ? Math.min(way + step, 1) : Math.max(way - step, 0);
-}
-
-/**
- * How much of a surface's light its lumels make where it has come so far: slowly at both ends. Where a
- * display's codes are dense, in the dark, an even passage would be seen to jump.
- */
-export function shownShare(way: number): number {
-  return way * way * (3 - 2 * way);
 }

@@ -12,7 +12,7 @@ import {
   withoutCharts,
 } from './charted.js';
 import type { Content } from './content.js';
-import { laterWay, shownShare } from './handover.js';
+import { laterWay } from './handover.js';
 import { type Copies, lumelsOfCopies } from './lumel-copies.js';
 import { isSame, type Placed, type PlacedLayout, type Wanted, wantedBy } from './lumel-wanted.js';
 import { materialsOf } from './patch.js';
@@ -164,7 +164,7 @@ export class LumelSurfaces {
     const lumels = lumelsAttribute(kept.parted, of.sides, of.corners);
     const known = before?.mesh === mesh ? before : undefined;
     const way = known?.way ?? firstWay;
-    const charted = chartedGeometry(original, kept.parted, lumels, shownShare(way), of.each);
+    const charted = chartedGeometry(original, kept.parted, lumels, way, of.each);
     const worldFromObject = new Matrix4();
     const lit = { wanted, mesh, original, charted, kept, worldFromObject, way, comes: true };
     if (known) worldFromObject.copy(known.worldFromObject);
@@ -198,7 +198,7 @@ export class LumelSurfaces {
     lit.comes = isWanted && isSamePlace(mesh.matrixWorld, worldFromObject);
     if (way === 0 && !isWanted) return this.#release(key, lit);
     mesh.geometry = way > 0 || lit.comes ? charted : original;
-    setLumelShare(charted, shownShare(way));
+    setLumelShare(charted, way);
   }
 
   /** A copy that the program has made of a mesh with lumels has none of its own. */

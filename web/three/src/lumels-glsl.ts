@@ -1,4 +1,5 @@
 import { STEEPEST } from '@lumencast/client';
+import { GAMMA } from './handover.js';
 import { FIRST, LUMEL_CORNER, LUMEL_SHARE, LUMELS } from './charted.js';
 
 /**
@@ -70,13 +71,23 @@ float lumelTilt( vec3 own, vec3 shading ) {
 	return max( 0.0, 1.0 + dot( slope, ( vec4( shading - own, 0.0 ) * viewMatrix ).xyz ) );
 }
 
-// How much of the light lumels make.
-float lumelShare() {
-	return hasLumels() ? vLumelShare : 0.0;
+// Whether nothing is to be seen of the grids' light.
+bool isLumelsAlone() {
+	return hasLumels() && vLumelShare >= 1.0;
 }
 
 float gridFactor() {
-	if ( vLumels.x < ${BELOW_NOWHERE} ) return lumencastMoving;
-	return mix( lumencastMoving, hasLumels() ? 0.0 : lumencastStill, vLumelShare );
+	if ( vLumels.x < ${BELOW_NOWHERE} || hasLumels() ) return lumencastMoving;
+	return mix( lumencastMoving, lumencastStill, vLumelShare );
+}
+
+// Irradiance of grids, of lumels, or on the way from one to the other: its codes on a display change evenly.
+// Twin: between in webgpu-lumels.ts.
+vec3 gridsOrLumels( vec3 grids, vec3 own, vec3 shading ) {
+	if ( ! hasLumels() ) return grids;
+	vec3 lumels = lumelTilt( own, shading ) * lumelIrradiance();
+	if ( vLumelShare >= 1.0 ) return lumels;
+	vec3 inverse = vec3( 1.0 / ${GAMMA} );
+	return pow( mix( pow( max( grids, 0.0 ), inverse ), pow( lumels, inverse ), vLumelShare ), vec3( ${GAMMA} ) );
 }
 `;

@@ -35,12 +35,15 @@ export function patchedIrradiance(): string {
   const probes = replaceText(
     ShaderChunk.lights_fragment_begin,
     'if ( isInsideLightProbeGrid(',
-    'if ( lumelShare() < 1.0 && isInsideLightProbeGrid(',
+    'if ( ! isLumelsAlone() && isInsideLightProbeGrid(',
   );
-  const grids = '#if NUM_LIGHT_PROBE_GRIDS > 0';
-  const lumels =
-    'if ( hasLumels() ) irradiance += lumelShare() * lumelTilt( nonPerturbedNormal, normal ) * lumelIrradiance();';
-  return replaceText(probes, grids, `${lumels}\n\n${grids}`);
+  const sum = 'irradiance += getLightProbeGridIrradiance(';
+  const summed = replaceText(probes, sum, sum.replace('irradiance', 'gridIrradiance'));
+  const begin = '#if NUM_LIGHT_PROBE_GRIDS > 0';
+  const begun = replaceText(summed, begin, `vec3 gridIrradiance = vec3( 0.0 );\n\n\t${begin}`);
+  const end = '#if defined( RE_IndirectSpecular )';
+  const lit = 'irradiance += gridsOrLumels( gridIrradiance, nonPerturbedNormal, normal );';
+  return replaceText(begun, end, `#if defined( RE_IndirectDiffuse )\n\t${lit}\n#endif\n\n${end}`);
 }
 
 export function patchedShadowCoordinates(): string {

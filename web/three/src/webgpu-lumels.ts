@@ -23,6 +23,7 @@ import {
 } from 'three/tsl';
 import { AnalyticLightNode, type Node, type NodeBuilder, type NodeFrame } from 'three/webgpu';
 import { FIRST, LUMEL_CORNER, LUMEL_SHARE, LUMELS } from './charted.js';
+import { GAMMA } from './handover.js';
 import { sizeOf } from './webgpu-pages.js';
 
 /** Uniforms of all scenes; other than neutral only while a scene is drawn. */
@@ -39,7 +40,6 @@ const BELOW_COORDINATES = -5e5;
 
 /** What probe grids hand to one another while a shader is built. */
 interface ProbeContext {
-  irradiance: Node<'vec3'>;
   lightProbeIrradiance?: Node<'vec3'>;
   lightProbePriority?: Node<'float'>;
 }
@@ -55,9 +55,10 @@ export class LumelLight extends Light {
 }
 
 /**
- * Adds irradiance at lumels wherever a side has some. Where it is all there is, this stands among the nodes
- * of probe grids as one of the highest priority, so that none is read. A shader is built for each set of
- * attributes: of geometries without charts it knows nothing of lumels.
+ * Puts irradiance at lumels in place of that of probe grids, or on the way from these, wherever a side has
+ * some. Where it is all there is, this stands among the nodes of grids as one of the highest priority, so that
+ * none is read. A shader is built for each set of attributes: of geometries without charts it knows nothing of
+ * lumels.
  */
 class LumelNode extends AnalyticLightNode<LumelLight> {
   static get type(): string {
@@ -70,26 +71,30 @@ class LumelNode extends AnalyticLightNode<LumelLight> {
     const { at, share } = seen;
     const pages = texture(this.light!.pages);
     const context = builder.context as unknown as ProbeContext;
-    context.lightProbeIrradiance ??= vec3().toVar('lightProbeIrradiance');
-    context.lightProbePriority ??= INFINITY.negate().toVar('lightProbePriority');
-    const { irradiance, lightProbeIrradiance, lightProbePriority } = context;
-    // three.js declares irradiance where it is first used: not within the branch.
+    const ofGrids = (context.lightProbeIrradiance ??= vec3().toVar('lightProbeIrradiance'));
+    const priority = (context.lightProbePriority ??= INFINITY.negate().toVar('lightProbePriority'));
     const light = vec3(0).toVar();
     If(hasLumels(seen), () => {
       const uv = at.div(sizeOf(pages));
       const texel = pages.sample(uv).level(float(0)) as Node<'vec4'>;
-      light.assign(texel.rgb.mul(factors.lumels.mul(share)));
+      light.assign(texel.rgb.mul(factors.lumels));
       If(factors.slopes.greaterThan(0), () => {
         const below = at.add(vec2(0, factors.slopes)).div(sizeOf(pages));
         light.mulAssign(tilt(pages.sample(below).level(float(0)) as Node<'vec4'>));
       });
-      If(share.greaterThanEqual(1), () => {
-        lightProbeIrradiance.assign(vec3(0));
-        lightProbePriority.assign(INFINITY);
-      });
+      If(share.greaterThanEqual(1), () => void priority.assign(INFINITY));
     });
-    irradiance.addAssign(light);
+    // three.js adds it once all grids have been assigned to it.
+    const both = hasLumels(seen).select(between(ofGrids, light, share), ofGrids);
+    context.lightProbeIrradiance = Object.assign(both, { assign: (value: Node) => ofGrids.assign(value) });
   }
+}
+
+/** Light on the way from one to another: its codes on a display change evenly. Twin: lumels-glsl.ts. */
+function between(from: Node<'vec3'>, to: Node<'vec3'>, way: Node<'float'>): Node<'vec3'> {
+  const code = (light: Node<'vec3'>) => light.max(vec3(0)).pow(vec3(1 / GAMMA));
+  const mixed = mix(code(from), code(to), way).pow(vec3(GAMMA));
+  return way.greaterThanEqual(1).select(to, mixed);
 }
 
 /**
@@ -142,7 +147,7 @@ function hasLumels({ at }: Seen): Node<'bool'> {
 const gridFactor = Fn((_: unknown, builder: NodeBuilder) => {
   const seen = seenBy(builder);
   if (!seen) return factors.moving;
-  return mix(factors.moving, hasLumels(seen).select(float(0), factors.still), seen.share);
+  return hasLumels(seen).select(factors.moving, mix(factors.moving, factors.still, seen.share));
 }) as unknown as () => Node<'float'>;
 
 /** A part of three.js' node that its types leave out. */

@@ -142,13 +142,18 @@ describe('patchMaterials', () => {
     }
     expect(vertex.indexOf('vLumels.xy =')).toBeGreaterThan(vertex.indexOf('void main()'));
     expect(fragment.indexOf('vec3 lumelIrradiance()')).toBeLessThan(fragment.indexOf('void main()'));
-    expect(fragment).toContain('if ( lumelShare() < 1.0 && isInsideLightProbeGrid(');
-    const added = fragment.indexOf('irradiance += lumelShare() * lumelTilt( nonPerturbedNormal, normal )');
+    expect(fragment).toContain('if ( ! isLumelsAlone() && isInsideLightProbeGrid(');
+    const lit = 'irradiance += gridsOrLumels( gridIrradiance, nonPerturbedNormal, normal );';
+    const added = fragment.indexOf(lit);
     expect(added).toBeGreaterThan(fragment.indexOf('vec3 irradiance = getAmbientLightIrradiance'));
     expect(added).toBeGreaterThan(fragment.indexOf('#include <normal_fragment_maps>'));
     expect(fragment).toContain('#include <normal_fragment_maps>');
+    expect(added).toBeGreaterThan(fragment.indexOf('gridIrradiance += getLightProbeGridIrradiance('));
     // Where a scene has no grids, too.
-    expect(added).toBeLessThan(fragment.indexOf('vec3 probeWorldPos'));
+    expect(fragment).toContain(`#if defined( RE_IndirectDiffuse )\n\t${lit}\n#endif`);
+    const declared = fragment.indexOf('vec3 gridIrradiance = vec3( 0.0 );');
+    expect(fragment.indexOf('#if NUM_LIGHT_PROBE_GRIDS > 0', declared)).toBeLessThan(added);
+    expect(fragment.indexOf('vec3 probeWorldPos')).toBeGreaterThan(declared);
     expect(fragment).toContain('exp2( s6.w ) * gridFactor()');
   });
 

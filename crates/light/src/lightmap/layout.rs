@@ -49,7 +49,7 @@ pub struct Layout {
     pub pages: u32,
     /// In order of their numbers.
     surfaces: Vec<Surface>,
-    /// Of surfaces that pass from probes to lumels, or back.
+    /// How far surfaces have come that pass from probes to lumels, or back.
     shares: BTreeMap<SurfaceId, f32>,
 }
 
@@ -60,14 +60,13 @@ impl Layout {
         Self { page_size, pages, surfaces, shares: BTreeMap::new() }
     }
 
-    /// The same, some of whose surfaces have that share of their light from lumels, 0 to 1, and the rest
-    /// from probes, since they pass from one to the other.
+    /// The same, some of whose surfaces have come so far from probes to lumels, 0 to 1.
     #[must_use]
     pub fn with_shares(self, shares: BTreeMap<SurfaceId, f32>) -> Self {
         Self { shares, ..self }
     }
 
-    /// How much of a surface's light its lumels make.
+    /// How far a surface has come from probes to lumels: a display's codes of its light have come as far.
     pub fn share(&self, id: SurfaceId) -> f32 {
         self.shares.get(&id).copied().unwrap_or(1.0)
     }

@@ -43,7 +43,7 @@ fn indirect_light(
         of_diffuse = mix(min(of_diffuse, many_bounces(visible, b.diffuse)), of_diffuse, share);
     }
     if share > 0.0 {
-        light.a = mix(light.a, lumel_light(lumels, n), share);
+        light.a = toward_lumels(light.a, lumel_light(lumels, n), share);
     }
     var sum = b.diffuse * under * of_diffuse * light.a / PI;
     sum += (b.f0 * by.x + b.f90 * by.y) * specular_occlusion(n_v, of_specular, b.alpha) * light.b;

@@ -3,6 +3,8 @@
 #import field/bindings
 #import shade/pass_bindings
 
+// The exponent of a display's codes.
+const GAMMA: f32 = 2.2;
 // What a vertex has in place of a rectangle where it has no lumels.
 const NO_LUMELS: u32 = 0xffffffffu;
 
@@ -16,7 +18,7 @@ struct Lumels {
     normal: vec3f,
 }
 
-// How much of a point's light its lumels make: 0 where it has none.
+// How far a point has come from probes to its lumels: 0 where it has none.
 fn lumel_share(lumels: Lumels) -> f32 {
     if lumels.rectangle == NO_LUMELS {
         return 0.0;
@@ -35,4 +37,15 @@ fn lumel_light(lumels: Lumels, shading: vec3f) -> vec3f {
         share = max(0.0, 1.0 + dot(slope, shading - lumels.normal));
     }
     return light * share * fields.lumel_scale;
+}
+
+// Light on the way from that of probes to that of lumels: its codes on a display of gamma 2.2 change evenly
+// (`light::between`).
+fn toward_lumels(probes: vec3f, lumels: vec3f, way: f32) -> vec3f {
+    if way >= 1.0 {
+        return lumels;
+    }
+    let inverse = vec3f(1.0 / GAMMA);
+    let codes = mix(pow(max(probes, vec3f(0.0)), inverse), pow(max(lumels, vec3f(0.0)), inverse), way);
+    return pow(codes, vec3f(GAMMA));
 }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use anyhow::{Result, ensure};
 use glam::Vec3;
-use lumencast_cache::shown_share;
 use lumencast_gather::path_trace::CpuPathTracer;
 use lumencast_light::{Field, FieldId, Layout, Light, Lightmap};
 use lumencast_picture::Picture;
@@ -33,6 +32,8 @@ pub(super) struct Handover {
     beyond: f32,
     /// The largest whole change of a pixel, codes.
     whole: f32,
+    /// The share of pixels that change by more than is allowed.
+    too_much: f64,
 }
 
 impl Handover {
@@ -72,36 +73,42 @@ impl Handover {
 
     /// What is seen in frames, pixel by pixel.
     fn of(frames: &[Vec<Vec3>]) -> Self {
-        let mut seen = Self { beyond: 0.0, whole: 0.0 };
-        for pixel in 0..frames[0].len() {
+        let mut seen = Self { beyond: 0.0, whole: 0.0, too_much: 0.0 };
+        let pixels = frames[0].len();
+        for pixel in 0..pixels {
             let change = |a: usize, b: usize| (frames[a][pixel] - frames[b][pixel]).abs();
             let whole = change(0, frames.len() - 1);
+            let beyond = |at: usize| change(at, at - 1) - whole / (frames.len() - 1) as f32;
+            let most = (1..frames.len()).map(|at| beyond(at).max_element()).fold(0.0, f32::max);
             seen.whole = seen.whole.max(whole.max_element());
-            for at in 1..frames.len() {
-                let beyond = change(at, at - 1) - whole / (frames.len() - 1) as f32;
-                seen.beyond = seen.beyond.max(beyond.max_element());
-            }
+            seen.beyond = seen.beyond.max(most);
+            seen.too_much += f64::from(u8::from(most > ALLOWED)) / pixels as f64;
         }
         seen
     }
 
     pub(super) fn json(&self) -> Value {
-        json!({ "codes_beyond": self.beyond, "allowed": ALLOWED, "whole_codes": self.whole })
+        json!({
+            "codes_beyond": self.beyond,
+            "allowed": ALLOWED,
+            "whole_codes": self.whole,
+            "too_much": self.too_much,
+        })
     }
 
     pub(super) fn say(&self) {
         say!(
             "hand-over: pixels change by up to {:.1} codes in all, and in a frame by up to {:.1} codes \
-             beyond a {FRAMES}th of that; {ALLOWED:.0} are allowed",
+             beyond a {FRAMES}th of that; {ALLOWED:.0} are allowed, {:.2} % of pixels have more",
             self.whole,
-            self.beyond
+            self.beyond,
+            100.0 * self.too_much
         );
     }
 }
 
 /// A layout all of whose surfaces have come so far from probes to lumels.
-fn passing(layout: &Layout, way: f32) -> Arc<Layout> {
-    let share = shown_share(way);
+fn passing(layout: &Layout, share: f32) -> Arc<Layout> {
     let shares = layout.surfaces().iter().map(|surface| (surface.id, share)).collect();
     Arc::new(layout.clone().with_shares(shares))
 }
@@ -123,5 +130,6 @@ mod tests {
         assert!(even.beyond.abs() < 1e-3 && (even.whole - 90.0).abs() < 1e-3);
         let jump = Handover::of(&frames([0.0, 0.0, 1.0, 1.0]));
         assert!((jump.beyond - 60.0).abs() < 1e-3, "{}", jump.beyond);
+        assert_eq!([even.too_much, jump.too_much], [0.0, 1.0]);
     }
 }
