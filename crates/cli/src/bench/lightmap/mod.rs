@@ -189,8 +189,7 @@ impl BenchLightmap {
             backs: layout.surfaces().iter().filter(|surface| surface.id.back).count(),
             lumels: solver.lumel_count(),
             buried: solver.buried_count(),
-            bytes_a_lumel: (solver.bytes() + lightmap_bytes(&lightmap)) as f64
-                / solver.lumel_count().max(1) as f64,
+            bytes: solver.bytes() + lightmap_bytes(&lightmap),
             samples: self.samples,
             bounces: self.bounces,
             materials: self.materials,

@@ -24,8 +24,8 @@ pub(super) struct Report {
     pub(super) lumels: usize,
     /// How many of the lumels lie within something.
     pub(super) buried: usize,
-    /// Bytes of memory a lumel: what is known of them, and the light that is shown.
-    pub(super) bytes_a_lumel: f64,
+    /// Bytes of memory: what is known of lumels, and the light that is shown.
+    pub(super) bytes: usize,
     /// Samples a lumel.
     pub(super) samples: u32,
     pub(super) bounces: u32,
@@ -50,6 +50,16 @@ pub(super) struct Report {
 }
 
 impl Report {
+    /// Bytes a lumel that a chart covers.
+    fn bytes_a_lumel(&self) -> f64 {
+        self.bytes as f64 / self.lumels.max(1) as f64
+    }
+
+    /// Bytes a lumel, covered or not.
+    fn bytes_a_lumel_of_pages(&self) -> f64 {
+        self.bytes as f64 / f64::from(self.pages * self.page_size.pow(2)).max(1.0)
+    }
+
     pub(super) fn json(&self) -> Value {
         let [layout, gather, filter] = self.seconds;
         let coded = self.coded.iter().map(Judged::json);
@@ -66,7 +76,8 @@ impl Report {
             "backs": self.backs,
             "lumels": self.lumels,
             "buried": self.buried,
-            "bytes_a_lumel": self.bytes_a_lumel,
+            "bytes_a_lumel": self.bytes_a_lumel(),
+            "bytes_a_lumel_of_pages": self.bytes_a_lumel_of_pages(),
             "samples": self.samples,
             "bounces": self.bounces,
             "materials": self.materials.to_string(),
@@ -88,14 +99,16 @@ impl Report {
 
     pub(super) fn say(&self) {
         say!(
-            "{}: {} × {}², a lumel every {:.1} cm, {} lumels ({} within something), {:.0} bytes each",
+            "{}: {} × {}², a lumel every {:.1} cm, {} lumels ({} within something), {:.0} bytes \
+             each, {:.0} a lumel of the pages",
             self.scene,
             self.pages,
             self.page_size,
             100.0 * self.texel,
             self.lumels,
             self.buried,
-            self.bytes_a_lumel
+            self.bytes_a_lumel(),
+            self.bytes_a_lumel_of_pages()
         );
         say!(
             "irradiance: {:.1} dB, as gathered {:.1} dB, {} samples a lumel",
