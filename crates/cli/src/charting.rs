@@ -1,5 +1,6 @@
 //! Still surfaces cut into charts and laid out, with a bar that shows how far that is.
 
+use std::fmt;
 use std::sync::Arc;
 
 use anyhow::Result;
@@ -7,8 +8,36 @@ use lumencast_charts::{ChartError, LaidOut, Progress, Sheets, Store, laid_out};
 use lumencast_gather::Gather;
 use lumencast_scene::{LightmapSpec, Snapshot};
 use lumencast_solve::with_backs;
+use serde::Serialize;
 
 use crate::output::{self, tell};
+
+/// How many lumels there are, and how large they are.
+#[derive(Clone, Copy, Serialize)]
+pub(crate) struct Lumels {
+    pub(crate) pages: u32,
+    /// Lumels on each side of a page.
+    pub(crate) page_size: u32,
+    /// Metres from lumel to lumel.
+    pub(crate) texel: f32,
+}
+
+impl Lumels {
+    pub(crate) fn of(LaidOut { layout, texel, .. }: &LaidOut) -> Self {
+        Self { pages: layout.pages, page_size: layout.page_size, texel: *texel }
+    }
+}
+
+impl fmt::Display for Lumels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { pages, page_size, texel } = self;
+        write!(f, "{pages} × {page_size}², a lumel every ")?;
+        match texel {
+            ..1e-3 => write!(f, "{:.2} mm", 1000.0 * texel),
+            _ => write!(f, "{:.1} cm", 100.0 * texel),
+        }
+    }
+}
 
 /// The fronts of a scene's still surfaces, cut into charts.
 pub(crate) fn fronts(scene: &Snapshot) -> Result<Sheets> {

@@ -35,7 +35,7 @@ use self::reference::{Reference, psnr, white};
 use self::report::Report;
 use crate::arguments::{LightmapArguments, Materials, SceneSource};
 use crate::bench::cast::moved_light;
-use crate::charting;
+use crate::charting::{self, Lumels};
 use crate::output;
 
 /// Points of surfaces at which light is judged.
@@ -117,10 +117,8 @@ impl BenchLightmap {
             .context("the scene has no still surface that lumels can lie on")?;
         let layout_seconds = start.elapsed().as_secs_f64();
 
-        let mut solver = LightmapSolver::new(FieldId(0), &snapshot, &laid_out, MEAN)
-            .with_slopes(self.directional);
         let start = Instant::now();
-        self.gather(&mut solver, &snapshot, &mut tracer)?;
+        let mut solver = self.gather(self.directional, &snapshot, &laid_out, &mut tracer)?;
         let gather_seconds = start.elapsed().as_secs_f64();
         let mut gathered = solver.dark();
         solver.clone().solve(false, &Light::default(), &mut gathered);
@@ -179,12 +177,10 @@ impl BenchLightmap {
             false => None,
         };
 
-        let LaidOut { layout, texel, .. } = &laid_out;
+        let layout = &laid_out.layout;
         let report = Report {
             scene: name,
-            pages: layout.pages,
-            page_size: layout.page_size,
-            texel: *texel,
+            pages: Lumels::of(&laid_out),
             surfaces: layout.surfaces().len(),
             backs: layout.surfaces().iter().filter(|surface| surface.id.back).count(),
             lumels: solver.lumel_count(),
@@ -230,8 +226,7 @@ impl BenchLightmap {
                 let mut edited = self.scene.open()?;
                 edited.apply(&edit)?;
                 let snapshot = edited.snapshot();
-                let mut solver = LightmapSolver::new(FieldId(0), &snapshot, laid_out, MEAN);
-                self.gather(&mut solver, &snapshot, &mut tracer)?;
+                let mut solver = self.gather(false, &snapshot, laid_out, &mut tracer)?;
                 let mut lightmap = solver.dark();
                 solver.solve(true, &Light::default(), &mut lightmap);
                 Some((edit, lightmap))
@@ -249,12 +244,15 @@ impl BenchLightmap {
         Options { materials: self.materials.model(), threads: None, levels: Levels::One }
     }
 
+    /// What arrives at the lumels of a scene.
     fn gather(
         &self,
-        solver: &mut LightmapSolver,
+        slopes: bool,
         scene: &Arc<Snapshot>,
+        laid_out: &LaidOut,
         tracer: &mut CpuPathTracer,
-    ) -> Result<()> {
+    ) -> Result<LightmapSolver> {
+        let mut solver = LightmapSolver::new(FieldId(0), scene, laid_out, MEAN).with_slopes(slopes);
         let bar = output::bar(u64::from(self.samples.div_ceil(PASS)), "Gathering at lumels");
         for (pass, first) in (0..self.samples).step_by(PASS as usize).enumerate() {
             let samples = PASS.min(self.samples - first);
@@ -267,7 +265,7 @@ impl BenchLightmap {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        Ok(())
+        Ok(solver)
     }
 
     /// The path tracer's irradiance, refined until noise is as low as asked for.
@@ -296,7 +294,7 @@ impl BenchLightmap {
                     half.iter_mut().zip(&mut backs).zip(gathered.sums.iter())
                 {
                     *sum += found.sum[0];
-                    *backs += found.back_face_fraction;
+                    *backs += found.dark_back_fraction;
                 }
                 passes += 1;
             }

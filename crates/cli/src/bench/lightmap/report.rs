@@ -9,15 +9,13 @@ use super::handover::Handover;
 use super::live::Live;
 use super::reference::Reference;
 use crate::arguments::Materials;
+use crate::charting::Lumels;
 use crate::output::say;
 
 /// What was measured of a scene's lumels.
 pub(super) struct Report {
     pub(super) scene: String,
-    pub(super) pages: u32,
-    pub(super) page_size: u32,
-    /// Metres from lumel to lumel.
-    pub(super) texel: f32,
+    pub(super) pages: Lumels,
     pub(super) surfaces: usize,
     /// How many of the surfaces are backs.
     pub(super) backs: usize,
@@ -57,7 +55,7 @@ impl Report {
 
     /// Bytes a lumel, covered or not.
     fn bytes_a_lumel_of_pages(&self) -> f64 {
-        self.bytes as f64 / f64::from(self.pages * self.page_size.pow(2)).max(1.0)
+        self.bytes as f64 / f64::from(self.pages.pages * self.pages.page_size.pow(2)).max(1.0)
     }
 
     pub(super) fn json(&self) -> Value {
@@ -69,9 +67,9 @@ impl Report {
         let handover = Value::Null;
         json!({
             "scene": self.scene,
-            "pages": self.pages,
-            "page_size": self.page_size,
-            "texel": self.texel,
+            "pages": self.pages.pages,
+            "page_size": self.pages.page_size,
+            "texel": self.pages.texel,
             "surfaces": self.surfaces,
             "backs": self.backs,
             "lumels": self.lumels,
@@ -99,12 +97,9 @@ impl Report {
 
     pub(super) fn say(&self) {
         say!(
-            "{}: {} × {}², a lumel every {:.1} cm, {} lumels ({} within something), {:.0} bytes \
-             each, {:.0} a lumel of the pages",
+            "{}: {}, {} lumels ({} within something), {:.0} bytes each, {:.0} a lumel of the pages",
             self.scene,
             self.pages,
-            self.page_size,
-            100.0 * self.texel,
             self.lumels,
             self.buried,
             self.bytes_a_lumel(),

@@ -23,11 +23,11 @@ use super::drawing::{cells, draw};
 use super::judge::{Judge, covered};
 use super::traced::{self, SIZE, Traced};
 use crate::arguments::{LightmapArguments, Reading, ReadingArguments, VolumeArgument, Wanted};
-use crate::charting;
+use crate::charting::{self, Lumels};
 use crate::light_source::Computed;
 use crate::{camera, out_file, output, warnings};
 use reference::References;
-use report::{Fault, Field, Lumels, Report, Table};
+use report::{Fault, Field, Report, Table};
 pub(super) use subjects::SUBJECTS;
 use subjects::{PlaceOfFault, Subject};
 

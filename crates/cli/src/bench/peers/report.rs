@@ -2,12 +2,12 @@
 
 use std::fmt::{self, Write};
 
-use lumencast_charts::LaidOut;
 use lumencast_light::Order;
 use serde::Serialize;
 
 use super::subjects::{Published, Rival};
 use crate::bench::judge::{Deviation, Psnr};
+use crate::charting::Lumels;
 
 #[derive(Serialize)]
 pub(super) struct Report {
@@ -40,28 +40,6 @@ pub(super) struct Field {
     /// Of its indirect part alone, beside the path tracer's.
     pub(super) indirect: Psnr,
     pub(super) faults: Vec<Fault>,
-}
-
-/// How many lumels there are, and how large they are.
-#[derive(Serialize)]
-pub(super) struct Lumels {
-    pages: u32,
-    page_size: u32,
-    /// Metres.
-    texel: f32,
-}
-
-impl Lumels {
-    pub(super) fn of(LaidOut { layout, texel, .. }: &LaidOut) -> Self {
-        Self { pages: layout.pages, page_size: layout.page_size, texel: *texel }
-    }
-}
-
-impl fmt::Display for Lumels {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { pages, page_size, texel } = self;
-        write!(f, "{pages} × {page_size}², a lumel every {:.1} cm", 100.0 * texel)
-    }
 }
 
 #[derive(Serialize)]

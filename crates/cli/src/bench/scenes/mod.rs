@@ -12,7 +12,7 @@ use anyhow::Result;
 use clap::Args;
 use lumencast_gather::path_trace::{Levels, MaterialModel, Options};
 use lumencast_gather::reference::Parts;
-use lumencast_light::{Field, Layout, Light};
+use lumencast_light::{Field, Light};
 use lumencast_picture::{Picture, ToneMap, exposure};
 use lumencast_scene::{Edit, Environment, Scene, Snapshot, View};
 use lumencast_shade::{Gpu, Lighting, Materials, Renderer, Settings, Shading, Shadows};
@@ -26,6 +26,7 @@ use super::traced::{self, BOUNCES, FIRST_SPP, SIZE, Traced};
 use crate::arguments::{
     EffortArguments, FieldsArguments, MOST_SAMPLES, Reading, ReadingArguments, Wanted,
 };
+use crate::charting::Lumels;
 use crate::light_source::Computed;
 use crate::output::{self, tell};
 use crate::{camera, out_file, warnings};
@@ -208,10 +209,7 @@ impl BenchScenes {
             let live = Live { bench: self, subject: &subject, wanted: &wanted, settings };
             beside.extend(live.beside(renderer, gatherer, judge, seconds.into())?);
         }
-        let pages = wanted.lightmap.iter().map(|laid_out| {
-            let Layout { pages, page_size, .. } = laid_out.layout;
-            format!("{pages} × {page_size}²")
-        });
+        let pages = wanted.lightmap.iter().map(|laid_out| Lumels::of(laid_out).to_string());
         Ok(Row {
             psnr: judge.psnr(&picture)?,
             reference_noise: judged.noise,
