@@ -36,15 +36,11 @@ impl View {
         let center = 0.5 * (bounds.min + bounds.max);
         let turn = Quat::from_euler(EulerRot::YXZ, 35f32.to_radians(), -25f32.to_radians(), 0.0);
         let rotation = Mat3::from_quat(turn);
-        let eye = center + rotation * Vec3::Z * (radius / (0.5 * FIELD_OF_VIEW).sin());
+        let distance = radius / (0.5 * FIELD_OF_VIEW).sin();
+        let eye = center + rotation * Vec3::Z * distance;
         Self {
             world_from_camera: Affine3A::from_mat3_translation(rotation, eye),
-            projection: Projection::Perspective {
-                yfov: FIELD_OF_VIEW,
-                aspect_ratio: None,
-                near: 0.01,
-                far: None,
-            },
+            projection: perspective(FIELD_OF_VIEW, distance),
         }
     }
 
@@ -57,8 +53,7 @@ impl View {
         let up = if forward.y.abs() > 0.9999 { Vec3::NEG_Z } else { Vec3::Y };
         let right = forward.cross(up).try_normalize()?;
         let camera = glam::Mat3::from_cols(right, right.cross(forward), -forward);
-        let projection =
-            Projection::Perspective { yfov, aspect_ratio: None, near: 0.01, far: None };
+        let projection = perspective(yfov, eye.distance(target));
         (eye.is_finite() && yfov > 0.0 && yfov < std::f32::consts::PI).then(|| Self {
             world_from_camera: Affine3A::from_mat3_translation(camera, eye),
             projection,
@@ -100,6 +95,13 @@ impl View {
     }
 }
 
+/// The projection of a view of something at a distance, metres. It is drawn from a thousandth of that on,
+/// since whole scenes may be a few millimetres large.
+fn perspective(yfov: f32, distance: f32) -> Projection {
+    let near = (1e-3 * distance).clamp(f32::MIN_POSITIVE, 0.01);
+    Projection::Perspective { yfov, aspect_ratio: None, near, far: None }
+}
+
 /// The rays of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays {
@@ -133,6 +135,19 @@ impl Rays {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of a scene of a few millimetres, too, nothing lies before the near plane.
+    #[test]
+    fn all_of_a_scene_is_drawn() {
+        for size in [1e-4, 0.004, 1.0, 1e5] {
+            let box_of = Aabb { min: Vec3::splat(-size), max: Vec3::splat(size) };
+            let view = View::overview(&box_of);
+            let eye = Vec3::from(view.world_from_camera.translation);
+            let Projection::Perspective { near, .. } = view.projection else { unreachable!() };
+            let radius = box_of.max.length().max(1e-3);
+            assert!(near > 0.0 && near < 0.1 * (eye.length() - radius), "{size}: {near}");
+        }
+    }
 
     #[test]
     fn rays_go_through_the_corners() {
