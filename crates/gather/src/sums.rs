@@ -28,7 +28,7 @@ struct Head {
     /// End of the entry's terms in `sum` and `squares`.
     end: u32,
     count: u32,
-    back_face_fraction: f32,
+    dark_back_fraction: f32,
     culled_fraction: f32,
 }
 
@@ -42,9 +42,10 @@ pub struct SumsAt<'a> {
     pub squares: &'a [f32],
     /// Number of samples taken.
     pub count: u32,
-    /// Share of the samples that first met the back of a surface (by winding order), 0 to 1. It is
-    /// near 1 for probes inside solid objects.
-    pub back_face_fraction: f32,
+    /// Share of the samples that first met the back of a surface (by winding order) and found no
+    /// source of light from there, 0 to 1. It is near 1 inside solid objects. Light of an earlier job
+    /// is no source.
+    pub dark_back_fraction: f32,
     /// Share of the samples that first met the back of a single-sided material, 0 to 1. Such backs
     /// are not meant to be seen.
     pub culled_fraction: f32,
@@ -92,7 +93,7 @@ impl Sums {
             sum: &self.sum[terms.clone()],
             squares: &self.squares[terms.clone()],
             count: head.count,
-            back_face_fraction: head.back_face_fraction,
+            dark_back_fraction: head.dark_back_fraction,
             culled_fraction: head.culled_fraction,
             distances: self.distances.get(terms).unwrap_or_default(),
             surfaces: &self.surfaces[before.map_or(0, surface)..surface(entry)],
@@ -107,7 +108,7 @@ impl Sums {
     /// Adds an entry. Either all entries have distances or none has. The same holds for surfaces,
     /// except that an entry without samples may lack them.
     pub fn push(&mut self, entry: SumsAt<'_>) {
-        let SumsAt { sum, squares, count, back_face_fraction, culled_fraction, .. } = entry;
+        let SumsAt { sum, squares, count, dark_back_fraction, culled_fraction, .. } = entry;
         self.sum.extend_from_slice(sum);
         self.squares.extend_from_slice(squares);
         self.distances.extend_from_slice(entry.distances);
@@ -118,7 +119,7 @@ impl Sums {
             self.surfaces_end.push(self.surfaces.len() as u32);
         }
         let end = self.sum.len() as u32;
-        self.heads.push(Head { end, count, back_face_fraction, culled_fraction });
+        self.heads.push(Head { end, count, dark_back_fraction, culled_fraction });
     }
 }
 

@@ -41,7 +41,7 @@ fn is_estimate(e: &ProbeEstimate) -> bool {
     is_light(&e.sh[..1])
         && e.sh.iter().all(|c| c.is_finite())
         && is_light(&e.standard_error)
-        && (0.0..=1.0).contains(&e.back_face_fraction)
+        && (0.0..=1.0).contains(&e.dark_back_fraction)
 }
 
 /// Gathers and draws at every place, with both models of materials, and scans what comes.
@@ -71,7 +71,7 @@ fn scans_find_what_they_look_for() {
     let mut bad = sound.clone();
     bad.sh[5].z = f32::NAN;
     assert!(!is_estimate(&bad));
-    assert!(!is_estimate(&ProbeEstimate { back_face_fraction: f32::NAN, ..sound }));
+    assert!(!is_estimate(&ProbeEstimate { dark_back_fraction: f32::NAN, ..sound }));
 }
 
 /// Each triangle with three vertices of its own.
@@ -266,7 +266,7 @@ fn eyes_inside_walls() {
     stage.light(point_light(5.0), Vec3::new(1.0, 0.3, 0.3), Vec3::X);
     let within = Vec3::new(2.0, 0.5, 0.0);
     let e = probe(&stage.snapshot(), within, MaterialModel::Full);
-    assert_eq!((e.sh[0], e.back_face_fraction), (BLACK, 1.0));
+    assert_eq!((e.sh[0], e.dark_back_fraction), (BLACK, 1.0));
     let eyes = [
         within,
         Vec3::X,

@@ -262,7 +262,7 @@ fn quad_light_seen_directly() {
             check(&only_c0(&above), &[Y0 * omega * emission], &[BLACK], 1e-4);
         } else {
             assert_eq!(above.sh, vec![BLACK; 9]);
-            assert!(above.back_face_fraction > 0.0);
+            assert!(above.dark_back_fraction > 0.0);
         }
     }
 }
@@ -294,9 +294,9 @@ fn backs_are_black() {
     stage.environment(Environment::Constant { radiance: Vec3::ONE });
     let inside = probe(&stage.snapshot(), Vec3::ZERO, 3);
     assert_eq!(inside.sh, vec![BLACK; 9]);
-    assert_eq!(inside.back_face_fraction, 1.0);
+    assert_eq!(inside.dark_back_fraction, 1.0);
     let outside = probe(&stage.snapshot(), Vec3::new(0.0, 3.0, 0.0), 0);
-    assert!(outside.sh[0].min_element() > 0.0 && outside.back_face_fraction == 0.0);
+    assert!(outside.sh[0].min_element() > 0.0 && outside.dark_back_fraction == 0.0);
 }
 
 /// Covered with probability alpha: black walls of alpha ¼ let ¾ of the light in.

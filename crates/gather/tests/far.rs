@@ -60,11 +60,11 @@ fn probes_see_what_they_see_near_the_origin() {
                 let tolerance = 5.0 * (*e + *f) + slack * near.sh[0];
                 assert!((a - b).abs().cmple(tolerance).all(), "{rooms:?} {k}: {a} {b}");
             }
-            assert!(near.sh[0].x > 1.0 && far.back_face_fraction == 0.0);
+            assert!(near.sh[0].x > 1.0 && far.dark_back_fraction == 0.0);
         }
         for (far, _) in beside(&rooms, &DARK, probes) {
             assert!(far.sh.iter().all(|c| *c == Vec3::ZERO), "{rooms:?}: {:?}", far.sh);
-            assert_eq!(far.back_face_fraction, 0.0);
+            assert_eq!(far.dark_back_fraction, 0.0);
         }
     }
 }

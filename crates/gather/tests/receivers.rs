@@ -34,7 +34,7 @@ fn irradiance(scene: &Arc<Snapshot>, lumel: Receiver) -> f32 {
     let sums = gather(Job { bounces: 0, ..Job::new(scene.clone(), [lumel], 1 << 16) });
     let sums = sums.at(0);
     assert_eq!((sums.sum.len(), sums.squares.len(), sums.count), (1, 1, 1 << 16));
-    assert_eq!(sums.back_face_fraction, 0.0);
+    assert_eq!(sums.dark_back_fraction, 0.0);
     sums.sum[0].x / sums.count as f32
 }
 

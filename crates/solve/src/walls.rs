@@ -27,7 +27,7 @@ const MEMORY: f32 = 0.1;
 /// What a probe saw in one tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sight {
-    /// [`SumsAt::back_face_fraction`] and [`SumsAt::culled_fraction`].
+    /// [`SumsAt::dark_back_fraction`] and [`SumsAt::culled_fraction`].
     backs: f32,
     culled: f32,
     samples: u32,
@@ -38,7 +38,7 @@ pub(crate) struct Sight {
 impl Sight {
     pub(crate) fn of(sums: &SumsAt<'_>) -> Self {
         Self {
-            backs: sums.back_face_fraction,
+            backs: sums.dark_back_fraction,
             culled: sums.culled_fraction,
             samples: sums.count,
             lit: sums.sum.first().is_some_and(|c0| *c0 != Vec3::ZERO),

@@ -9,7 +9,9 @@ use lumencast_charts::{LaidOut, Sheet, laid_out, sheets};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Receiver, Shading};
 use lumencast_light::{FieldId, Grid, Light, Lightmap, Order, Place, ProbeVolume, SurfaceId};
-use lumencast_scene::{Edit, Environment, LightmapSpec, Material, Scene, Snapshot, Transform};
+use lumencast_scene::{
+    Edit, Environment, LightKind, LightmapSpec, Material, PunctualLight, Scene, Snapshot, Transform,
+};
 use lumencast_solve::blend::BlendSettings;
 use lumencast_solve::{
     FitEffort, GatherOptions, LightmapSolver, Request, Solver, Turn, spread, with_backs,
@@ -276,6 +278,55 @@ fn lumels_within_something_take_the_light_about_them() {
     assert!((0.01..0.1).contains(&share), "{share}");
     let dark = irradiances(&scene, &lightmap, 2000).iter().filter(|e| e.x < 0.2 * PI).count();
     assert_eq!(dark, 0);
+}
+
+/// Behind a pane, and in a room whose walls are wound outwards, lumels see little but the backs of
+/// double-sided surfaces. Light comes from these, so what arrives is shown.
+#[test]
+fn lumels_before_backs_that_are_lit_have_their_own_light() {
+    let of_both_sides = |stage: &mut Stage| {
+        let both = lambert(Vec3::splat(0.5), Vec3::ZERO);
+        stage.material(Material { double_sided: true, ..both })
+    };
+    let mut pane = Stage::default();
+    let both = of_both_sides(&mut pane);
+    pane.quad(Vec3::new(-1.0, 0.0, -1.0), 2.0 * Vec3::Z, 2.0 * Vec3::X, both);
+    pane.quad(Vec3::new(-0.5, 0.25, -0.5), Vec3::Z, Vec3::X, both);
+    pane.environment(Environment::Constant { radiance: Vec3::ONE });
+    let mut room = Stage::default();
+    let both = of_both_sides(&mut room);
+    room.room(Vec3::ZERO, Vec3::splat(-2.0), both);
+    room.quad(Vec3::new(-0.5, 0.0, -0.5), Vec3::Z, Vec3::X, both);
+    let lamp = PunctualLight {
+        kind: LightKind::Point { radius: 0.0 },
+        color: Vec3::ONE,
+        intensity: 10.0,
+        range: None,
+    };
+    room.light(lamp, Vec3::new(0.2, 0.7, 0.3), Vec3::Y);
+    for (stage, from) in [(pane, Vec3::splat(-0.4)), (room, Vec3::splat(-0.5))] {
+        let scene = stage.snapshot();
+        let (_, _, lightmap) = lit(&scene, 3, 1024);
+        let seen = |place: &Place| {
+            place.normal.y > 0.9
+                && place.position.y == 0.0
+                && place.position.cmpge(from).all()
+                && place.position.cmple(-from).all()
+        };
+        let places: Vec<Place> =
+            spread(&scene, &lightmap.layout, 4000).into_iter().filter(seen).collect();
+        assert!(places.len() > 50, "{}", places.len());
+        let receivers: Vec<Receiver> =
+            places.iter().map(|place| Receiver::point(place.position, place.normal)).collect();
+        let mut tracer = tracer();
+        let ticket = tracer.submit(Job { bounces: 3, ..Job::new(scene.clone(), receivers, 4096) });
+        let right = tracer.wait(ticket).expect("light");
+        for (place, right) in places.iter().zip(right.sums.iter()) {
+            let right = right.mean().next().expect("irradiance").x;
+            let told = lightmap.irradiance_at(&place.on.expect("a point")).expect("lumels").x;
+            assert!((told / right - 1.0).abs() < 0.1, "{told}, not {right} at {}", place.position);
+        }
+    }
 }
 
 /// What is not finite does not count, nor what was never gathered.

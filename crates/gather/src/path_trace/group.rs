@@ -500,7 +500,7 @@ impl Shader<'_, '_> {
             let path = &self.paths[index as usize];
             let scattered = path.throughput * (weight * arriving);
             let scattered = self.limited(self.depth + 1, scattered);
-            self.paths[index as usize].seen.add(Part::Indirect, scattered);
+            self.paths[index as usize].seen.add_known(scattered);
         }
     }
 

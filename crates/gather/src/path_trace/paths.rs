@@ -83,6 +83,8 @@ pub(crate) struct Seen {
     pub(crate) front: bool,
     /// Whether the first surface is seen from the back of a single-sided material.
     pub(crate) culled: bool,
+    /// Whether the path found a source of light, not only light that was known.
+    pub(crate) lit: bool,
 }
 
 impl Seen {
@@ -93,6 +95,7 @@ impl Seen {
         normal: Vec3::ZERO,
         front: false,
         culled: false,
+        lit: false,
     };
 
     /// Arriving radiance, cd/m².
@@ -100,11 +103,18 @@ impl Seen {
         self.direct + self.indirect
     }
 
+    /// Adds radiance of a source.
     pub(super) fn add(&mut self, part: Part, light: Vec3) {
+        self.lit |= light != Vec3::ZERO;
         match part {
             Part::Direct => self.direct += light,
             Part::Indirect => self.indirect += light,
         }
+    }
+
+    /// Adds radiance of light that was known.
+    pub(super) fn add_known(&mut self, light: Vec3) {
+        self.indirect += light;
     }
 }
 

@@ -150,7 +150,7 @@ impl BatchSums {
         let mut sum = [Vec3::ZERO; sh::MAX_COEFFICIENTS];
         let mut squares = [0.0; sh::MAX_COEFFICIENTS];
         let mut distances = [Vec2::ZERO; sh::MAX_COEFFICIENTS];
-        let (mut backs, mut culled) = (0, 0);
+        let (mut dark_backs, mut culled) = (0, 0);
         for ((sample, seen), reached) in (tile.first..tile.end).zip(seen).zip(reached) {
             let radiance = seen.radiance();
             let terms = aim.terms(sample);
@@ -176,7 +176,8 @@ impl BatchSums {
                     front: seen.front,
                 }));
             }
-            backs += u32::from(seen.normal != Vec3::ZERO && !seen.front);
+            let is_back = seen.normal != Vec3::ZERO && !seen.front;
+            dark_backs += u32::from(is_back && !seen.lit);
             culled += u32::from(seen.culled);
         }
         self.sum.extend_from_slice(&sum[..count]);
@@ -184,7 +185,7 @@ impl BatchSums {
         if job.distances.is_some() {
             self.distances.extend_from_slice(&distances[..count]);
         }
-        self.backs.push([backs, culled]);
+        self.backs.push([dark_backs, culled]);
     }
 }
 
@@ -221,7 +222,7 @@ impl Total {
             sum: &sum[..terms],
             squares: &squares[..terms],
             count: self.count,
-            back_face_fraction: share(self.backs[0]),
+            dark_back_fraction: share(self.backs[0]),
             culled_fraction: share(self.backs[1]),
             distances: &distances[..asked],
             surfaces: &self.surfaces,

@@ -50,8 +50,8 @@ pub struct ProbeEstimate {
     pub sh: Vec<Vec3>,
     /// Standard errors of the coefficients, from the differences between lattices.
     pub standard_error: Vec<Vec3>,
-    /// As in [`SumsAt::back_face_fraction`].
-    pub back_face_fraction: f32,
+    /// As in [`SumsAt::dark_back_fraction`].
+    pub dark_back_fraction: f32,
 }
 
 /// Estimates the light at points, in order.
@@ -99,7 +99,7 @@ fn combine(lattices: &[SumsAt<'_>]) -> ProbeEstimate {
     ProbeEstimate {
         sh,
         standard_error,
-        back_face_fraction: (lattices.iter().map(|s| f64::from(s.back_face_fraction)).sum::<f64>()
+        dark_back_fraction: (lattices.iter().map(|s| f64::from(s.dark_back_fraction)).sum::<f64>()
             / n) as f32,
     }
 }

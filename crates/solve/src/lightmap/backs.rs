@@ -1,8 +1,8 @@
 //! Which backs of surfaces have lumels.
 //!
 //! Most materials of real files are double-sided, and most of their backs lie within something. What
-//! the back of a chart sees decides: where its points see the fronts of surfaces, or nothing at all,
-//! light can arrive.
+//! the back of a chart sees decides: where its points see the fronts of surfaces, backs that are lit, or
+//! nothing at all, light can arrive.
 
 use std::sync::Arc;
 
@@ -17,8 +17,10 @@ use crate::error::SolveError;
 const POINTS: usize = 4;
 /// Directions in which each looks.
 const DIRECTIONS: u32 = 32;
-/// A point sees light if fewer of its directions than this share meet the back of a surface.
-const BACKS: f32 = 0.5;
+/// A point sees light if fewer of its directions than this share meet the back of a surface that is dark.
+const DARK_BACKS: f32 = 0.5;
+/// Light that is scattered so often tells whether a back is dark.
+const BOUNCES: u32 = 1;
 
 /// The sheets, and those of their backs that light can reach: charts of double-sided materials that see
 /// something.
@@ -54,12 +56,12 @@ pub fn with_backs(
     if receivers.is_empty() {
         return Ok(sheets);
     }
-    let look = Job { bounces: 0, ..Job::new(scene.clone(), receivers, DIRECTIONS) };
+    let look = Job { bounces: BOUNCES, ..Job::new(scene.clone(), receivers, DIRECTIONS) };
     let ticket = gatherer.submit(look);
     let found = gatherer.wait(ticket).ok_or(SolveError::Gather)?;
     let mut reached: Vec<Option<Vec<bool>>> = vec![None; sheets.len()];
     for ((sheet, chart), sums) in asked.into_iter().zip(found.sums.iter()) {
-        if sums.back_face_fraction < BACKS {
+        if sums.dark_back_fraction < DARK_BACKS {
             let charts = sheets[sheet].charts();
             reached[sheet].get_or_insert_with(|| vec![false; charts])[chart as usize] = true;
         }

@@ -6,7 +6,7 @@ use lumencast_light::luminance;
 
 use super::change::Change;
 
-/// Share of backs, by winding, above which a lumel lies within something: its light is that of the
+/// Share of backs without light above which a lumel lies within something: its light is that of the
 /// lumels about it.
 const BURIED_ABOVE: f32 = 0.5;
 /// So many samples tell whether it does.
@@ -26,7 +26,7 @@ pub(crate) struct Sum {
     /// Sum over samples of the square of its luminance.
     squares: f32,
     samples: f32,
-    /// Samples that met the back of a surface first.
+    /// Samples that first met the back of a surface, by winding, and found no light from there.
     backs: f32,
 }
 
@@ -35,7 +35,7 @@ impl Sum {
     pub(crate) fn of(found: &SumsAt<'_>) -> Option<Self> {
         let (sum, squares) = (*found.sum.first()?, *found.squares.first()?);
         let samples = found.count as f32;
-        let backs = found.back_face_fraction * samples;
+        let backs = found.dark_back_fraction * samples;
         let is_sound = sum.is_finite() && squares.is_finite() && samples > 0.0;
         is_sound.then_some(Self { sum, squares, samples, backs })
     }
