@@ -17,8 +17,10 @@ use crate::sheet::Sheet;
 pub const PAGE: u32 = 1024;
 /// Pages of that size, at most.
 pub const MOST_PAGES: u32 = 8;
-/// Lumels a side of the page that scenes fill that ask for no density, at least.
-const USUAL: u32 = 256;
+/// Lumels a side of the page that scenes fill that ask for no density: the smallest of which charts cover
+/// a share, or else the largest.
+const USUAL: [u32; 3] = [256, 512, PAGE];
+const COVERED: f64 = 0.25;
 /// Side of the smallest lumels that larger scenes get which ask for no density, metres. Light of twice as
 /// many lumels takes twice as long to compute.
 const FINEST: f64 = 0.07;
@@ -71,7 +73,8 @@ impl LaidOut {
 /// smaller page or up to [`MOST_PAGES`] pages of [`PAGE`]², or with the smallest lumels that fit these.
 ///
 /// Where nothing is asked for, lumels are a decimetre large, or as small as 7 cm where the pages which that
-/// takes have room for them. What would not fill a page of 256² fills it.
+/// takes have room for them. What would not fill a page of 256² fills it, or a larger one where most of that
+/// would lie between charts.
 ///
 /// # Errors
 /// [`ChartError::NoRoom`] where no density fits, [`ChartError::NoArea`] without sheets, and whatever the
@@ -92,18 +95,18 @@ pub fn laid_out(
 
 /// Lays out the sheets of a scene that asks for no density: with a lumel every decimetre, or with smaller
 /// ones of down to 7 cm where the pages which that takes have room for them. A scene that would not
-/// fill a page of 256² fills it.
+/// fill a page of 256² fills it, or a larger one.
 fn usual(sheets: &[Sheet], area: f64) -> Result<LaidOut, ChartError> {
-    let filled = (area / FILLED).sqrt() / f64::from(USUAL);
+    let charts: usize = sheets.iter().map(Sheet::charts).sum();
+    let filled = (area / FILLED).sqrt() / f64::from(USUAL[0]);
     if filled < f64::from(LightmapSpec::TEXEL) {
-        return by_spec(sheets, area, LightmapSpec::Size(USUAL));
+        return by_spec(sheets, area, LightmapSpec::Size(page_for(charts)));
     }
     let usual = by_spec(sheets, area, LightmapSpec::default())?;
     if usual.coarser {
         return Ok(usual);
     }
     let Layout { page_size, pages, .. } = usual.layout;
-    let charts: usize = sheets.iter().map(Sheet::charts).sum();
     let promised = roomiest(&usual, (area / charts as f64).sqrt());
     let mut density = (promised * FIRST).min(1.0 / FINEST);
     for _ in 0..ATTEMPTS {
@@ -116,6 +119,17 @@ fn usual(sheets: &[Sheet], area: f64) -> Result<LaidOut, ChartError> {
         density /= BACK;
     }
     Ok(usual)
+}
+
+/// The page that so many charts fill, if they are squares alike. Padding lies about each, and about as
+/// much is covered in part alone.
+fn page_for(charts: usize) -> u32 {
+    let covered = |page: u32| {
+        let side = f64::from(page) * (FILLED / charts as f64).sqrt() - f64::from(2 * PADDING);
+        charts as f64 * (side.max(0.0) / f64::from(page)).powi(2)
+    };
+    let [.., largest] = USUAL;
+    USUAL.into_iter().find(|page| covered(*page) >= COVERED).unwrap_or(largest)
 }
 
 /// The density, up to [`FINEST`], at which the pages of a layout have room for its rectangles, if these grow

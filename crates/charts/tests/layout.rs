@@ -167,6 +167,32 @@ fn scenes_that_ask_for_nothing_fill_their_pages() {
     assert!((0.0977..0.0985).contains(&texel), "as small as a page allows: {texel}");
 }
 
+/// On a page of 256² most of these would be padding.
+#[test]
+fn many_little_things_have_a_larger_page() {
+    let of = |side: i32| {
+        let mut stage = Stage::default();
+        let material = stage.material(grey());
+        stage.quad(Vec3::ZERO, 0.3 * Vec3::X, 0.4 * Vec3::Y, material);
+        let mesh = stage.snapshot().instances[0].mesh.clone();
+        for k in 1..side * side {
+            let at = Vec3::new((k % side) as f32, (k / side) as f32, 0.0);
+            stage.instance(MeshId(0), mesh.clone(), Affine3A::from_translation(at));
+        }
+        let snapshot = stage.snapshot();
+        let laid_out = laid_out(&cut(&snapshot).sheets, None).unwrap();
+        check(&snapshot, &laid_out);
+        let area = 0.12 * (side * side) as f32;
+        let covered = area / laid_out.texel.powi(2) / laid_out.layout.lumel_count() as f32;
+        (laid_out.layout.page_size, covered)
+    };
+    for (side, page) in [(12, 256), (30, 512), (50, 1024)] {
+        let (size, covered) = of(side);
+        assert_eq!(size, page);
+        assert!(covered > 0.25, "{side}: {covered}");
+    }
+}
+
 /// Nine surfaces of 100 × 100 m: at a decimetre each nearly fills a page.
 #[test]
 fn lumels_grow_where_pages_end() {
