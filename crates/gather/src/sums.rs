@@ -42,9 +42,9 @@ pub struct SumsAt<'a> {
     pub squares: &'a [f32],
     /// Number of samples taken.
     pub count: u32,
-    /// Share of the samples that first met the back of a surface (by winding order) and found no
-    /// source of light from there, 0 to 1. It is near 1 inside solid objects. Light of an earlier job
-    /// is no source.
+    /// Share of the samples that first met the back of a surface (by winding order), which emits or
+    /// from which they found no source of light, 0 to 1. It is near 1 inside solid objects and lamps.
+    /// Light of an earlier job is no source.
     pub dark_back_fraction: f32,
     /// Share of the samples that first met the back of a single-sided material, 0 to 1. Such backs
     /// are not meant to be seen.

@@ -208,6 +208,7 @@ impl Shader<'_, '_> {
                 path.seen.culled = !front && !spot.material.double_sided;
             }
             let mut emitted = spot.emission_seen(front, world.model);
+            path.seen.shines |= depth == 0 && emitted != Vec3::ZERO;
             if emitted == Vec3::ZERO {
                 continue;
             }

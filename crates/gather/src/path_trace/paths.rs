@@ -83,6 +83,8 @@ pub(crate) struct Seen {
     pub(crate) front: bool,
     /// Whether the first surface is seen from the back of a single-sided material.
     pub(crate) culled: bool,
+    /// Whether the first surface emits to the seen side.
+    pub(crate) shines: bool,
     /// Whether the path found a source of light, not only light that was known.
     pub(crate) lit: bool,
 }
@@ -95,6 +97,7 @@ impl Seen {
         normal: Vec3::ZERO,
         front: false,
         culled: false,
+        shines: false,
         lit: false,
     };
 

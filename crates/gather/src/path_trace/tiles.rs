@@ -177,7 +177,7 @@ impl BatchSums {
                 }));
             }
             let is_back = seen.normal != Vec3::ZERO && !seen.front;
-            dark_backs += u32::from(is_back && !seen.lit);
+            dark_backs += u32::from(is_back && (seen.shines || !seen.lit));
             culled += u32::from(seen.culled);
         }
         self.sum.extend_from_slice(&sum[..count]);
