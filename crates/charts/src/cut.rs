@@ -10,7 +10,7 @@ use lumencast_light::{ChartVertex, Charts};
 use uvunwrap::{Atlas, Density, Error, MeshInput, Options, OutputMesh, Packing, Progress, Stage};
 
 use crate::error::ChartError;
-use crate::lumels::{LOOKED_AT, overlaps};
+use crate::overlaps::{LOOKED_AT, overlaps};
 use crate::parts::parts;
 
 /// Charts of a primitive, at most: what has more is a cloud of splinters that fills pages with padding.
@@ -133,7 +133,7 @@ fn overlapping(vertices: &[CutVertex], triangles: &[[u32; 3]], metres: Vec2) -> 
     let scale = LOOKED_AT as f32 / metres.max_element();
     let placed = triangles.iter().filter(|triangle| **triangle != Charts::NOWHERE);
     let lumels = |triangle: &[u32; 3]| triangle.map(|v| scale * vertices[v as usize].at);
-    let found = overlaps(placed.map(lumels), UVec2::splat(LOOKED_AT));
+    let found = overlaps(placed.map(lumels));
     found.twice as f32 / found.all.max(1) as f32
 }
 

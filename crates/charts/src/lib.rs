@@ -22,6 +22,7 @@ mod error;
 mod extend;
 mod layout;
 mod lumels;
+mod overlaps;
 mod parts;
 mod raster;
 mod sheet;

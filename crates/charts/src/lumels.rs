@@ -1,6 +1,6 @@
 //! Where the lumels of charts lie on the surface.
 
-use glam::{UVec2, Vec2, Vec3};
+use glam::{UVec2, Vec3};
 use lumencast_light::{Charts, Layout, Rectangle, Surface};
 
 use crate::raster::shares;
@@ -52,35 +52,6 @@ pub fn lumels_on_pages<'a>(
         let Rectangle { page, corner } = surface.rectangles[lumel.rectangle as usize];
         (layout.index(page, corner + lumel.at), lumel)
     })
-}
-
-/// Places are looked at by so many lumels a side, to find overlaps.
-pub(crate) const LOOKED_AT: u32 = 1024;
-
-/// Lumels whose middles lie well within triangles.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Within {
-    /// Within any.
-    pub(crate) all: usize,
-    /// Within two or more: none unless charts overlap.
-    pub(crate) twice: usize,
-}
-
-/// Counts the lumels that triangles hold, and those that several do. `corners` are in lumels.
-pub(crate) fn overlaps(corners: impl Iterator<Item = [Vec2; 3]>, size: UVec2) -> Within {
-    /// A middle nearer to an edge than this share of the triangle is left to its neighbour.
-    const WITHIN: f32 = 1e-2;
-    let mut held = vec![0_u8; size.element_product() as usize];
-    for triangle in corners {
-        for share in shares(triangle, size) {
-            if share.holds_middle && share.weights.min_element() > WITHIN {
-                let times = &mut held[(share.lumel.y * size.x + share.lumel.x) as usize];
-                *times = times.saturating_add(1);
-            }
-        }
-    }
-    let of = |least: u8| held.iter().filter(|times| **times >= least).count();
-    Within { all: of(1), twice: of(2) }
 }
 
 /// The best offer for each lumel.

@@ -4,14 +4,14 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::{Mat3, UVec2, Vec2, Vec3};
+use glam::{Mat3, Vec2, Vec3};
 use lumencast_light::SurfaceId;
 use lumencast_scene::{Instance, Material, Primitive, Snapshot};
 use rayon::prelude::*;
 
 use crate::cut::{Cut, Shape, cut};
 use crate::error::ChartError;
-use crate::lumels::{LOOKED_AT, overlaps};
+use crate::overlaps::{LOOKED_AT, overlaps};
 use crate::store::{Key, Store};
 
 /// Coordinates so far outside of [0, 1] are inside.
@@ -257,7 +257,7 @@ fn own_coordinates(primitive: &Primitive) -> Result<Option<&[Vec2]>, &'static st
         return Err("leave the square from 0 to 1");
     }
     let lumels = |triangle: &[u32; 3]| triangle.map(|v| LOOKED_AT as f32 * uv[v as usize]);
-    if overlaps(primitive.triangles.iter().map(lumels), UVec2::splat(LOOKED_AT)).twice > 0 {
+    if overlaps(primitive.triangles.iter().map(lumels)).twice > 0 {
         return Err("overlap");
     }
     Ok(Some(uv))
