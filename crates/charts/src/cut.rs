@@ -10,7 +10,7 @@ use lumencast_light::{ChartVertex, Charts};
 use uvunwrap::{Atlas, Density, Error, MeshInput, Options, OutputMesh, Packing, Progress, Stage};
 
 use crate::error::ChartError;
-use crate::overlaps::{LOOKED_AT, overlaps};
+use crate::overlaps::overlaps;
 use crate::parts::parts;
 
 /// Charts of a primitive, at most: what has more is a cloud of splinters that fills pages with padding.
@@ -130,10 +130,10 @@ pub(crate) fn cut(shape: &Shape<'_>, watch: Watch<'_>) -> Result<Cut, ChartError
 
 /// The share of places on charts, which lie on so many metres, that belong to two triangles.
 fn overlapping(vertices: &[CutVertex], triangles: &[[u32; 3]], metres: Vec2) -> f32 {
-    let scale = LOOKED_AT as f32 / metres.max_element();
+    let scale = metres.max_element().recip();
     let placed = triangles.iter().filter(|triangle| **triangle != Charts::NOWHERE);
-    let lumels = |triangle: &[u32; 3]| triangle.map(|v| scale * vertices[v as usize].at);
-    let found = overlaps(placed.map(lumels));
+    let corners = |triangle: &[u32; 3]| triangle.map(|v| scale * vertices[v as usize].at);
+    let found = overlaps(placed.map(corners));
     found.twice as f32 / found.all.max(1) as f32
 }
 

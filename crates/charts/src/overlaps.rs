@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use glam::{DVec2, Vec2};
 
-/// Places are looked at by so many lumels a side.
-pub(crate) const LOOKED_AT: u32 = 1024;
+/// The unit square is looked at by so many lumels a side.
+const LOOKED_AT: u32 = 1024;
 
 /// A middle nearer to an edge than this share of the triangle is left to its neighbour.
 const WITHIN: f64 = 1e-2;
@@ -20,8 +20,7 @@ pub(crate) struct Within {
     pub(crate) twice: u32,
 }
 
-/// Counts the lumels that triangles hold, and those that several do, on a square of [`LOOKED_AT`]
-/// lumels a side. `corners` are in lumels.
+/// Counts the lumels that triangles hold, and those that several do, of 1024² in the unit square.
 pub(crate) fn overlaps(corners: impl Iterator<Item = [Vec2; 3]>) -> Within {
     let words = (LOOKED_AT * LOOKED_AT / WORD) as usize;
     let (mut once, mut twice) = (vec![0_u64; words], vec![0_u64; words]);
@@ -57,8 +56,9 @@ struct Triangle {
 }
 
 impl Triangle {
+    /// One whose corners lie in the unit square, in lumels.
     fn new(corners: [Vec2; 3]) -> Option<Self> {
-        let corners @ [a, b, c] = corners.map(|corner| corner.as_dvec2());
+        let corners @ [a, b, c] = corners.map(|at| f64::from(LOOKED_AT) * at.as_dvec2());
         let twice = (b - a).perp_dot(c - a);
         (twice.abs() > 0.0 && twice.is_finite()).then_some(Self { corners, twice })
     }
@@ -98,6 +98,11 @@ mod tests {
 
     use super::*;
     use crate::raster::barycentric;
+
+    /// [`super::overlaps`] of triangles whose corners are in lumels.
+    fn overlaps(corners: impl Iterator<Item = [Vec2; 3]>) -> Within {
+        super::overlaps(corners.map(|triangle| triangle.map(|at| at / LOOKED_AT as f32)))
+    }
 
     /// Corners spread over the square and beyond it.
     fn corners(seed: u32) -> [Vec2; 3] {

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::cut::{Cut, Shape, cut};
 use crate::error::ChartError;
-use crate::overlaps::{LOOKED_AT, overlaps};
+use crate::overlaps::overlaps;
 use crate::store::{Key, Store};
 
 /// Coordinates so far outside of [0, 1] are inside.
@@ -256,8 +256,8 @@ fn own_coordinates(primitive: &Primitive) -> Result<Option<&[Vec2]>, &'static st
     if !uv.iter().all(within) {
         return Err("leave the square from 0 to 1");
     }
-    let lumels = |triangle: &[u32; 3]| triangle.map(|v| LOOKED_AT as f32 * uv[v as usize]);
-    if overlaps(primitive.triangles.iter().map(lumels)).twice > 0 {
+    let corners = |triangle: &[u32; 3]| triangle.map(|v| uv[v as usize]);
+    if overlaps(primitive.triangles.iter().map(corners)).twice > 0 {
         return Err("overlap");
     }
     Ok(Some(uv))
