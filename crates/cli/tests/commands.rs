@@ -322,7 +322,7 @@ fn bench_lightmap_judges_the_light_of_lumels() {
     assert!((44.0..120.0).contains(&bytes), "{bytes}");
     let of_pages = report["bytes_a_lumel_of_pages"].as_f64().expect("a number");
     assert!((16.0..bytes).contains(&of_pages), "{of_pages}");
-    assert_eq!(report["coded"].as_array().map(Vec::len), Some(8));
+    assert_eq!(report["coded"].as_array().map(Vec::len), Some(10));
     assert!(report["poison_codes"].as_f64().is_some_and(|codes| codes <= 1.0), "{report}");
     let words = bench(&few).stdout;
     assert!(words.contains("irradiance: ") && words.contains("1 × 256²"), "{words}");

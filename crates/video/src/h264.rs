@@ -3,32 +3,36 @@
 use openh264::OpenH264API;
 use openh264::decoder::{DecodedYUV, Decoder};
 use openh264::encoder::{
-    BitRate, Complexity, Encoder, EncoderConfig, FrameRate, FrameType, IntraFramePeriod, QpRange,
+    BitRate, Complexity, Encoder, EncoderConfig, FrameRate, FrameType, IntraFramePeriod,
     RateControlMode, SpsPpsStrategy, UsageType, VuiConfig,
 };
 use openh264::formats::{YUVSlices, YUVSource};
-use openh264_sys2::{ENCODER_OPTION_TRACE_LEVEL, WELS_LOG_QUIET};
+use openh264_sys2::{ENCODER_OPTION_SVC_ENCODE_PARAM_EXT, SEncParamExt};
 
 use crate::VideoError;
 use crate::picture::{Picture, PictureDecoder, PictureEncoder};
 
-/// A quantisation parameter: each 6 more double the step. The encoder takes 12 to 36.
+/// A quantisation parameter: each 6 more double the step. Lumels take 6 to 36.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Qp(u8);
 
 impl Qp {
     /// The finest and the coarsest.
-    pub const RANGE: std::ops::RangeInclusive<u8> = 12..=36;
+    pub const RANGE: std::ops::RangeInclusive<u8> = 6..=36;
 
-    /// The parameter, if the encoder takes it.
+    /// The parameter, if it is within the range.
     pub fn new(qp: u8) -> Option<Self> {
         Self::RANGE.contains(&qp).then_some(Self(qp))
     }
 
-    /// What suits lumels on pages of so many a side, so that they lose at most 1.5 dB: 12, but 18 for
-    /// pages of more than 512, which lose less and cost more bytes.
+    /// What suits lumels on pages of so many a side, so that they lose at most 1.5 dB: 9, but 12 for
+    /// pages of more than 256 and 18 for pages of more than 512, which lose less and cost more bytes.
     pub fn for_pages(side: u32) -> Self {
-        Self(if side <= 512 { 12 } else { 18 })
+        Self(match side {
+            0..=256 => 9,
+            257..=512 => 12,
+            _ => 18,
+        })
     }
 
     /// As a number.
@@ -69,8 +73,7 @@ impl H264Encoder {
             return Err(VideoError::Size { width, height });
         }
         let config = EncoderConfig::new()
-            .rate_control_mode(RateControlMode::Quality)
-            .qp(QpRange::new(qp.0, qp.0))
+            .rate_control_mode(RateControlMode::Off)
             .bitrate(AMPLE)
             .max_frame_rate(RATE)
             .skip_frames(false)
@@ -86,19 +89,39 @@ impl H264Encoder {
             .vui(VuiConfig::bt709_full());
         let mut encoder =
             Encoder::with_api_config(OpenH264API::from_source(), config).map_err(failed)?;
-        hush(&mut encoder);
+        // The library has settings to change once it has coded a picture.
+        encoder.encode(&planes(&Picture::plain(width, height, 128, [128; 2]))).map_err(failed)?;
+        let mut settings = settings(&mut encoder)?;
+        settings.sSpatialLayers[0].iDLayerQp = qp.0.into();
+        change(&mut encoder, settings)?;
         Ok(Self { encoder, size: (width, height) })
     }
 }
 
-/// Keeps the library from writing to the standard error that it keeps no bit rate.
-fn hush(encoder: &mut Encoder) {
-    let mut level = WELS_LOG_QUIET;
-    #[expect(unsafe_code, reason = "the wrapper sets the level once it has written already")]
-    // SAFETY: the option takes a pointer to an int, and reads it before it returns.
-    unsafe {
-        encoder.raw_api().set_option(ENCODER_OPTION_TRACE_LEVEL, (&raw mut level).cast());
-    }
+/// The settings that the library goes by.
+fn settings(encoder: &mut Encoder) -> Result<SEncParamExt, VideoError> {
+    let mut settings = SEncParamExt::default();
+    #[expect(unsafe_code, reason = "the wrapper does not tell settings")]
+    // SAFETY: the option takes a pointer to these settings, and writes them before it returns.
+    let result = unsafe {
+        let settings = (&raw mut settings).cast();
+        encoder.raw_api().get_option(ENCODER_OPTION_SVC_ENCODE_PARAM_EXT, settings)
+    };
+    if result == 0 { Ok(settings) } else { Err(unset()) }
+}
+
+fn change(encoder: &mut Encoder, mut settings: SEncParamExt) -> Result<(), VideoError> {
+    #[expect(unsafe_code, reason = "the wrapper has no quantiser without rate control")]
+    // SAFETY: the option takes a pointer to these settings, and reads them before it returns.
+    let result = unsafe {
+        let settings = (&raw mut settings).cast();
+        encoder.raw_api().set_option(ENCODER_OPTION_SVC_ENCODE_PARAM_EXT, settings)
+    };
+    if result == 0 { Ok(()) } else { Err(unset()) }
+}
+
+fn unset() -> VideoError {
+    VideoError::Encoder("it does not take the quantiser".into())
 }
 
 impl PictureEncoder for H264Encoder {
@@ -175,32 +198,20 @@ fn picture(decoded: &DecodedYUV<'_>) -> Picture {
 
 #[cfg(test)]
 mod tests {
-    use openh264_sys2::{
-        CAMERA_VIDEO_REAL_TIME, CONSTANT_ID, ENCODER_OPTION_SVC_ENCODE_PARAM_EXT,
-        MEDIUM_COMPLEXITY, RC_QUALITY_MODE, SEncParamExt,
-    };
+    use openh264_sys2::{CAMERA_VIDEO_REAL_TIME, CONSTANT_ID, MEDIUM_COMPLEXITY, RC_OFF_MODE};
 
     use super::*;
 
     /// The library may have its own mind: it is asked for the settings that it goes by.
     #[test]
     fn the_library_goes_by_the_settings_that_are_chosen() {
-        let mut encoder = H264Encoder::new(64, 32, Qp(18)).expect("an encoder");
-        let chroma = [vec![128; 32 * 16], vec![128; 32 * 16]];
-        let picture = Picture { width: 64, height: 32, luma: vec![90; 64 * 32], chroma };
-        encoder.encode(&picture, true).expect("a unit");
-        let mut has = SEncParamExt::default();
-        #[expect(unsafe_code, reason = "the wrapper does not tell settings")]
-        // SAFETY: the option takes a pointer to these parameters, and writes them before it returns.
-        let result = unsafe {
-            let api = encoder.encoder.raw_api();
-            api.get_option(ENCODER_OPTION_SVC_ENCODE_PARAM_EXT, (&raw mut has).cast())
-        };
-        assert_eq!(result, 0);
+        let mut encoder = H264Encoder::new(64, 32, Qp(9)).expect("an encoder");
+        encoder.encode(&Picture::plain(64, 32, 90, [128; 2]), true).expect("a unit");
+        let has = settings(&mut encoder.encoder).expect("settings");
         assert!(!has.bEnableFrameSkip && !has.bEnableSceneChangeDetect);
         assert!(!has.bEnableAdaptiveQuant && !has.bEnableBackgroundDetection);
         assert!(!has.bEnableLongTermReference && !has.bEnableDenoise);
-        assert_eq!((has.iMinQp, has.iMaxQp, has.iRCMode), (18, 18, RC_QUALITY_MODE));
+        assert_eq!(has.iRCMode, RC_OFF_MODE);
         assert_eq!((has.iTargetBitrate, has.fMaxFrameRate), (200_000_000, 30.0));
         assert_eq!(
             (has.iUsageType, has.iComplexityMode),
@@ -209,6 +220,7 @@ mod tests {
         assert_eq!((has.uiIntraPeriod, has.eSpsPpsIdStrategy), (0, CONSTANT_ID));
         assert_eq!(has.iMultipleThreadIdc, 1);
         let [layer, ..] = has.sSpatialLayers;
+        assert_eq!(layer.iDLayerQp, 9);
         assert!(layer.bVideoSignalTypePresent && layer.bFullRange, "full range");
     }
 }

@@ -64,9 +64,9 @@ pub(crate) struct LiveFieldsArguments {
     /// (h264-stacked), or as they are (halves), which takes a fast link.
     #[arg(long, value_enum, default_value_t = SentAs::H264)]
     lumel_coding: SentAs,
-    /// How coarse the video is; 6 more make half the bytes or less. Unless given, 12 for pages of up to
-    /// 512² lumels, and 18 for larger ones.
-    #[arg(long, value_name = "12..36", value_parser = qp)]
+    /// How coarse the video is; 6 more make half the bytes or less. Unless given, 9 for pages of up to
+    /// 256² lumels, 12 for those of up to 512², and 18 for larger ones.
+    #[arg(long, value_name = "6..36", value_parser = qp)]
     qp: Option<Qp>,
     /// Lets lumels also tell how light depends on the normal, for surfaces with normal maps. Takes about
     /// twice the bytes.

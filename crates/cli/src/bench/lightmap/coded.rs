@@ -8,7 +8,7 @@ use lumencast_light::{Lightmap, Told};
 use serde_json::{Value, json};
 
 /// Parameters that are tried.
-const QPS: [u8; 4] = [12, 15, 18, 24];
+const QPS: [u8; 5] = [9, 12, 15, 18, 24];
 
 /// A lightmap as one way of coding shows it.
 pub(super) struct Coded {
