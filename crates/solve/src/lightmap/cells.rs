@@ -7,7 +7,7 @@
 //! light changes get one with every job, and others get one now and then. The other samples are taken by
 //! blocks in turn, all lumels of each, so that little has to be solved anew. Blocks whose light has changed
 //! come first; noisy ones come more often (stride scheduling, Waldspurger and Weihl 1995). A block's first
-//! turns take one of about four lumels: the filter makes more of these than of as many samples at all.
+//! turns take few samples, so that all blocks soon have some.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
@@ -26,14 +26,14 @@ const CELL: u32 = 16;
 const CELLS: u32 = BLOCK / CELL;
 /// Lumels a side of a square of which a glance takes one, of each surface and direction.
 const GLANCE: u32 = 4;
-/// The same in the first turns of a block, and how many turns these are.
-const FIRST: u32 = 2;
-const FIRST_TURNS: u8 = 2;
+/// The same where probes tell what is shown at first.
+const TOLD: u32 = 2;
 /// Samples of a lumel in a glance: as many as let a glance at all cells take so many in all, a power of two
 /// within these bounds.
 const GLANCES_SAMPLES: u32 = 1 << 19;
 const GLANCE_SAMPLES: Range<u32> = 4..16;
-/// Samples of a lumel in a turn.
+/// Samples of a lumel in the first turns of a block, and in later ones.
+const FIRST_SAMPLES: [u32; 3] = [2, 2, 4];
 const TURN_SAMPLES: u32 = 8;
 /// The same in a turn that was hurried.
 const HURRIED_SAMPLES: u32 = 32;
@@ -53,10 +53,10 @@ const EVEN: f32 = 0.5;
 /// A square of lumels that are gathered at together.
 #[derive(Clone, Debug, PartialEq)]
 struct Cell {
-    /// Its lumels' receivers. The first ones are those of a glance, and those of the block's first turns.
+    /// Its lumels' receivers. The first ones are those of a glance, and those that probes tell of.
     receivers: Range<u32>,
     glance: u32,
-    first_turns: u32,
+    told: u32,
     /// The version of the scene at which it had its last glance.
     seen: Option<u64>,
 }
@@ -88,9 +88,10 @@ pub(crate) struct Cells {
     next_glance: usize,
     next_changing: usize,
     blocks: Vec<Turns>,
-    /// Cells that have not been gathered at in the turn that is under way.
+    /// Cells that have not been gathered at in the turn that is under way, and how many samples of a lumel
+    /// that takes.
     turn: Range<usize>,
-    is_one_of_first: bool,
+    turn_samples: u32,
     /// Number of turns until now.
     turns: u64,
     /// Cells whose turn comes before all others.
@@ -119,10 +120,10 @@ impl Cells {
         for block in places.chunk_by_mut(|a, b| key(a).0 == key(b).0) {
             let start = cells.len();
             for cell in block.chunk_by_mut(|a, b| key(a) == key(b)) {
-                let [glance, first_turns] = sorted(cell, page_size);
+                let [glance, told] = sorted(cell, page_size);
                 let receivers = first..first + cell.len() as u32;
                 first = receivers.end;
-                cells.push(Cell { receivers, glance, first_turns, seen: None });
+                cells.push(Cell { receivers, glance, told, seen: None });
             }
             blocks.push(Turns { cells: start..cells.len(), ..Turns::default() });
         }
@@ -193,16 +194,15 @@ impl Cells {
                 .iter_mut()
                 .min_by(|a, b| a.due.total_cmp(&b.due).then_with(|| a.last.cmp(&b.last)))?;
             self.turns += 1;
-            self.is_one_of_first = next.count < FIRST_TURNS;
+            let first = FIRST_SAMPLES.get(usize::from(next.count));
+            self.turn_samples = first.copied().unwrap_or(TURN_SAMPLES);
             next.count = next.count.saturating_add(1);
             self.turn = next.cells.clone();
             next.last = self.turns;
             let share = if mean > 0.0 { next.noise / mean } else { 1.0 };
             next.due += 1.0 / f64::from(EVEN + (1.0 - EVEN) * share);
         }
-        let Cell { receivers, first_turns, .. } = &self.cells[self.turn.next()?];
-        let end = if self.is_one_of_first { receivers.start + first_turns } else { receivers.end };
-        Some(receivers.start..end)
+        Some(self.cells[self.turn.next()?].receivers.clone())
     }
 
     /// Lets the cells of these receivers have their turn next.
@@ -259,8 +259,7 @@ impl Cells {
             {
                 calm += self.glance_at(cell, lumels, &mut budgets);
             } else if let Some(receivers) = self.next_turn() {
-                let spacing = if self.is_one_of_first { FIRST } else { 1 };
-                let part = Part { spacing, samples: TURN_SAMPLES };
+                let part = Part { spacing: 1, samples: self.turn_samples };
                 let all_alike = self.turns.is_multiple_of(BURIED);
                 let receivers = receivers.filter(|receiver| all_alike || !is_buried(*receiver));
                 turns += self.take(receivers, part, Some(self.turns), lumels, &mut budgets);
@@ -341,10 +340,10 @@ impl Cells {
         self.cells.partition_point(|cell| cell.receivers.end <= receiver)
     }
 
-    /// Whether a receiver is one of those that a block's first turns take.
-    pub(crate) fn is_of_first_turns(&self, receiver: u32) -> bool {
-        let Cell { receivers, first_turns, .. } = &self.cells[self.cell_of(receiver)];
-        receiver - receivers.start < *first_turns
+    /// Whether a receiver is one of those that probes tell of, where nothing else is known.
+    pub(crate) fn is_told(&self, receiver: u32) -> bool {
+        let Cell { receivers, told, .. } = &self.cells[self.cell_of(receiver)];
+        receiver - receivers.start < *told
     }
 
     /// The receivers of a cell.
@@ -364,11 +363,10 @@ impl Cells {
     }
 }
 
-/// Puts those lumels of a cell first that a glance takes, then those of a block's first turns, and counts
-/// both.
+/// Puts those lumels of a cell first that a glance takes, then those that probes tell of, and counts both.
 fn sorted(cell: &mut [LumelPlace], page_size: u32) -> [u32; 2] {
-    let [glance, first] = [GLANCE, FIRST].map(|side| spread_over(cell, side, page_size));
-    let rank = |k: &usize| match (glance[*k], first[*k]) {
+    let [glance, told] = [GLANCE, TOLD].map(|side| spread_over(cell, side, page_size));
+    let rank = |k: &usize| match (glance[*k], told[*k]) {
         (true, _) => 0,
         (false, true) => 1,
         (false, false) => 2,
@@ -452,12 +450,12 @@ mod tests {
         let squares: HashSet<UVec2> =
             seen.iter().map(|lumel| on_page(*lumel, PAGE).1 / GLANCE).collect();
         assert_eq!(squares.len(), seen.len(), "one of each square");
-        // Then one of four, and all of them.
-        let turns = u64::from(PAGE * PAGE * TURN_SAMPLES);
-        for count in [4, 4, 1] {
-            let turn = |_| lumels(&places, &cells.budgets(turns / 4 / count, 1, &all, |_| false));
+        // Then all of them, with few samples at first.
+        for samples in [2, 2, 4, 8, 8] {
+            let turns = u64::from(PAGE * PAGE * samples);
+            let turn = |_| lumels(&places, &cells.budgets(turns / 4, 1, &all, |_| false));
             let turned: HashSet<u32> = (0..4).flat_map(turn).collect();
-            assert_eq!(turned.len(), PAGE as usize * PAGE as usize / count as usize);
+            assert_eq!(turned.len(), PAGE as usize * PAGE as usize);
         }
     }
 

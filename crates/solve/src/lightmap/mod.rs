@@ -87,8 +87,10 @@ pub struct LightmapSolver {
     /// Blocks that are solved by and by: much more is known of them, or of what they read of others.
     due: Queue,
     ripening: Ripening,
-    /// Blocks that nothing was known of: those that show nothing, and those that show the light of probes.
-    /// The first ones are the next to show it.
+    /// Whether there are probes, so that their light is shown where little is known.
+    shows_probes: bool,
+    /// Blocks that were not solved yet: those that show nothing or light of before an edit, and those that
+    /// show the light of probes. The first ones are the next to show it.
     dark: VecDeque<Block>,
     unknown: VecDeque<Block>,
     /// Blocks without surfaces beside those that have some: they are solved with these.
@@ -145,6 +147,7 @@ impl LightmapSolver {
             ripening: Ripening::default(),
             dark: covered(&places, layout.page_size).into_iter().collect(),
             unknown: VecDeque::new(),
+            shows_probes: false,
             readers: Arc::new(readers),
             beside: Arc::new(empty_beside(&places, layout.page_size)),
             without: ids.filter(|id| !placed.contains_key(id)).collect(),
@@ -242,6 +245,7 @@ impl LightmapSolver {
     /// The scene was edited: light may be another from now on.
     pub fn expect_change(&mut self) {
         self.cells.expect_change();
+        self.dark.append(&mut self.unknown);
     }
 
     /// Irradiances that light has at the lumels that surfaces cover.

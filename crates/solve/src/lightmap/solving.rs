@@ -19,7 +19,7 @@ const LEFT: usize = 4;
 const DUE_AT_ONCE: usize = 4;
 /// More of these where there are many blocks: none waits for more than so many turns.
 const DUE_WITHIN: usize = 64;
-/// So many blocks that nothing is known of show the light of probes at a time, and so many do so again.
+/// So many blocks that little is known of show the light of probes at a time, and so many do so again.
 const DARK_AT_ONCE: usize = 16;
 const UNKNOWN_AT_ONCE: usize = 2;
 
@@ -87,21 +87,19 @@ impl LightmapSolver {
         next
     }
 
-    /// Lets blocks that nothing is known of show the light of probes, some at a time, until samples come;
-    /// again where no other blocks wait.
+    /// Lets blocks that little is known of show the light of probes, some at a time, again and again until
+    /// there are enough samples.
     fn show_probes(&mut self, probes: &Light, shown: &mut Lightmap) {
-        if probes.volumes().next().is_none() {
+        self.shows_probes = probes.volumes().next().is_some();
+        if !self.shows_probes {
             return;
         }
-        let Self { dark, unknown, ripening, news, .. } = self;
+        let Self { dark, unknown, ripening, .. } = self;
         dark.retain(|block| !ripening.is_solved(block));
         unknown.retain(|block| !ripening.is_solved(block));
-        let next: Vec<Block> = if !dark.is_empty() {
-            dark.drain(..DARK_AT_ONCE.min(dark.len())).collect()
-        } else if news.is_empty() {
-            unknown.drain(..UNKNOWN_AT_ONCE.min(unknown.len())).collect()
-        } else {
-            Vec::new()
+        let next: Vec<Block> = match dark.is_empty() {
+            false => dark.drain(..DARK_AT_ONCE.min(dark.len())).collect(),
+            true => unknown.drain(..UNKNOWN_AT_ONCE.min(unknown.len())).collect(),
         };
         unknown.extend(&next);
         let told: Vec<Vec<Vec3>> =
@@ -111,15 +109,14 @@ impl LightmapSolver {
         }
     }
 
-    /// The irradiance of probes at the lumels of a block, row by row: at those of a block's first turns, and
-    /// between them.
+    /// The irradiance of probes at the lumels of a block, row by row: at some of them, and between these.
     fn told_by_probes(&self, block: &Block, probes: &Light) -> Vec<Vec3> {
         let size = self.layout.page_size;
         let receiver = |number: u32| {
             let at = block.corner() + UVec2::new(number % BLOCK, number / BLOCK);
             let is_on_page = at.max_element() < size;
             let entry = is_on_page.then(|| self.receiver_of[self.layout.index(block.page, at)])?;
-            beyond::own(entry).filter(|receiver| self.cells.is_of_first_turns(*receiver))
+            beyond::own(entry).filter(|receiver| self.cells.is_told(*receiver))
         };
         let told = |receiver: u32| {
             let point = &self.points[receiver as usize];

@@ -18,6 +18,8 @@ use super::sums::{Sum, noise, scatter};
 
 /// What is shown of a lumel is a mean of about so many: the filter's.
 const ALIKE: f32 = 64.0;
+/// So many samples a lumel are better than the light of probes.
+const ENOUGH: f32 = 1.5;
 /// A cell that is brighter or darker by this share of its light is gathered at sooner than others.
 const MUCH: f32 = 0.1;
 
@@ -57,7 +59,8 @@ impl LightmapSolver {
             let sums = &self.sums[receivers];
             self.cells.set_noise(number, noise(sums));
             let known: f32 = sums.iter().map(Sum::samples).sum();
-            if self.ripening.is_solved(&block) || self.is_seen_all(number) {
+            let is_enough = !self.shows_probes || known >= ENOUGH * sums.len() as f32;
+            if self.ripening.is_solved(&block) || is_enough && self.is_seen_all(number) {
                 self.ripen(block, new / known, 0.0);
             }
         }
@@ -100,7 +103,9 @@ impl LightmapSolver {
             }
         }
         for (block, change) in blocks {
-            self.ripen(block, 0.0, change);
+            if self.ripening.is_solved(&block) {
+                self.ripen(block, 0.0, change);
+            }
         }
     }
 
