@@ -25,10 +25,6 @@ impl Queue {
         self.blocks.len()
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.blocks.is_empty()
-    }
-
     /// All that wait.
     pub(crate) fn all(&self) -> impl Iterator<Item = &Block> {
         self.blocks.iter()
