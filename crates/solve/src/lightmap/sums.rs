@@ -174,6 +174,21 @@ mod tests {
         assert!((mean.x - 1.1).abs() < 1e-4, "{mean}");
     }
 
+    /// Of values ±1 about the true mean, n have a mean of variance 1 / n.
+    #[test]
+    fn few_samples_are_not_thought_better_than_they_are() {
+        let either = [-1.0, 1.0];
+        let variances =
+            either.iter().flat_map(|a| either.map(|b| [10.0 + a, 10.0 + b])).map(|two| {
+                let (_, variance) = Sum::of_samples(two.into_iter()).known().expect("light");
+                variance
+            });
+        assert!((variances.sum::<f32>() / 4.0 - 0.5).abs() < 1e-4);
+        let many = Sum::of_samples((0..64).map(|k| either[k % 2]));
+        let (_, variance) = many.known().expect("light");
+        assert!((variance - 1.0 / 63.0).abs() < 1e-6, "{variance}");
+    }
+
     /// What is known follows changes, and weighs as much as they leave of it.
     #[test]
     fn changes_are_followed() {
