@@ -64,14 +64,21 @@ const RATE: FrameRate = FrameRate::from_hz(30.0);
 const LIMITS: (u32, u32) = (3840, 2160);
 
 impl H264Encoder {
-    /// For pictures of a size.
+    /// Whether pictures are of a size that can be encoded.
     ///
     /// # Errors
-    /// [`VideoError::Size`] beyond 3840 × 2160, either way round; [`VideoError::Encoder`].
+    /// [`VideoError::Size`] beyond 3840 × 2160, either way round.
+    pub fn check(width: u32, height: u32) -> Result<(), VideoError> {
+        let is_too_large = width.max(height) > LIMITS.0 || width.min(height) > LIMITS.1;
+        if is_too_large { Err(VideoError::Size { width, height }) } else { Ok(()) }
+    }
+
+    /// For pictures of a size. The first one is a keyframe, asked for or not.
+    ///
+    /// # Errors
+    /// As [`Self::check`]; [`VideoError::Encoder`].
     pub fn new(width: u32, height: u32, qp: Qp) -> Result<Self, VideoError> {
-        if width.max(height) > LIMITS.0 || width.min(height) > LIMITS.1 {
-            return Err(VideoError::Size { width, height });
-        }
+        Self::check(width, height)?;
         let config = EncoderConfig::new()
             .rate_control_mode(RateControlMode::Off)
             .bitrate(AMPLE)
@@ -94,6 +101,7 @@ impl H264Encoder {
         let mut settings = settings(&mut encoder)?;
         settings.sSpatialLayers[0].iDLayerQp = qp.0.into();
         change(&mut encoder, settings)?;
+        encoder.force_intra_frame();
         Ok(Self { encoder, size: (width, height) })
     }
 }

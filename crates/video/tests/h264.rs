@@ -126,6 +126,14 @@ fn keyframes_come_when_asked_for() {
     assert_eq!(types(&encoder.encode(&gradient(1, 0), true).unwrap()), types(&keyframe));
 }
 
+#[test]
+fn the_first_picture_is_a_keyframe_also_where_none_is_asked_for() {
+    let (mut encoder, mut decoder) = coder(18);
+    let first = encoder.encode(&gradient(0, 0), false).unwrap();
+    assert!(units(&first).iter().any(|(t, _)| *t == KEYFRAME));
+    decoder.decode(&first).unwrap();
+}
+
 /// Bits of a unit (H.264, 7.2 and 9.1).
 struct Bits {
     bytes: Vec<u8>,

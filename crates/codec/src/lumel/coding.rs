@@ -58,9 +58,9 @@ impl LumelCoding {
     pub fn check(self, page_size: u32) -> Result<(), VideoError> {
         match self.video() {
             None => Ok(()),
-            Some((packing, qp)) => {
+            Some((packing, _)) => {
                 let (width, height) = packing.size(page_size);
-                H264Encoder::new(width, height, qp).map(drop)
+                H264Encoder::check(width, height)
             }
         }
     }
