@@ -97,10 +97,11 @@ impl LightmapSolver {
         let Self { dark, unknown, ripening, .. } = self;
         dark.retain(|block| !ripening.is_solved(block));
         unknown.retain(|block| !ripening.is_solved(block));
-        let next: Vec<Block> = match dark.is_empty() {
-            false => dark.drain(..DARK_AT_ONCE.min(dark.len())).collect(),
-            true => unknown.drain(..UNKNOWN_AT_ONCE.min(unknown.len())).collect(),
+        let (blocks, most) = match dark.is_empty() {
+            false => (dark, DARK_AT_ONCE),
+            true => (&mut *unknown, UNKNOWN_AT_ONCE),
         };
+        let next: Vec<Block> = blocks.drain(..most.min(blocks.len())).collect();
         unknown.extend(&next);
         let told: Vec<Vec<Vec3>> =
             next.par_iter().map(|block| self.told_by_probes(block, probes)).collect();
