@@ -20,6 +20,9 @@ pub(crate) const MOST_CHARTS: u32 = 1 << 16;
 pub(crate) const PADDING: u32 = 2;
 /// Charts begin half a lumel further in, so that borders along the axes go through lumels' middles.
 const INSET: Vec2 = Vec2::splat(0.5);
+/// A chart takes up to so many lumels more than it is long: it begins half a lumel further in, and in the
+/// midst of one.
+const ROUNDING: u32 = 3;
 /// Coordinates are multiples of a part of a lumel, as they are sent.
 const GRID: f32 = 256.0;
 /// Lumels that charts are laid out on first. They are laid out anew at the density that is asked for:
@@ -192,6 +195,21 @@ pub(crate) fn lay_out(
         placed[own] = *triangle;
     }
     Ok(Charts { sizes, vertices, triangles: placed })
+}
+
+/// The density, lumels a metre, beyond which one of the charts that `keep` names is longer than `most`
+/// lumels, with its padding.
+pub(crate) fn densest(cut: &Cut, keep: &dyn Fn(u32) -> bool, most: u32) -> f64 {
+    let mut bounds = vec![(Vec2::INFINITY, Vec2::NEG_INFINITY); cut.charts as usize];
+    for CutVertex { chart, at, .. } in &cut.vertices {
+        if let Some((low, high)) = bounds.get_mut(*chart as usize) {
+            (*low, *high) = (low.min(*at), high.max(*at));
+        }
+    }
+    let kept = bounds.iter().zip(0..).filter(|(_, chart)| keep(*chart));
+    let sides = kept.map(|((low, high), _)| f64::from((*high - *low).max_element()));
+    let longest = sides.fold(0.0, f64::max);
+    f64::from(most.saturating_sub(ROUNDING + 2 * PADDING).max(1)) / longest
 }
 
 /// Calls the library.

@@ -6,7 +6,7 @@ use glam::UVec2;
 use lumencast_light::{Charts, Layout, Rectangle, Surface, SurfaceId};
 
 use crate::error::ChartError;
-use crate::layout::{ALIGNMENT, LaidOut, charts};
+use crate::layout::{ALIGNMENT, LaidOut, PAGE, charts};
 use crate::sheet::Sheet;
 
 /// Lumels of all pages, at most.
@@ -22,7 +22,8 @@ pub struct Extended {
 }
 
 /// Lays out more sheets beside the surfaces that `keeps` names, at the same density, on further pages
-/// where there is no room on those that there are. The place of surfaces that are not kept is free.
+/// where there is no room on those that there are. Those with a chart that would be larger than a page of
+/// [`PAGE`]² have larger lumels. The place of surfaces that are not kept is free.
 ///
 /// # Errors
 /// Whatever the unwrapper finds wrong.
@@ -41,9 +42,13 @@ pub fn extended(
         }
     }
     let most = (MOST_LUMELS / (page_size as usize).pow(2).max(1)).max(pages as usize);
+    let mut larger = before.larger.clone();
+    larger.retain(|id, _| keeps(*id));
     let mut left_out = Vec::new();
     for sheet in sheets {
-        let charts = match charts(sheet, 1.0 / before.texel, page_size) {
+        let densest = if page_size == PAGE { sheet.densest(page_size) } else { f64::INFINITY };
+        let density = densest.min(1.0 / f64::from(before.texel));
+        let charts = match charts(sheet, density as f32, page_size) {
             Ok(charts) => Arc::new(charts),
             Err(ChartError::NoRoom) => {
                 left_out.push(sheet.id);
@@ -53,7 +58,12 @@ pub fn extended(
         };
         let as_it_was = taken.clone();
         match rectangles(&charts, &mut taken, page_size, most) {
-            Some(rectangles) => surfaces.push(Surface { id: sheet.id, charts, rectangles }),
+            Some(rectangles) => {
+                surfaces.push(Surface { id: sheet.id, charts, rectangles });
+                if density == densest {
+                    larger.insert(sheet.id, (1.0 / density) as f32);
+                }
+            }
             None => {
                 taken = as_it_was;
                 left_out.push(sheet.id);
@@ -61,7 +71,8 @@ pub fn extended(
         }
     }
     let layout = Layout::new(page_size, taken.len() as u32, surfaces);
-    Ok(Extended { laid_out: LaidOut { layout, ..*before }, left_out })
+    let LaidOut { texel, coarser, .. } = *before;
+    Ok(Extended { laid_out: LaidOut { layout, texel, larger, coarser }, left_out })
 }
 
 /// A place for each rectangle of charts; nothing where the pages, `most` of them, have no room.

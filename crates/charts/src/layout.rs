@@ -1,11 +1,11 @@
 //! Charts laid out on pages.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-use glam::UVec2;
+use glam::{DVec2, UVec2};
 use guillotiere::{AllocatorOptions, AtlasAllocator, size2};
-use lumencast_light::{Charts, Layout, Rectangle, Surface};
+use lumencast_light::{Charts, Layout, Rectangle, Surface, SurfaceId};
 use lumencast_scene::LightmapSpec;
 use rayon::prelude::*;
 
@@ -51,8 +51,10 @@ const LEAST_SHARE: f64 = 1e-3;
 pub struct LaidOut {
     /// Where surfaces lie.
     pub layout: Layout,
-    /// Side of a lumel, metres.
+    /// Side of a lumel, metres, but on surfaces of which a chart would be larger than a page.
     pub texel: f32,
+    /// The same on these surfaces: lumels are so large that the page has room for the chart.
+    pub larger: BTreeMap<SurfaceId, f32>,
     /// Whether lumels are larger than they were asked for, since there are only so many pages.
     pub coarser: bool,
 }
@@ -65,12 +67,42 @@ impl LaidOut {
             LightmapSpec::Size(size) => (size, LightmapSpec::TEXEL),
             LightmapSpec::Texel(texel) => (EMPTY, texel),
         };
-        Self { layout: Layout::new(size, 1, Vec::new()), texel, coarser: false }
+        let layout = Layout::new(size, 1, Vec::new());
+        Self { layout, texel, larger: BTreeMap::new(), coarser: false }
+    }
+
+    /// Side of the lumels of a surface, metres.
+    pub fn texel_of(&self, surface: SurfaceId) -> f32 {
+        self.larger.get(&surface).copied().unwrap_or(self.texel)
+    }
+}
+
+/// Pages to lay charts out on.
+#[derive(Clone, Copy, Debug)]
+struct Room {
+    /// Lumels a side of a page.
+    size: u32,
+    /// How many there are at most.
+    pages: u32,
+    /// Whether a surface of which a chart would be larger than a page has larger lumels.
+    shrinks: bool,
+}
+
+impl Room {
+    /// The density of a sheet, lumels a metre, where others have the one that is given.
+    fn density_of(self, sheet: &Sheet, density: f64) -> f64 {
+        if self.shrinks { density.min(sheet.densest(self.size)) } else { density }
+    }
+
+    /// Lumels of all pages.
+    fn lumels(self) -> f64 {
+        f64::from(self.size).powi(2) * f64::from(self.pages)
     }
 }
 
 /// Lays sheets out on pages: on one of a size, as densely as they fit, or with lumels of a size, on one
-/// smaller page or up to [`MOST_PAGES`] pages of [`PAGE`]², or with the smallest lumels that fit these.
+/// smaller page or up to [`MOST_PAGES`] pages of [`PAGE`]², or with the smallest lumels that fit these. There
+/// a surface with a chart that would be larger than a page has larger lumels than the others.
 ///
 /// Where nothing is asked for, lumels are a decimetre large, or as small as 7 cm where the pages which that
 /// takes have room for them. What would not fill a page of 256² fills it, or a larger one where most of that
@@ -106,15 +138,16 @@ fn usual(sheets: &[Sheet], area: f64) -> Result<LaidOut, ChartError> {
     if usual.coarser {
         return Ok(usual);
     }
-    let Layout { page_size, pages, .. } = usual.layout;
+    let Layout { page_size: size, pages, .. } = usual.layout;
+    let room = Room { size, pages, shrinks: !usual.larger.is_empty() };
     let promised = roomiest(&usual, (area / charts as f64).sqrt());
     let mut density = (promised * FIRST).min(1.0 / FINEST);
     for _ in 0..ATTEMPTS {
         if density * f64::from(usual.texel) <= 1.0 {
             break;
         }
-        if let Some(layout) = at_density(sheets, density, page_size, pages)? {
-            return Ok(LaidOut { layout, texel: (1.0 / density) as f32, coarser: false });
+        if let Some(laid_out) = at_density(sheets, density, room)? {
+            return Ok(laid_out);
         }
         density /= BACK;
     }
@@ -135,14 +168,20 @@ fn page_for(charts: usize) -> u32 {
 /// The density, up to [`FINEST`], at which the pages of a layout have room for its rectangles, if these grow
 /// as their charts do: their sides, but not what lies between charts. `side` is the mean of charts' sides,
 /// metres.
-fn roomiest(LaidOut { layout, texel, .. }: &LaidOut, side: f64) -> f64 {
-    let sizes: Vec<UVec2> =
-        layout.surfaces().iter().flat_map(|surface| &surface.charts.sizes).copied().collect();
+fn roomiest(LaidOut { layout, texel, larger, .. }: &LaidOut, side: f64) -> f64 {
     let lumels = |density: f64| side * density + f64::from(PADDING);
     let least = 1.0 / f64::from(*texel);
+    // Those with larger lumels do not grow.
+    let sizes = layout.surfaces().iter().flat_map(|surface| {
+        let grows = !larger.contains_key(&surface.id);
+        surface.charts.sizes.iter().map(move |size| (size.as_dvec2(), grows))
+    });
+    let sizes: Vec<(DVec2, bool)> = sizes.collect();
     let fits = |density: f64| {
-        let grown =
-            |size: &UVec2| (size.as_dvec2() * lumels(density) / lumels(least)).ceil().as_uvec2();
+        let growth = lumels(density) / lumels(least);
+        let grown = |(size, grows): &(DVec2, bool)| {
+            (*size * if *grows { growth } else { 1.0 }).ceil().as_uvec2()
+        };
         let parts = sizes.iter().flat_map(|size| tiled(grown(size), layout.page_size));
         pack(&parts.collect::<Vec<UVec2>>(), layout.page_size, layout.pages).is_some()
     };
@@ -166,35 +205,45 @@ fn tiled(size: UVec2, page: u32) -> impl Iterator<Item = UVec2> {
 
 /// See [`laid_out`]; sheets have so many square metres.
 fn by_spec(sheets: &[Sheet], area: f64, spec: LightmapSpec) -> Result<LaidOut, ChartError> {
-    let (pages, size, asked) = match spec {
-        LightmapSpec::Size(size) => (1, size, None),
-        LightmapSpec::Texel(texel) => (MOST_PAGES, PAGE, Some(1.0 / f64::from(texel))),
+    let (room, asked) = match spec {
+        LightmapSpec::Size(size) => (Room { size, pages: 1, shrinks: false }, None),
+        LightmapSpec::Texel(texel) => {
+            let room = Room { size: PAGE, pages: MOST_PAGES, shrinks: true };
+            (room, Some(1.0 / f64::from(texel)))
+        }
     };
-    let lumels = f64::from(size) * f64::from(size) * f64::from(pages);
-    let guess = (FILLED * lumels / area).sqrt();
-    let attempt = |density| at_density(sheets, density, size, pages);
-    let done = |layout, density: f64| {
-        let coarser = asked.is_some_and(|asked| density < asked);
-        Ok(LaidOut { layout, texel: (1.0 / density) as f32, coarser })
+    let own: Vec<(f64, f64)> = sheets.iter().map(|s| (s.area(), s.densest(room.size))).collect();
+    // Lumels that charts cover at a density.
+    let needed = |density: f64| -> f64 {
+        own.iter().map(|(area, densest)| area * density.min(*densest).powi(2)).sum()
     };
-    if let Some(asked) = asked.filter(|asked| *asked < 2.0 * guess) {
-        let needed = asked * asked * area;
-        let smaller = SMALLER.into_iter().filter(|size| f64::from(size * size) > needed);
-        for (size, pages) in smaller.map(|size| (size, 1)).chain([(size, pages)]) {
-            if let Some(layout) = at_density(sheets, asked, size, pages)? {
-                return done(layout, asked);
+    let mut guess = (FILLED * room.lumels() / area).sqrt();
+    if let Some(asked) = asked {
+        if needed(asked) < 4.0 * FILLED * room.lumels() {
+            let fits = |size: &u32| sheets.iter().all(|sheet| asked <= sheet.densest(*size));
+            let smaller = SMALLER.into_iter().filter(|size| f64::from(size * size) > needed(asked));
+            let smaller = smaller.filter(fits).map(|size| Room { size, pages: 1, shrinks: false });
+            for room in smaller.chain([room]) {
+                if let Some(laid_out) = at_density(sheets, asked, room)? {
+                    return Ok(laid_out);
+                }
             }
         }
+        while guess < asked && needed(guess * STEP) < FILLED * room.lumels() {
+            guess *= STEP;
+        }
+        guess = guess.min(asked);
     }
+    let attempt = |density| at_density(sheets, density, room);
     let (mut fits, mut least_too_dense) = (None, f64::INFINITY);
-    let mut density = asked.map_or(guess, |asked| asked.min(guess));
+    let mut density = guess;
     while fits.is_none() || least_too_dense == f64::INFINITY {
         if density < LEAST_SHARE * guess {
             return Err(ChartError::NoRoom);
         }
         match attempt(density)? {
-            Some(layout) => {
-                fits = Some((layout, density));
+            Some(laid_out) => {
+                fits = Some((laid_out, density));
                 density *= STEP;
             }
             None => {
@@ -203,38 +252,36 @@ fn by_spec(sheets: &[Sheet], area: f64, spec: LightmapSpec) -> Result<LaidOut, C
             }
         }
     }
-    let (mut layout, mut density) = fits.ok_or(ChartError::NoRoom)?;
+    let (mut laid_out, mut density) = fits.ok_or(ChartError::NoRoom)?;
     for _ in 0..HALVINGS {
         let between = (density * least_too_dense).sqrt();
         match attempt(between)? {
-            Some(denser) => (layout, density) = (denser, between),
+            Some(denser) => (laid_out, density) = (denser, between),
             None => least_too_dense = between,
         }
     }
-    done(layout, density)
+    Ok(LaidOut { coarser: asked.is_some_and(|asked| density < asked), ..laid_out })
 }
 
-/// The layout at a density, lumels a metre; nothing where the pages have no room for it.
-fn at_density(
-    sheets: &[Sheet],
-    density: f64,
-    size: u32,
-    pages: u32,
-) -> Result<Option<Layout>, ChartError> {
-    let mut firsts: Vec<&Sheet> = Vec::new();
+/// The layout at a density, lumels a metre; nothing where there is no room for it.
+fn at_density(sheets: &[Sheet], density: f64, room: Room) -> Result<Option<LaidOut>, ChartError> {
+    let mut firsts: Vec<(&Sheet, f64)> = Vec::new();
     let mut known = HashMap::new();
     let charts_of: Vec<usize> = sheets
         .iter()
         .map(|sheet| {
             *known.entry(key(sheet)).or_insert_with(|| {
-                firsts.push(sheet);
+                firsts.push((sheet, room.density_of(sheet, density)));
                 firsts.len() - 1
             })
         })
         .collect();
-    let charts: Vec<Result<Arc<Charts>, ChartError>> =
-        firsts.par_iter().map(|sheet| charts(sheet, density as f32, size).map(Arc::new)).collect();
+    let charts: Vec<Result<Arc<Charts>, ChartError>> = firsts
+        .par_iter()
+        .map(|(sheet, density)| charts(sheet, *density as f32, room.size).map(Arc::new))
+        .collect();
     let mut laid: Vec<(&Sheet, Arc<Charts>)> = Vec::new();
+    let mut larger = BTreeMap::new();
     for (sheet, number) in sheets.iter().zip(charts_of) {
         match &charts[number] {
             Ok(charts) => laid.push((sheet, charts.clone())),
@@ -242,8 +289,14 @@ fn at_density(
             Err(ChartError::NoRoom) => return Ok(None),
             Err(error) => return Err(error.clone()),
         }
+        let (_, own) = firsts[number];
+        if own < density {
+            larger.insert(sheet.id, (1.0 / own) as f32);
+        }
     }
-    Ok(place(&laid, size, pages))
+    let texel = (1.0 / density) as f32;
+    let layout = place(&laid, room.size, room.pages);
+    Ok(layout.map(|layout| LaidOut { layout, texel, larger, coarser: false }))
 }
 
 /// Equal for sheets that share charts.

@@ -9,7 +9,7 @@ use lumencast_light::SurfaceId;
 use lumencast_scene::{Instance, Material, Primitive, Snapshot};
 use rayon::prelude::*;
 
-use crate::cut::{Cut, Shape, cut};
+use crate::cut::{Cut, Shape, cut, densest};
 use crate::error::ChartError;
 use crate::overlaps::overlaps;
 use crate::store::{Key, Store};
@@ -79,6 +79,12 @@ impl Sheet {
 
     pub(crate) fn keeps(&self, chart: u32) -> bool {
         self.kept.as_ref().is_none_or(|kept| kept.get(chart as usize).copied().unwrap_or(false))
+    }
+
+    /// The density, lumels a metre, beyond which a chart of it is larger than a page of so many lumels a
+    /// side.
+    pub(crate) fn densest(&self, page_size: u32) -> f64 {
+        densest(&self.cut, &|chart| self.keeps(chart), page_size)
     }
 
     /// Square metres of what is kept.

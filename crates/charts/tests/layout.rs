@@ -30,7 +30,8 @@ fn page_lumel(surface: &Surface, rectangle: u32, at: UVec2) -> (u32, UVec2) {
 
 /// Checks what everyone relies on: rectangles lie on pages, and a lumel belongs to one surface and to
 /// one part of it.
-fn check(scene: &Snapshot, LaidOut { layout, texel, .. }: &LaidOut) {
+fn check(scene: &Snapshot, laid_out: &LaidOut) {
+    let layout = &laid_out.layout;
     let mut owners = HashMap::new();
     for (number, surface) in layout.surfaces().iter().enumerate() {
         let of_node = |i: &&lumencast_scene::Instance| i.node.0 == surface.id.node;
@@ -54,7 +55,7 @@ fn check(scene: &Snapshot, LaidOut { layout, texel, .. }: &LaidOut) {
             let [a, b, c] = own.map(world);
             curved += 0.5 * (b - a).cross(c - a).length();
         }
-        let share = flat * texel * texel / curved;
+        let share = flat * laid_out.texel_of(surface.id).powi(2) / curved;
         assert!((0.9..1.1).contains(&share), "{:?}: lumels for {share} of its area", surface.id);
         for lumel in lumels(&surface.charts) {
             assert!(lumel.weights.min_element() >= 0.0);
@@ -207,6 +208,43 @@ fn lumels_grow_where_pages_end() {
     check(&snapshot, &laid_out);
     assert!(laid_out.coarser && laid_out.texel > 0.1, "{}", laid_out.texel);
     assert!(laid_out.layout.pages <= MOST_PAGES && laid_out.layout.page_size == PAGE);
+}
+
+/// Two roads, so long, and a hut beside them. The roads' lumels are as large as make them fit a page, the
+/// hut's a decimetre.
+#[test]
+fn what_is_larger_than_a_page_has_larger_lumels() {
+    for side in [150.0, 2000.0] {
+        let mut stage = Stage::default();
+        let material = stage.material(grey());
+        for x in [-side, 0.0] {
+            let corner = Vec3::new(x, 0.0, 0.0);
+            stage.quad(corner, side * Vec3::Z, 0.02 * side * Vec3::X, material);
+        }
+        stage.room(Vec3::ZERO, Vec3::new(8.0, 3.0, 6.0), material);
+        let scene = stage.snapshot();
+        let sheets = cut(&scene).sheets;
+        let all = laid_out(&sheets, LightmapSpec::Texel(0.1)).unwrap();
+        check(&scene, &all);
+        assert!(!all.coarser && all.texel == 0.1 && all.layout.pages <= 2, "{}", all.layout.pages);
+        assert_eq!(all.larger.len(), 2);
+        let least = side / PAGE as f32;
+        for texel in all.larger.values() {
+            assert!((least..1.01 * least).contains(texel), "{texel} m on {side} m");
+        }
+        let usual = laid_out(&sheets, None).unwrap();
+        check(&scene, &usual);
+        assert!(usual.texel <= 0.1 && usual.larger == all.larger, "{}", usual.texel);
+
+        // The roads come later.
+        let (roads, hut) = sheets.split_at(2);
+        let before = laid_out(hut, LightmapSpec::Size(PAGE)).unwrap();
+        let Extended { laid_out: after, left_out } = extended(&before, |_| true, roads).unwrap();
+        check(&scene, &after);
+        assert!(left_out.is_empty() && after.larger == all.larger, "{:?}", after.larger);
+        let gone = extended(&after, |id| id == hut[0].id, &[]).unwrap().laid_out;
+        assert!(gone.larger.is_empty() && gone.texel == before.texel);
+    }
 }
 
 /// A sphere whose charts do not fit one page.

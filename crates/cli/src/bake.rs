@@ -16,6 +16,7 @@ use crate::arguments::{
     EffortArguments, FieldsArguments, GatherArguments, MOST_SAMPLES, SceneArguments, Wanted, source,
 };
 use crate::{
+    charting::Lumels,
     light_source, out_file,
     output::{self, say},
 };
@@ -111,9 +112,8 @@ impl Bake {
             say!("probes: {probes}, {}", spent(of_probes, "probe"));
         }
         if let (Some(of_lumels), Some(laid_out)) = (of_lumels, &lightmap) {
-            let (size, texel) = (laid_out.layout.page_size, 100.0 * laid_out.texel);
             let spent = spent(of_lumels, "lumel");
-            say!("pages: {pages} of {size}², a lumel every {texel:.1} cm, {spent}");
+            say!("pages: {}, {spent}", Lumels::of(laid_out));
         }
         Ok(())
     }

@@ -20,22 +20,32 @@ pub(crate) struct Lumels {
     pub(crate) page_size: u32,
     /// Metres from lumel to lumel.
     pub(crate) texel: f32,
+    /// The most of it, on surfaces that would not fit a page otherwise.
+    pub(crate) largest: Option<f32>,
 }
 
 impl Lumels {
-    pub(crate) fn of(LaidOut { layout, texel, .. }: &LaidOut) -> Self {
-        Self { pages: layout.pages, page_size: layout.page_size, texel: *texel }
+    pub(crate) fn of(laid_out: &LaidOut) -> Self {
+        let LaidOut { layout, texel, larger, .. } = laid_out;
+        let largest = larger.values().copied().reduce(f32::max);
+        Self { pages: layout.pages, page_size: layout.page_size, texel: *texel, largest }
     }
 }
 
 impl fmt::Display for Lumels {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { pages, page_size, texel } = self;
-        write!(f, "{pages} × {page_size}², a lumel every ")?;
-        match texel {
-            ..1e-3 => write!(f, "{:.2} mm", 1000.0 * texel),
-            _ => write!(f, "{:.1} cm", 100.0 * texel),
-        }
+        let Self { pages, page_size, texel, largest } = self;
+        write!(f, "{pages} × {page_size}², a lumel every {}", length(*texel))?;
+        largest.map_or(Ok(()), |largest| write!(f, " to {}", length(largest)))
+    }
+}
+
+/// A length of so many metres.
+fn length(metres: f32) -> String {
+    match metres {
+        ..1e-3 => format!("{:.2} mm", 1000.0 * metres),
+        ..1.0 => format!("{:.1} cm", 100.0 * metres),
+        _ => format!("{metres:.1} m"),
     }
 }
 
@@ -69,10 +79,15 @@ pub(crate) fn lay_out(
     let all = with_backs(sheets, scene, gatherer)?;
     match laid_out(&all, spec) {
         Ok(laid_out) => {
+            let Lumels { texel, largest, .. } = Lumels::of(&laid_out);
             if laid_out.coarser {
-                let size = 100.0 * laid_out.texel;
+                let size = length(texel);
+                tell!("warning: lumels are {size} wide, since there is no room for smaller ones");
+            }
+            if let Some(largest) = largest {
+                let (surfaces, size) = (laid_out.larger.len(), length(largest));
                 tell!(
-                    "warning: lumels are {size:.1} cm wide, since there is no room for smaller ones"
+                    "warning: lumels of {surfaces} surfaces are up to {size} wide, to fit a page"
                 );
             }
             Ok(Some(laid_out))

@@ -25,7 +25,7 @@ pub(crate) fn lightmap_report(scene: &mut Scene, spec: Option<LightmapSpec>) -> 
     let sheets = with_backs(sheets, &scene.snapshot(), &mut tracer)?;
     let looked = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let LaidOut { layout, texel, coarser } = laid_out(&sheets, spec)?;
+    let LaidOut { layout, texel, larger, coarser } = laid_out(&sheets, spec)?;
     let laid_out = start.elapsed().as_secs_f64();
     let covered: usize = layout.surfaces().iter().map(|s: &Surface| lumels(&s.charts).len()).sum();
     let triangles = layout.surfaces().iter().flat_map(|surface| &surface.charts.triangles);
@@ -34,6 +34,7 @@ pub(crate) fn lightmap_report(scene: &mut Scene, spec: Option<LightmapSpec>) -> 
         "pages": layout.pages,
         "page_size": layout.page_size,
         "texel": texel,
+        "largest_texel": larger.values().copied().reduce(f32::max),
         "coarser_than_asked": coarser,
         "surfaces": layout.surfaces().len(),
         "backs": layout.surfaces().iter().filter(|surface| surface.id.back).count(),

@@ -84,9 +84,8 @@ fn unit(key: &str, map: &Map<String, Value>, whole: Unit) -> Unit {
         "tick_seconds" | "time" | "seconds" => Unit::Of("s"),
         "tick_ms" => Unit::Of("ms"),
         "c0" | "zenith" | "horizon" | "ground" | "radiance" => Unit::Of("cd/m²"),
-        "bounds" | "center" | "size" | "texel" | "position" | "radius" | "range" | "metres" => {
-            Unit::Of("m")
-        }
+        "bounds" | "center" | "size" | "texel" | "largest_texel" | "position" | "radius"
+        | "range" | "metres" => Unit::Of("m"),
         "illuminance" => Unit::Of("lx"),
         "angle" | "inner" | "outer" => Unit::Angle,
         "intensity" if map.get("type").is_some_and(|kind| kind == "directional") => Unit::Of("lx"),

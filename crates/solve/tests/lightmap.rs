@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 use glam::{Affine3A, Quat, UVec3, Vec3};
-use lumencast_charts::{LaidOut, Sheet, laid_out, sheets};
+use lumencast_charts::{LaidOut, Sheet, laid_out, lumels_on_pages, sheets};
 use lumencast_gather::path_trace::{CpuPathTracer, Options};
 use lumencast_gather::{Gather, Job, Receiver, Shading};
 use lumencast_light::{FieldId, Grid, Light, Lightmap, Order, Place, ProbeVolume, SurfaceId};
@@ -115,6 +115,46 @@ fn slopes_tell_what_arrives_on_tilted_normals() {
     };
     let (with, without) = (error(&lightmap), error(&lightmap.clone().with_slopes(false)));
     assert!(without > 0.15 && with < 0.3 * without, "{with}, without slopes {without}");
+}
+
+/// A floor so long that its lumels are larger than those of a rug on it, both beside a dark wall: noise
+/// goes from all of them.
+#[test]
+fn lumels_of_two_sizes_are_filtered() {
+    let mut stage = Stage::default();
+    let grey = stage.material(lambert(Vec3::splat(0.5), Vec3::ZERO));
+    let black = stage.material(lambert(Vec3::ZERO, Vec3::ZERO));
+    stage.environment(Environment::Constant { radiance: Vec3::ONE });
+    stage.quad(Vec3::ZERO, 4.0 * Vec3::Z, 400.0 * Vec3::X, grey);
+    stage.quad(Vec3::new(200.0, 0.02, 1.0), 2.0 * Vec3::Z, 3.0 * Vec3::X, grey);
+    stage.quad(Vec3::ZERO, 400.0 * Vec3::X, 5.0 * Vec3::Y, black);
+    let scene = stage.snapshot();
+    let fronts = sheets(&scene, None, &|_| true).expect("charts").sheets;
+    let laid_out = laid_out(&fronts, LightmapSpec::Texel(0.05)).expect("a layout");
+    let [floor, rug] = laid_out.layout.surfaces() else { panic!("two surfaces") };
+    assert!(laid_out.texel_of(rug.id) == 0.05 && laid_out.texel_of(floor.id) > 0.35);
+    let mut tracer = tracer();
+    let mut light = |samples, filtered| {
+        let mut solver = LightmapSolver::new(FieldId(3), &scene, &laid_out, MEAN);
+        let job = Job { bounces: 0, ..solver.job(scene.clone(), samples) };
+        let budgets = job.budgets.clone();
+        let ticket = tracer.submit(job);
+        solver.take(&tracer.wait(ticket).expect("light"), &budgets);
+        let mut lightmap = solver.dark();
+        solver.solve(filtered, &Light::default(), &mut lightmap);
+        lightmap.irradiance
+    };
+    let (right, gathered, filtered) = (light(512, false), light(4, false), light(4, true));
+    for surface in [floor, rug] {
+        let lumels = lumels_on_pages(&laid_out.layout, surface);
+        let lumels: Vec<usize> = lumels.map(|(lumel, _)| lumel).collect();
+        let error = |light: &[Vec3]| {
+            let squares = lumels.iter().map(|l| light[*l].distance_squared(right[*l]));
+            (squares.sum::<f32>() / lumels.len() as f32).sqrt()
+        };
+        let (gathered, filtered) = (error(&gathered), error(&filtered));
+        assert!(filtered < 0.4 * gathered, "{:?}: {gathered} to {filtered}", surface.id);
+    }
 }
 
 /// A closed room whose walls shine, so brightly.

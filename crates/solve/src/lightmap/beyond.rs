@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::{IVec2, IVec3, UVec2, Vec2, Vec3};
-use lumencast_charts::{barycentric, lumels_on_pages};
+use lumencast_charts::{LaidOut, barycentric, lumels_on_pages};
 use lumencast_light::{Layout, Rectangle, Surface};
 use lumencast_scene::Snapshot;
 use rayon::prelude::*;
@@ -15,6 +15,7 @@ use super::NO_RECEIVER;
 use super::blocks::Block;
 use super::places::{PlacedSurface, surfaces};
 use super::point::Point;
+use super::texels::Texels;
 
 /// Set where a lumel stands for another one's receiver.
 const BEYOND: u32 = 1 << 31;
@@ -33,24 +34,30 @@ struct Place {
 }
 
 /// Lets lumels about charts stand for those that lie there in the world. `receiver_of` has the receivers
-/// of covered lumels, whose points are `points`; lumels are `texel` metres large.
+/// of covered lumels, whose points are `points`. Lumels stand for those of their own size.
 pub(crate) fn go_on(
     receiver_of: &mut [u32],
     points: &[Point],
     scene: &Snapshot,
-    layout: &Layout,
-    texel: f32,
+    laid_out: &LaidOut,
+    texels: &Texels,
 ) {
+    let layout = &laid_out.layout;
     let mut is_taken: Vec<bool> = receiver_of.iter().map(|of| *of != NO_RECEIVER).collect();
-    let mut places = Vec::new();
-    for (surface, placed) in surfaces(scene, layout) {
-        about(surface, &placed, layout, &mut is_taken, &mut places);
-    }
-    let near = Near::new(points, NEAR * texel);
-    let found: Vec<Option<u32>> = places.par_iter().map(|place| near.nearest(place)).collect();
-    for (place, receiver) in places.iter().zip(found) {
-        if let Some(receiver) = receiver {
-            receiver_of[place.lumel] = BEYOND | receiver;
+    for texel in texels.among(0..points.len() as u32) {
+        let mut places = Vec::new();
+        for (surface, placed) in surfaces(scene, layout) {
+            if laid_out.texel_of(surface.id) == texel {
+                about(surface, &placed, layout, &mut is_taken, &mut places);
+            }
+        }
+        let of_size = (0..).zip(points).filter(|(receiver, _)| texels.at(*receiver) == texel);
+        let near = Near::new(of_size, points, NEAR * texel);
+        let found: Vec<Option<u32>> = places.par_iter().map(|place| near.nearest(place)).collect();
+        for (place, receiver) in places.iter().zip(found) {
+            if let Some(receiver) = receiver {
+                receiver_of[place.lumel] = BEYOND | receiver;
+            }
         }
     }
 }
@@ -145,9 +152,10 @@ struct Near<'a> {
 }
 
 impl<'a> Near<'a> {
-    fn new(points: &'a [Point], reach: f32) -> Self {
+    /// Those of `among`, by their receivers.
+    fn new(among: impl Iterator<Item = (u32, &'a Point)>, points: &'a [Point], reach: f32) -> Self {
         let mut cubes: HashMap<IVec3, Vec<u32>> = HashMap::new();
-        for (receiver, point) in (0..).zip(points) {
+        for (receiver, point) in among {
             let cube = (point.position / (2.0 * reach)).floor().as_ivec3();
             cubes.entry(cube).or_default().push(receiver);
         }

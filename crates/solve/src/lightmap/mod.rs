@@ -20,6 +20,7 @@ mod slopes;
 mod solving;
 mod sums;
 mod taking;
+mod texels;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;
@@ -46,6 +47,7 @@ use seams::Seams;
 use slopes::Slopes;
 pub use solving::BLOCKS_AT_ONCE;
 use sums::Sum;
+use texels::Texels;
 
 /// What a lumel has in place of a receiver where no surface covers it.
 const NO_RECEIVER: u32 = u32::MAX;
@@ -67,7 +69,7 @@ struct Moved {
 pub struct LightmapSolver {
     id: FieldId,
     settings: BlendSettings,
-    texel: f32,
+    texels: Texels,
     cells: Cells,
     /// Lumels that lie on surfaces, by their index among those of all pages; one a receiver, cell by
     /// cell.
@@ -124,7 +126,8 @@ impl LightmapSolver {
         let points: Arc<[Point]> =
             places.iter().map(|place| Point::new(place.position, place.normal)).collect();
         let lumels: Arc<[u32]> = places.iter().map(|place| place.lumel).collect();
-        beyond::go_on(&mut receiver_of, &points, scene, &layout, laid_out.texel);
+        let texels = Texels::new(laid_out, &receiver_of, places.len());
+        beyond::go_on(&mut receiver_of, &points, scene, laid_out, &texels);
         let readers = beyond::readers(&receiver_of, &lumels, layout.page_size);
         let placed = placed(scene, &layout);
         let still = scene.instances.iter().filter(|instance| instance.still);
@@ -132,7 +135,7 @@ impl LightmapSolver {
         Self {
             id,
             settings,
-            texel: laid_out.texel,
+            texels,
             cells,
             lumels,
             points,
@@ -194,6 +197,7 @@ impl LightmapSolver {
             + size_of_val(&**sums)
             + self.slopes.as_ref().map_or(0, Slopes::bytes)
             + self.glances.bytes()
+            + self.texels.bytes()
             + self.seams.bytes()
     }
 
@@ -234,7 +238,7 @@ impl LightmapSolver {
 
     /// Where all surfaces lie, and how large a lumel is.
     pub(crate) fn laid_out(&self) -> LaidOut {
-        LaidOut { layout: Layout::clone(&self.layout), texel: self.texel, coarser: false }
+        self.texels.laid_out(&self.layout)
     }
 
     /// How updates are blended, and whether lumels tell how light depends on the normal.

@@ -156,7 +156,7 @@ impl LightmapSolver {
         let noisy = |entry: &u32| self.known(beyond::receiver(*entry)?);
         let mut window: Vec<Option<Noisy>> = entries.iter().map(noisy).collect();
         if filtered {
-            filter(&mut window, side, self.texel, REACH);
+            self.filter(&entries, &mut window);
         }
         let known: Vec<Option<Noisy>> = entries
             .iter()
@@ -174,6 +174,30 @@ impl LightmapSolver {
         Solved {
             irradiance: filled(&|lumel| lumel.irradiance),
             slopes: self.slopes.as_ref().map(|_| filled(&of_slope)),
+        }
+    }
+
+    /// Filters a window about a block, whose lumels have these entries: those of each size among
+    /// themselves.
+    fn filter(&self, entries: &[u32], window: &mut [Option<Noisy>]) {
+        let side = BLOCK + 2 * REACH;
+        let receivers = entries.iter().filter_map(|entry| beyond::receiver(*entry));
+        let sizes = self.texels.among(receivers);
+        if let [texel] = sizes[..] {
+            filter(window, side, texel, REACH);
+            return;
+        }
+        for texel in sizes {
+            let is_of_size = |entry: u32| {
+                beyond::receiver(entry).is_some_and(|receiver| self.texels.at(receiver) == texel)
+            };
+            let of_size =
+                |(lumel, entry): (&Option<Noisy>, &u32)| lumel.filter(|_| is_of_size(*entry));
+            let mut own: Vec<Option<Noisy>> = window.iter().zip(entries).map(of_size).collect();
+            filter(&mut own, side, texel, REACH);
+            for (lumel, own) in window.iter_mut().zip(own) {
+                *lumel = own.or(*lumel);
+            }
         }
     }
 

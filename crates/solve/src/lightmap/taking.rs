@@ -138,7 +138,8 @@ impl LightmapSolver {
         let about = self.cells.about(cell).flat_map(|about| self.cells.glanced_of(about));
         let glances: Vec<Glanced> = about.map(glanced).collect();
         let change = |receiver: usize| {
-            Change::of(place(receiver), &self.points[receiver], glances.iter(), self.texel)
+            let texel = self.texels.at(receiver as u32);
+            Change::of(place(receiver), &self.points[receiver], glances.iter(), texel)
         };
         self.cells.receivers_of(cell).map(change).collect()
     }

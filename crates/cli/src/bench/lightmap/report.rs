@@ -70,6 +70,7 @@ impl Report {
             "pages": self.pages.pages,
             "page_size": self.pages.page_size,
             "texel": self.pages.texel,
+            "largest_texel": self.pages.largest,
             "surfaces": self.surfaces,
             "backs": self.backs,
             "lumels": self.lumels,
