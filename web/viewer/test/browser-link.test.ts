@@ -25,6 +25,8 @@ const PORT = 4443;
  */
 const SCENE = ['cornell', '--volume', '80x5x5', '--samples', '2..2'];
 const REGIONS = 8;
+/** Ticks a second of the server. */
+const TICKS = 25;
 /** Beyond the first region's end. */
 const CAMERA: [number, number, number] = [-5, 0, 0];
 /** Megabits a second. */
@@ -104,12 +106,14 @@ describe.skipIf(!link)('a link that is too slow', () => {
         expect(median).toBeLessThan(0.2);
       }
 
+      // Where more came than the server sent meanwhile, some had waited in the page.
+      const rate = Math.min(wide.tickRate, TICKS);
       const half = await measureAt(RATES.half);
       expect(half.layers).toContain(1);
-      expect(half.tickRate).toBeGreaterThan(0.9 * wide.tickRate);
+      expect(half.tickRate).toBeGreaterThan(0.9 * rate);
       for (const { updates, median, p99 } of half.regions) {
         // Layer 0 is every fourth update; trying more than the link carries costs some.
-        expect(updates).toBeGreaterThan(0.125 * wide.tickRate);
+        expect(updates).toBeGreaterThan(0.125 * rate);
         expect(median).toBeLessThan(0.5);
         expect(p99).toBeLessThan(2);
       }
@@ -117,8 +121,8 @@ describe.skipIf(!link)('a link that is too slow', () => {
       const slow = await measureAt(RATES.tooNarrow, 3 * MEASURE);
       const [near, far] = [slow.regions[0], slow.regions[REGIONS - 1]];
       expect(slow.layers).toContain(1);
-      expect(slow.tickRate).toBeGreaterThan(0.8 * wide.tickRate);
-      expect(near.updates).toBeGreaterThan(0.1 * wide.tickRate);
+      expect(slow.tickRate).toBeGreaterThan(0.8 * rate);
+      expect(near.updates).toBeGreaterThan(0.1 * rate);
       expect(near.median).toBeLessThan(1);
       expect(near.updates).toBeGreaterThan(3 * far.updates);
       expect(near.median).toBeLessThan(far.median / 3);
