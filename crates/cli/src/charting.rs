@@ -85,9 +85,9 @@ pub(crate) fn lay_out(
                 tell!("warning: lumels are {size} wide, since there is no room for smaller ones");
             }
             if let Some(largest) = largest {
-                let (surfaces, size) = (laid_out.larger.len(), length(largest));
+                let size = length(largest);
                 tell!(
-                    "warning: lumels of {surfaces} surfaces are up to {size} wide, to fit a page"
+                    "warning: lumels are up to {size} wide where a chart would be larger than a page"
                 );
             }
             Ok(Some(laid_out))
