@@ -6,7 +6,7 @@ use glam::UVec2;
 use lumencast_light::{Charts, Layout, Rectangle, Surface, SurfaceId};
 
 use crate::error::ChartError;
-use crate::layout::{ALIGNMENT, LaidOut, PAGE, charts};
+use crate::layout::{ALIGNMENT, LaidOut, PAGE, Room, charts};
 use crate::sheet::Sheet;
 
 /// Lumels of all pages, at most.
@@ -42,12 +42,13 @@ pub fn extended(
         }
     }
     let most = (MOST_LUMELS / (page_size as usize).pow(2).max(1)).max(pages as usize);
+    let room = Room { size: page_size, pages: most as u32, shrinks: page_size == PAGE };
+    let usual = 1.0 / f64::from(before.texel);
     let mut larger = before.larger.clone();
     larger.retain(|id, _| keeps(*id));
     let mut left_out = Vec::new();
     for sheet in sheets {
-        let densest = if page_size == PAGE { sheet.densest(page_size) } else { f64::INFINITY };
-        let density = densest.min(1.0 / f64::from(before.texel));
+        let density = room.density_of(sheet, usual);
         let charts = match charts(sheet, density as f32, page_size) {
             Ok(charts) => Arc::new(charts),
             Err(ChartError::NoRoom) => {
@@ -60,7 +61,7 @@ pub fn extended(
         match rectangles(&charts, &mut taken, page_size, most) {
             Some(rectangles) => {
                 surfaces.push(Surface { id: sheet.id, charts, rectangles });
-                if density == densest {
+                if density < usual {
                     larger.insert(sheet.id, (1.0 / density) as f32);
                 }
             }

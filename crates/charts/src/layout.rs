@@ -79,18 +79,18 @@ impl LaidOut {
 
 /// Pages to lay charts out on.
 #[derive(Clone, Copy, Debug)]
-struct Room {
+pub(crate) struct Room {
     /// Lumels a side of a page.
-    size: u32,
+    pub(crate) size: u32,
     /// How many there are at most.
-    pages: u32,
+    pub(crate) pages: u32,
     /// Whether a surface of which a chart would be larger than a page has larger lumels.
-    shrinks: bool,
+    pub(crate) shrinks: bool,
 }
 
 impl Room {
     /// The density of a sheet, lumels a metre, where others have the one that is given.
-    fn density_of(self, sheet: &Sheet, density: f64) -> f64 {
+    pub(crate) fn density_of(self, sheet: &Sheet, density: f64) -> f64 {
         if self.shrinks { density.min(sheet.densest(self.size)) } else { density }
     }
 
@@ -212,17 +212,17 @@ fn by_spec(sheets: &[Sheet], area: f64, spec: LightmapSpec) -> Result<LaidOut, C
             (room, Some(1.0 / f64::from(texel)))
         }
     };
-    let own: Vec<(f64, f64)> = sheets.iter().map(|s| (s.area(), s.densest(room.size))).collect();
-    // Lumels that charts cover at a density.
-    let needed = |density: f64| -> f64 {
-        own.iter().map(|(area, densest)| area * density.min(*densest).powi(2)).sum()
-    };
     let mut guess = (FILLED * room.lumels() / area).sqrt();
     if let Some(asked) = asked {
+        let own = sheets.iter().map(|sheet| (sheet.area(), sheet.densest(room.size)));
+        let own: Vec<(f64, f64)> = own.collect();
+        // Lumels that charts cover at a density.
+        let needed = |density: f64| -> f64 {
+            own.iter().map(|(area, densest)| area * density.min(*densest).powi(2)).sum()
+        };
         if needed(asked) < 4.0 * FILLED * room.lumels() {
-            let fits = |size: &u32| sheets.iter().all(|sheet| asked <= sheet.densest(*size));
             let smaller = SMALLER.into_iter().filter(|size| f64::from(size * size) > needed(asked));
-            let smaller = smaller.filter(fits).map(|size| Room { size, pages: 1, shrinks: false });
+            let smaller = smaller.map(|size| Room { size, pages: 1, shrinks: false });
             for room in smaller.chain([room]) {
                 if let Some(laid_out) = at_density(sheets, asked, room)? {
                     return Ok(laid_out);

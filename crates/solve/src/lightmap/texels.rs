@@ -20,7 +20,10 @@ impl Texels {
     /// Of so many receivers; `receiver_of` has those of covered lumels.
     pub(crate) fn new(laid_out: &LaidOut, receiver_of: &[u32], receivers: usize) -> Self {
         let LaidOut { layout, texel, larger, .. } = laid_out;
-        let mut each = vec![*texel; if larger.is_empty() { 0 } else { receivers }];
+        if larger.is_empty() {
+            return Self { usual: *texel, larger: BTreeMap::new(), each: None };
+        }
+        let mut each = vec![*texel; receivers];
         for surface in layout.surfaces() {
             if let Some(texel) = larger.get(&surface.id) {
                 for (lumel, _) in lumels_on_pages(layout, surface) {
@@ -30,8 +33,7 @@ impl Texels {
                 }
             }
         }
-        let each = (!larger.is_empty()).then(|| each.into());
-        Self { usual: *texel, larger: larger.clone(), each }
+        Self { usual: *texel, larger: larger.clone(), each: Some(each.into()) }
     }
 
     /// The side of a receiver's lumel, metres.
