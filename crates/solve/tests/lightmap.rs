@@ -33,15 +33,27 @@ fn laid(scene: &Arc<Snapshot>) -> LaidOut {
 
 fn lit(scene: &Arc<Snapshot>, bounces: u32, samples: u32) -> (LightmapSolver, LaidOut, Lightmap) {
     let laid_out = laid(scene);
-    let mut solver = LightmapSolver::new(FieldId(3), scene, &laid_out, MEAN);
+    let (solver, lightmap) = solved(scene, &laid_out, bounces, samples, true);
+    (solver, laid_out, lightmap)
+}
+
+/// Lumels that lie so, after so many samples each.
+fn solved(
+    scene: &Arc<Snapshot>,
+    laid_out: &LaidOut,
+    bounces: u32,
+    samples: u32,
+    filtered: bool,
+) -> (LightmapSolver, Lightmap) {
+    let mut solver = LightmapSolver::new(FieldId(3), scene, laid_out, MEAN);
     let mut tracer = tracer();
     let job = Job { bounces, ..solver.job(scene.clone(), samples) };
     let budgets = job.budgets.clone();
     let ticket = tracer.submit(job);
     solver.take(&tracer.wait(ticket).expect("light"), &budgets);
     let mut lightmap = solver.dark();
-    solver.solve(true, &Light::default(), &mut lightmap);
-    (solver, laid_out, lightmap)
+    solver.solve(filtered, &Light::default(), &mut lightmap);
+    (solver, lightmap)
 }
 
 fn irradiances(scene: &Snapshot, lightmap: &Lightmap, count: usize) -> Vec<Vec3> {
@@ -133,17 +145,7 @@ fn lumels_of_two_sizes_are_filtered() {
     let laid_out = laid_out(&fronts, LightmapSpec::Texel(0.05)).expect("a layout");
     let [floor, rug] = laid_out.layout.surfaces() else { panic!("two surfaces") };
     assert!(laid_out.texel_of(rug.id) == 0.05 && laid_out.texel_of(floor.id) > 0.35);
-    let mut tracer = tracer();
-    let mut light = |samples, filtered| {
-        let mut solver = LightmapSolver::new(FieldId(3), &scene, &laid_out, MEAN);
-        let job = Job { bounces: 0, ..solver.job(scene.clone(), samples) };
-        let budgets = job.budgets.clone();
-        let ticket = tracer.submit(job);
-        solver.take(&tracer.wait(ticket).expect("light"), &budgets);
-        let mut lightmap = solver.dark();
-        solver.solve(filtered, &Light::default(), &mut lightmap);
-        lightmap.irradiance
-    };
+    let light = |samples, filtered| solved(&scene, &laid_out, 0, samples, filtered).1.irradiance;
     let (right, gathered, filtered) = (light(512, false), light(4, false), light(4, true));
     for surface in [floor, rug] {
         let lumels = lumels_on_pages(&laid_out.layout, surface);
@@ -433,17 +435,7 @@ fn noise_is_filtered_across_charts() {
         let scene = tiled(tiles);
         let all = sheets(&scene, None, &|_| true).expect("charts").sheets;
         let laid_out = laid_out(&all, LightmapSpec::Texel(0.1)).expect("a layout");
-        let light = |samples: u32| {
-            let mut solver = LightmapSolver::new(FieldId(0), &scene, &laid_out, MEAN);
-            let mut tracer = tracer();
-            let job = Job { bounces: 1, ..solver.job(scene.clone(), samples) };
-            let budgets = job.budgets.clone();
-            let ticket = tracer.submit(job);
-            solver.take(&tracer.wait(ticket).expect("light"), &budgets);
-            let mut lightmap = solver.dark();
-            solver.solve(true, &Light::default(), &mut lightmap);
-            lightmap
-        };
+        let light = |samples: u32| solved(&scene, &laid_out, 1, samples, true).1;
         let [noisy, right] = [8, 512].map(light);
         let places = spread(&scene, &laid_out.layout, 2000);
         let squares: f32 = places
