@@ -94,7 +94,7 @@ pub(crate) fn cut(shape: &Shape<'_>, watch: Watch<'_>) -> Result<Cut, ChartError
     }
     let parts = shape.parts();
     if parts > MOST_CHARTS {
-        return Err(ChartError::TooManyCharts { charts: parts });
+        return Err(ChartError::TooManyCharts { charts: parts, most: MOST_CHARTS });
     }
     let texels_per_unit = (FIRST_LUMELS / area).sqrt() as f32;
     let density = Density::Fixed { texels_per_unit, page_size: None };
@@ -106,7 +106,7 @@ pub(crate) fn cut(shape: &Shape<'_>, watch: Watch<'_>) -> Result<Cut, ChartError
     };
     let atlas = generate(input, &options, watch)?;
     if atlas.chart_count > MOST_CHARTS {
-        return Err(ChartError::TooManyCharts { charts: atlas.chart_count });
+        return Err(ChartError::TooManyCharts { charts: atlas.chart_count, most: MOST_CHARTS });
     }
     let metres = UVec2::new(atlas.width, atlas.height).as_vec2() / atlas.texels_per_unit;
     let mesh = checked(&atlas, shape.triangles)?;

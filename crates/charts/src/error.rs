@@ -8,10 +8,12 @@ pub enum ChartError {
     #[error("it has no area")]
     NoArea,
     /// It falls into more charts than pages are worth.
-    #[error("it falls into {charts} charts or more; {} are too many", crate::cut::MOST_CHARTS)]
+    #[error("it falls into {charts} charts or more; {most} are the most")]
     TooManyCharts {
         /// As many as there would be, at least.
         charts: u32,
+        /// As many as are cut.
+        most: u32,
     },
     /// Its progress was told to someone who wished it to end.
     #[error("it was interrupted")]
