@@ -1,4 +1,4 @@
-import type { LightSession } from './light.js';
+import type { LightSession } from './light-session.js';
 
 /** The name of the file that a URI stands for; what is no sequence of UTF-8 stays as it is. */
 export function nameOf(uri: string): string {

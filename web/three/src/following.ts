@@ -1,7 +1,7 @@
 import type { Edit } from '@lumencast/client';
 import type { Object3D, Scene } from 'three';
 import { changedParts, FOLLOW_INTERVAL, type Pose, poseOf, worldPoseOf } from './follow.js';
-import type { LightSession } from './light.js';
+import type { LightSession } from './light-session.js';
 import { isPunctualLight, type PunctualLight } from './lights.js';
 import { matchNames, type NamedNode } from './names.js';
 import type { Replica } from './replica.js';

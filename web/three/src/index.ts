@@ -10,7 +10,8 @@
  */
 import type { WebGLRenderer } from 'three';
 import { type ConnectOptions, connectWith, type ShowOptions, showWith } from './connect.js';
-import { type AttachOptions, type LightSession, LumencastLight } from './light.js';
+import { type AttachOptions, LumencastLight } from './light.js';
+import type { LightSession } from './light-session.js';
 import { webglPlatform } from './webgl.js';
 
 export * from './common.js';

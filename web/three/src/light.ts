@@ -6,7 +6,6 @@ import {
   type Environment,
   isLightmap,
   isVolume,
-  type Session,
 } from '@lumencast/client';
 import { type Camera, type Light, type Object3D, type Scene, type Texture, Vector3 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
@@ -16,19 +15,13 @@ import { nameOf, SavedFiles, sceneFile } from './files.js';
 import { Following } from './following.js';
 import { ProbeGrids } from './grids.js';
 import { isPunctualLight } from './lights.js';
+import type { LightSession } from './light-session.js';
 import type { LumelLook } from './lumel-pages.js';
 import { Lumels } from './lumels.js';
 import type { NamedNode } from './names.js';
 import type { Platform, ProbeGrid } from './platform.js';
 import { Replica } from './replica.js';
 import { type ShadowOptions, Shadows } from './shadows.js';
-
-/** What a session must offer; {@link Session} does. */
-export type LightSession = Pick<
-  Session,
-  'files' | 'catalog' | 'status' | 'stats' | 'on' | 'edit' | 'light' | 'sceneTime' | 'setCamera' | 'close'
-> &
-  Partial<Pick<Session, 'saved' | 'unshown'>>;
 
 export interface AttachOptions {
   /** Where the light is shown. */

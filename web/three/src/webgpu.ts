@@ -16,7 +16,8 @@ import {
 } from 'three/webgpu';
 import { type ConnectOptions, connectWith, type ShowOptions, showWith } from './connect.js';
 import { MIN_CONE, MIN_DISTANCE } from './falloff.js';
-import { type AttachOptions, type LightSession, LumencastLight } from './light.js';
+import { type AttachOptions, LumencastLight } from './light.js';
+import type { LightSession } from './light-session.js';
 import type { Platform } from './platform.js';
 import { unitsTaken } from './units.js';
 import { FactorGridNode, factors, LumelLight } from './webgpu-lumels.js';

@@ -20,7 +20,8 @@ import {
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { LUMELS } from '../src/charted.js';
-import { type LightSession, LumencastLight } from '../src/light.js';
+import { LumencastLight } from '../src/light.js';
+import type { LightSession } from '../src/light-session.js';
 import {
   chartsOf,
   halves,
