@@ -1,8 +1,8 @@
 /**
  * Figures of the whole way, server and page on one machine: the delay from the end of a tick to the
- * update in the page, the time that lumels take of the page's thread, and the time that the page's light
- * takes to follow a moved sun. The page does not draw meanwhile: without a GPU that would take the server's
- * processor.
+ * update in the page; the time that lumels take of the page's thread by the clock, and that the whole update
+ * works on it; and the time that the page's light takes to follow a moved sun. The page does not draw
+ * meanwhile: without a GPU that would take the server's processor.
  *
  *     LUMENCAST_BIN=target/release/lumencast npm run figures
  *
@@ -11,7 +11,7 @@
 import { writeFileSync } from 'node:fs';
 import { cpus } from 'node:os';
 import { resolve } from 'node:path';
-import type { Browser } from 'playwright-core';
+import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
 import { openPage } from './browser.js';
@@ -87,8 +87,10 @@ describe('the time of each picture that lumels take of the page’s thread, whil
       const browser = await launchBrowser();
       try {
         const page = await openPage(browser, server.address, VIEWPORT, { renderer });
+        const endTrace = await traceThread(page);
         const times = await page.evaluate(lumelTimes, UPKEEP_SECONDS);
         figures[`lumels_ms_${scene}_${renderer}`] = { pictures: times.length, ...summary(times) };
+        figures[`update_thread_ms_${scene}_${renderer}`] = summary(threadTimes(await endTrace()));
       } finally {
         await browser.close();
         await server.kill();
@@ -136,16 +138,56 @@ function summary(values: readonly number[]): Record<'median' | 'p95' | 'p99' | '
   return { median: at(0.5), p95: at(0.95), p99: at(0.99), max: at(1) };
 }
 
-/** In the page: what each update of the light takes for lumels, milliseconds. */
+/** In the page: what each update of the light takes for lumels, milliseconds by the clock. */
 async function lumelTimes(seconds: number): Promise<number[]> {
   const { camera, light } = window.lumencast!;
   const times: number[] = [];
   for (const end = performance.now() + 1000 * seconds; performance.now() < end;) {
     await new Promise(requestAnimationFrame);
+    performance.mark('update');
     light.update(camera);
     times.push(light.lumelTime);
   }
   return times;
+}
+
+/** What a trace tells of a stretch of a thread's work: when it began, and what it took; microseconds. */
+interface TraceEvent {
+  readonly name: string;
+  readonly tid: number;
+  readonly ts: number;
+  readonly dur?: number;
+  /** Time in which the thread ran: others may have had its core meanwhile. */
+  readonly tdur?: number;
+}
+
+/** Traces what the page's threads do, until its result is called. */
+async function traceThread(page: Page): Promise<() => Promise<TraceEvent[]>> {
+  const client = await page.context().newCDPSession(page);
+  const events: TraceEvent[] = [];
+  client.on('Tracing.dataCollected', ({ value }) => void events.push(...(value as unknown as TraceEvent[])));
+  const complete = new Promise((resolve) => client.on('Tracing.tracingComplete', resolve));
+  await client.send('Tracing.start', {
+    traceConfig: { includedCategories: ['devtools.timeline', 'blink.user_timing'] },
+    transferMode: 'ReportEvents',
+  });
+  return async () => {
+    await client.send('Tracing.end');
+    await complete;
+    return events;
+  };
+}
+
+/** Milliseconds of work of each frame's callback in which the light was updated. */
+function threadTimes(events: readonly TraceEvent[]): number[] {
+  const marks = events.filter(({ name }) => name === 'update');
+  const callbacks = events.filter(({ name }) => name === 'FireAnimationFrame');
+  return marks.flatMap((mark) => {
+    const around = callbacks.find(
+      ({ tid, ts, dur = 0 }) => tid === mark.tid && ts <= mark.ts && mark.ts <= ts + dur,
+    );
+    return around?.tdur === undefined ? [] : [around.tdur / 1000];
+  });
 }
 
 /**
