@@ -9,6 +9,7 @@ import {
   type Catalog,
   epochOf,
   type FieldInfo,
+  hasMorePages,
   isCodedAlike,
   isLightmap,
   offersSame,
@@ -153,7 +154,7 @@ export class Cache {
       const same = old.get(field.id);
       // Each field's updates are numbered by its own server's run.
       const anew = this.saved || (before && same && epochOf(before, same.field) !== epochOf(catalog, field));
-      const keeps = same && isCodedAlike(same.field, field);
+      const keeps = same && (isCodedAlike(same.field, field) || hasMorePages(field, same.field));
       if (same && (anew || !keeps)) same.forgetUpdates();
       if (keeps) {
         same.field = field;

@@ -21,6 +21,7 @@ export {
   type FieldHead,
   type FieldInfo,
   type FieldKind,
+  hasMorePages,
   hasSameShape,
   isLightmap,
   isVolume,

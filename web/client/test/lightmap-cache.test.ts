@@ -107,6 +107,26 @@ describe('pictures', () => {
       expect([...first, ...second]).not.toContain(revision);
   });
 
+  it('stay while pages are added, and light comes to these', () => {
+    const server = new LightmapServer({ pages: 1 });
+    const cache = joined(server);
+    for (const { bytes } of server.resources) cache.addResource(bytes);
+    addAll(cache, server.step(2), 0);
+    const revision = lightOf(cache, 1).regions[0].revision;
+    const longer = new LightmapServer({ pages: 2 });
+    cache.addCatalog(longer.catalog, 1);
+    // The former layout stands until the new one is here.
+    expect([shown(cache, 1), nodes(cache, 1)]).toEqual([[[2, 1]], [1, 2]]);
+    expect(lightOf(cache, 1).field.shape.pages).toBe(2);
+    expect(lightOf(cache, 1).regions[0].revision).toBe(revision);
+    const [, added] = new LightmapServer({ pages: 2, keyframeEvery: 1 }).step(3);
+    addAll(cache, [added], 1);
+    expect(shown(cache, 2)).toEqual([
+      [2, 1],
+      [3, 1],
+    ]);
+  });
+
   it('stay on their way when an update brings nothing new', () => {
     const server = new LightmapServer({ pages: 1 });
     const cache = joined(server);

@@ -18,9 +18,10 @@ export interface AtlasPlan {
 }
 
 /**
- * Lays the pages of all lightmaps out in rows, as square as can be: one texture takes one unit. Between
- * pages nothing is left free, as charts keep two lumels from their page's border. Slopes lie below all
- * pages.
+ * Lays the pages of all lightmaps out in a square, or in one without its last row: one texture takes one
+ * unit. Each square grows by a column and then by a row, so that pages stay where they are as others are
+ * added behind them. Between pages nothing is left free, as charts keep two lumels from their page's border.
+ * Slopes lie below all pages.
  * @returns `undefined` where a texture of this device has no room for them
  */
 export function planAtlas(lightmaps: readonly PageSet[], textureSize: number): AtlasPlan | undefined {
@@ -37,7 +38,10 @@ export function planAtlas(lightmaps: readonly PageSet[], textureSize: number): A
     slopes: hasSlopes ? rows : 0,
     corner(lightmap, page) {
       const cell = first[lightmap] + page;
-      return [(cell % columns) * side, Math.floor(cell / columns) * side];
+      const square = Math.floor(Math.sqrt(cell));
+      const beyond = cell - square ** 2;
+      const [column, row] = beyond < square ? [square, beyond] : [beyond - square, square];
+      return [column * side, row * side];
     },
   };
 }

@@ -1,4 +1,10 @@
-import { type FieldInfo, isLightmap, type LightmapLight, type LightState } from '@lumencast/client';
+import {
+  type FieldInfo,
+  hasMorePages,
+  isLightmap,
+  type LightmapLight,
+  type LightState,
+} from '@lumencast/client';
 import type { Light, Scene, Texture } from 'three';
 import type { Content } from './content.js';
 import { planAtlas } from './lumel-atlas.js';
@@ -31,13 +37,17 @@ export class Lumels {
     this.#surfaces = new LumelSurfaces(scene, content, warn);
   }
 
-  /** Makes room for the pages of these lightmaps, in place of those there are. */
+  /**
+   * Makes room for the pages of these lightmaps, in place of those there are. Where others are but added,
+   * meshes keep their lumels.
+   */
   setLightmaps(lightmaps: readonly Lightmap[]): void {
     if (isSameRoom(lightmaps, this.#lightmaps) && (this.#pages || lightmaps.length === 0)) return;
-    this.#clear();
+    const keepsMeshes = this.#pages && isLonger(lightmaps, this.#lightmaps);
+    this.#clearPages();
     this.#lightmaps = lightmaps;
-    if (lightmaps.length === 0) return;
-    const reason = this.#plan();
+    const reason = lightmaps.length > 0 ? this.#plan() : undefined;
+    if (!this.#pages || !keepsMeshes) this.#surfaces.clear();
     if (reason) this.warn(`light at lumels is not shown, surfaces are lit by probes: ${reason}`);
   }
 
@@ -132,17 +142,24 @@ export class Lumels {
   }
 
   dispose(): void {
-    this.#clear();
+    this.#surfaces.clear();
+    this.#clearPages();
   }
 
-  #clear(): void {
-    this.#surfaces.clear();
+  #clearPages(): void {
     this.#layouts = [];
     this.#light?.removeFromParent();
     this.#light = undefined;
     this.#pages?.dispose();
     this.#pages = undefined;
   }
+}
+
+/** Whether the last lightmap alone has more pages than before: all others lie where they lay. */
+function isLonger(now: readonly Lightmap[], before: readonly Lightmap[]): boolean {
+  const [last, lastBefore] = [now.at(-1), before.at(-1)];
+  if (!last || !lastBefore || last.id !== lastBefore.id) return false;
+  return hasMorePages(last, lastBefore) && isSameRoom(now.slice(0, -1), before.slice(0, -1));
 }
 
 /** Whether lightmaps take the same room, wherever surfaces lie in it. */

@@ -425,6 +425,24 @@ describe('lumels', () => {
     expect(light.pages).toBeUndefined();
   });
 
+  it('stay on their meshes while pages are added, not while fewer are left', () => {
+    const square = surface({ node: 9, charts: SQUARE });
+    const ofPages = (pages: number) => session.tell('catalog', catalogOf(lightmapField(1, 8, pages)));
+    ofPages(1);
+    shine(4, square);
+    const { geometry } = wall;
+    ofPages(2);
+    expect([light.lumelMeshes, wall.geometry]).toEqual([1, geometry]);
+    const regions = [region({ picture: halves(0, 64, 4) })];
+    session.state = { fields: [lightmapLight(regions, layout(square), lightmapField(1, 8, 2))], age: 0 };
+    light.update(camera);
+    expect([light.lumelMeshes, wall.geometry]).toEqual([1, geometry]);
+    // What is there is painted anew, whole and at once.
+    expect(pages.paint.mock.lastCall![0]).toMatchObject([{ x: 0, y: 0, share: 1 }]);
+    ofPages(1);
+    expect(light.lumelMeshes).toBe(0);
+  });
+
   it('take no room where the session cannot show them', () => {
     session.unshown = [lightmap];
     session.tell('catalog', catalogOf(lightmap, field));

@@ -30,6 +30,13 @@ describe('an atlas of pages', () => {
     }
   });
 
+  it('leaves pages where they are as others are added', () => {
+    for (let pages = 1; pages < 20; pages++) {
+      const [before, after] = [pages, pages + 1].map((pages) => planAtlas([{ pageSize: 8, pages }], 4096)!);
+      for (let page = 0; page < pages; page++) expect(after.corner(0, page)).toEqual(before.corner(0, page));
+    }
+  });
+
   it('has slopes below all pages, where there is room', () => {
     const lightmaps = [
       { pageSize: 8, pages: 3, slopes: true },

@@ -108,6 +108,16 @@ export function isCodedAlike(a: FieldInfo, b: FieldInfo): boolean {
   return hasSameShape(a, { ...b, shape: { ...b.shape, layout: a.shape.layout } });
 }
 
+/**
+ * Whether a lightmap has more pages than before, and is coded alike otherwise: regions keep their numbers.
+ * Slopes lie behind all pages, and would get others.
+ */
+export function hasMorePages(now: FieldInfo, before: FieldInfo): boolean {
+  if (!isLightmap(now) || !isLightmap(before) || now.shape.slopes) return false;
+  const { pages } = now.shape;
+  return pages > before.shape.pages && isCodedAlike(now, { ...before, shape: { ...before.shape, pages } });
+}
+
 /** Whether two catalogs offer the same fields of the same scene and run, at whatever scales and layouts. */
 export function offersSame(a: Catalog, b: Catalog): boolean {
   const heads = ({ fields, ...rest }: Catalog) =>
