@@ -34,5 +34,5 @@ pub use layout::{LaidOut, MOST_PAGES, PAGE, laid_out};
 pub use lumels::{Lumel, lumels, lumels_on_pages};
 pub use parts::{UnionFind, chart_count};
 pub use raster::barycentric;
-pub use sheet::{Progress, Sheet, Sheets, sheets};
+pub use sheet::{Progress, Sheet, Sheets, sheets, takes_lumels};
 pub use store::Store;

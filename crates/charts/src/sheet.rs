@@ -150,7 +150,7 @@ pub fn sheets(
 
 /// Whether lumels on a surface of this material would be seen: light passes through glass, and what is
 /// unlit or black shows none.
-fn takes_lumels(material: &Material) -> bool {
+pub fn takes_lumels(material: &Material) -> bool {
     let is_black = material.base_color.truncate() == Vec3::ZERO;
     !material.unlit && material.transmission == 0.0 && !is_black
 }

@@ -17,6 +17,9 @@ pub enum SolveError {
     /// Surfaces that are not cut into charts.
     #[error(transparent)]
     Charts(#[from] lumencast_charts::ChartError),
+    /// The system has no thread to work on.
+    #[error("no thread to cut surfaces on: {0}")]
+    NoThread(String),
     /// Light that was being computed is not coming.
     #[error("the gatherer gave up a job; its log says why")]
     Gather,

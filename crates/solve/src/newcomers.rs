@@ -12,7 +12,7 @@ use crate::error::SolveError;
 use crate::lightmap::{LightmapSolver, with_backs};
 
 /// Still instances that rest and have no lumels yet. Cutting them into charts and placing lumels takes
-/// its time, and needs nothing but what is here: [`Newcomers::place`] may run on any thread.
+/// its time, and needs nothing but what is here: [`Newcomers::place`] may run beside ticks.
 #[derive(Clone, Debug)]
 pub struct Newcomers {
     /// The field that they are to have lumels of.
@@ -22,7 +22,7 @@ pub struct Newcomers {
     before: LaidOut,
     /// By their nodes and their numbers there.
     pub(crate) instances: Vec<(u32, u32)>,
-    scene: Arc<Snapshot>,
+    pub(crate) scene: Arc<Snapshot>,
 }
 
 /// Lumels of a layout that has room for newcomers.
@@ -64,12 +64,24 @@ impl Newcomers {
     }
 
     /// The lumels of a layout with their surfaces too, and without those of instances that are gone.
-    /// `gatherer` looks which backs light can reach; `goes_on` is asked now and then.
+    /// `gatherer` looks which backs light can reach; `goes_on` is asked now and then. It works on one thread
+    /// of its own: among those that all share, work of ticks would wait for the end of a cut.
     ///
     /// # Errors
     /// [`lumencast_charts::ChartError::Interrupted`] where `goes_on` answers no, whatever the unwrapper
-    /// finds wrong, and a gatherer that gave up.
+    /// finds wrong, a gatherer that gave up, and a system without a thread to spare.
     pub fn place(
+        &self,
+        store: Option<&Store>,
+        gatherer: &mut dyn Gather,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Placed, SolveError> {
+        let own = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let own = own.map_err(|error| SolveError::NoThread(error.to_string()))?;
+        own.install(|| self.place_here(store, gatherer, goes_on))
+    }
+
+    fn place_here(
         &self,
         store: Option<&Store>,
         gatherer: &mut dyn Gather,

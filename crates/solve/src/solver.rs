@@ -208,7 +208,7 @@ impl Solver {
     pub fn leave_without_lumels(&mut self, newcomers: &Newcomers) {
         self.each_lightmap(|lightmap, _| {
             if lightmap.id() == newcomers.field() {
-                lightmap.go_without(&newcomers.instances);
+                lightmap.go_without(&newcomers.instances, &newcomers.scene);
             }
         });
     }

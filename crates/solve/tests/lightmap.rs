@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 use std::f32::consts::PI;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{Affine3A, Quat, UVec3, Vec3};
 use lumencast_charts::{LaidOut, Sheet, laid_out, lumels_on_pages, sheets};
@@ -482,8 +483,11 @@ fn backs_of_what_comes_later_have_lumels() {
     solver.follow(&room(true, 1.0));
     let rested = room(true, 4.0);
     let newcomers = solver.newcomers(&rested).expect("what has come");
-    let placed = newcomers.place(None, &mut tracer(), &|| true).expect("a layout");
-    assert_eq!(placed.left_out, 0);
+    // Ticks' own work never waits for it among the threads that all share.
+    let threads = AtomicUsize::new(0);
+    let goes_on = || threads.fetch_max(rayon::current_num_threads(), Ordering::Relaxed) < 9;
+    let placed = newcomers.place(None, &mut tracer(), &goes_on).expect("a layout");
+    assert_eq!((placed.left_out, threads.into_inner()), (0, 1));
     let surfaces = placed.layout().surfaces();
     let sides = |node: u32| -> Vec<bool> {
         surfaces.iter().filter(|s| s.id.node == node).map(|s| s.id.back).collect()
@@ -492,6 +496,47 @@ fn backs_of_what_comes_later_have_lumels() {
     let nodes: Vec<u32> = rested.instances.iter().skip(later).map(|i| i.node.0).collect();
     assert_eq!(sides(nodes[0]), [false, true]);
     assert!(nodes[1..].iter().all(|node| sides(*node) == [false]));
+}
+
+/// What an edit turns to glass is lit by probes until it is none any more; what was black gets lumels once it
+/// is grey and has rested.
+#[test]
+fn lumels_follow_materials() {
+    let scene = |transmission: f32, color: f32, version: u64, time: f64| {
+        let mut stage = Stage::default();
+        let wall = stage.material(lambert(Vec3::splat(0.5), Vec3::ONE));
+        let pane = lambert(Vec3::splat(0.5), Vec3::ZERO);
+        let pane = stage.material(Material { transmission, ..pane });
+        let plate = stage.material(lambert(Vec3::splat(color), Vec3::ZERO));
+        stage.room(Vec3::ZERO, Vec3::splat(4.0), wall);
+        stage.quad(Vec3::ZERO, Vec3::X, Vec3::Y, pane);
+        stage.quad(-Vec3::ONE, Vec3::X, Vec3::Y, plate);
+        Arc::new(Snapshot { time, version, ..Snapshot::clone(&stage.snapshot()) })
+    };
+    let first = scene(0.0, 0.0, 0, 0.0);
+    let mut solver = Solver::new(&[], GatherOptions::default()).expect("no volumes");
+    solver.set_lightmap(&first, Some(&laid(&first)));
+    let nodes = |solver: &Solver| -> Vec<u32> {
+        let lightmap = solver.light().lightmaps().next().expect("a lightmap");
+        lightmap.layout.surfaces().iter().map(|surface| surface.id.node).collect()
+    };
+    assert!(solver.follow(&first).is_empty());
+    assert_eq!(nodes(&solver), [0, 1, 2, 3, 4, 5, 6]);
+    assert_eq!(solver.follow(&scene(0.5, 0.0, 1, 1.0)).len(), 1);
+    assert_eq!(nodes(&solver), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(solver.follow(&scene(0.0, 0.0, 2, 2.0)).len(), 1);
+    assert_eq!(nodes(&solver), [0, 1, 2, 3, 4, 5, 6]);
+    let rested = |version, time| scene(0.0, 0.5, version, time);
+    assert!(solver.newcomers(&scene(0.0, 0.0, 2, 9.0)).is_none());
+    solver.follow(&rested(3, 10.0));
+    assert!(solver.newcomers(&rested(3, 11.0)).is_none());
+    let newcomers = solver.newcomers(&rested(3, 13.0)).expect("what was black");
+    let placed = newcomers.place(None, &mut tracer(), &|| true).expect("a layout");
+    assert_eq!(placed.layout().surfaces().last().map(|surface| surface.id.node), Some(7));
+    // With as many primitives that show lumels, it is not tried again.
+    solver.leave_without_lumels(&newcomers);
+    solver.follow(&rested(4, 20.0));
+    assert!(solver.newcomers(&rested(4, 30.0)).is_none());
 }
 
 /// A plate is carried elsewhere and lit there while lumels are placed for what has come: it has none until

@@ -1,14 +1,15 @@
 //! Instances that move, rest, come and go, and what becomes of their lumels.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
 use lumencast_charts::lumels_on_pages;
 use lumencast_light::{Layout, Lightmap, Surface};
-use lumencast_scene::Snapshot;
+use lumencast_scene::{Instance, Snapshot};
 
 use super::blocks::Block;
+use super::materials::{blank, showing};
 use super::places::{LumelPlace, lumel_places};
 use super::point::Point;
 use super::sums::Sum;
@@ -20,24 +21,24 @@ const RESTING: f64 = 2.0;
 
 impl LightmapSolver {
     /// Leaves out of the layout what has moved: its lumels are where it was. What is back where it was,
-    /// or has rested where it is until its lumels there were gathered at, has them again. Whether that is
-    /// another layout.
+    /// or has rested where it is until its lumels there were gathered at, has them again. What shows no
+    /// lumels, since its material is another, is left out as long. Whether that is another layout.
     pub fn follow(&mut self, scene: &Snapshot, shown: &mut Lightmap) -> bool {
         let is_same = self.followed.replace(scene.version) == Some(scene.version);
         if is_same && self.moved.is_empty() && self.newcomers.is_empty() {
             return false;
         }
-        let now: HashMap<InstanceId, Affine3A> = scene
-            .instances
-            .iter()
-            .filter(|instance| instance.still)
-            .map(|instance| ((instance.node.0, instance.copy), instance.world_from_object))
-            .collect();
-        self.follow_newcomers(&now, scene.time);
+        let still = scene.instances.iter().filter(|instance| instance.still);
+        let now: HashMap<InstanceId, &Instance> =
+            still.map(|instance| ((instance.node.0, instance.copy), instance)).collect();
+        self.follow_newcomers(&now, scene);
+        let blank = blank(&self.layout, &now, scene);
+        let mut is_other = blank != self.blank;
+        self.blank = blank;
         let ids: Vec<InstanceId> = self.placed.keys().copied().collect();
-        let mut is_other = false;
         for id in ids {
-            is_other |= self.follow_instance(id, now.get(&id).copied(), scene);
+            let at = now.get(&id).map(|instance| instance.world_from_object);
+            is_other |= self.follow_instance(id, at, scene);
         }
         if is_other {
             shown.layout = self.resting();
@@ -45,24 +46,31 @@ impl LightmapSolver {
         is_other
     }
 
-    /// Where the surfaces lie that have not moved.
+    /// Where the surfaces lie that have not moved and show lumels.
     fn resting(&self) -> Arc<Layout> {
         let Layout { page_size, pages, .. } = *self.layout;
-        let is_there = |surface: &&Surface| !self.moved.contains_key(&instance_of(surface));
+        let is_there = |surface: &&Surface| {
+            !self.moved.contains_key(&instance_of(surface)) && !self.blank.contains(&surface.id)
+        };
         let surfaces = self.layout.surfaces().iter().filter(is_there).cloned().collect();
         Arc::new(Layout::new(page_size, pages, surfaces))
     }
 
-    /// Remembers since when instances rest that have no lumels yet.
-    fn follow_newcomers(&mut self, now: &HashMap<InstanceId, Affine3A>, time: f64) {
+    /// Remembers since when instances rest that have no lumels yet. Those that were to have none come again
+    /// once more of their primitives show some.
+    fn follow_newcomers(&mut self, now: &HashMap<InstanceId, &Instance>, scene: &Snapshot) {
         self.newcomers.retain(|id, _| now.contains_key(id));
-        for (id, at) in now {
-            if self.placed.contains_key(id) || self.without.contains(id) {
+        self.without.retain(|id, showed| {
+            now.get(id).is_some_and(|instance| showing(instance, scene) <= *showed)
+        });
+        for (id, instance) in now {
+            if self.placed.contains_key(id) || self.without.contains_key(id) {
                 continue;
             }
-            let resting = Moved { at: Some(*at), since: time };
+            let at = Some(instance.world_from_object);
+            let resting = Moved { at, since: scene.time };
             let known = self.newcomers.entry(*id).or_insert(resting);
-            if known.at != Some(*at) {
+            if known.at != at {
                 *known = resting;
             }
         }
@@ -79,9 +87,9 @@ impl LightmapSolver {
         rested.map(|(id, _)| *id).collect()
     }
 
-    /// Instances that get no lumels.
-    pub(crate) fn go_without(&mut self, instances: &[InstanceId]) {
-        self.without.extend(instances);
+    /// Instances that get no lumels, as they are in a scene.
+    pub(crate) fn go_without(&mut self, instances: &[InstanceId], scene: &Snapshot) {
+        self.without.extend(without(scene, |id| instances.contains(id)));
         self.newcomers.retain(|id, _| !instances.contains(id));
     }
 
@@ -118,7 +126,8 @@ impl LightmapSolver {
         new.without = std::mem::take(&mut self.without);
         new.newcomers = std::mem::take(&mut self.newcomers);
         new.newcomers.retain(|id, _| !new.placed.contains_key(id));
-        new.go_without(&without);
+        new.go_without(&without, scene);
+        new.blank = std::mem::take(&mut self.blank);
         new.moved = std::mem::take(&mut self.moved);
         new.moved.retain(|id, _| new.placed.contains_key(id));
         for id in with {
@@ -206,4 +215,15 @@ impl LightmapSolver {
         let lumels = own.flat_map(|surface| lumels_on_pages(&self.layout, surface));
         lumels.map(|(index, _)| self.receiver_of[index])
     }
+}
+
+/// Those of the still instances that are to have no lumels: of each how many primitives would show some.
+pub(super) fn without(
+    scene: &Snapshot,
+    is_without: impl Fn(&InstanceId) -> bool,
+) -> BTreeMap<InstanceId, usize> {
+    let still = scene.instances.iter().filter(|instance| instance.still);
+    let all = still.map(|instance| ((instance.node.0, instance.copy), instance));
+    let chosen = all.filter(|(id, _)| is_without(id));
+    chosen.map(|(id, instance)| (id, showing(instance, scene))).collect()
 }

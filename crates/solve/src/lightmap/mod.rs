@@ -10,6 +10,7 @@ mod fill;
 mod filter;
 mod glances;
 mod instances;
+mod materials;
 mod places;
 mod point;
 mod points;
@@ -28,7 +29,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Vec3};
 use lumencast_charts::LaidOut;
 use lumencast_gather::{Budget, Draws, Job, Receiver, Shading};
-use lumencast_light::{Field, FieldId, Layout, Light, Lightmap, Surface};
+use lumencast_light::{Field, FieldId, Layout, Light, Lightmap, Surface, SurfaceId};
 use lumencast_scene::Snapshot;
 
 use crate::blend::BlendSettings;
@@ -107,8 +108,10 @@ pub struct LightmapSolver {
     moved: BTreeMap<InstanceId, Moved>,
     /// Still instances without lumels: where they are, and since when, seconds of scene time.
     newcomers: BTreeMap<InstanceId, Moved>,
-    /// Those that get none: their surfaces take none, or there is no room.
-    without: BTreeSet<InstanceId>,
+    /// Those that get none, and how many of their primitives would show some: there was no room.
+    without: BTreeMap<InstanceId, usize>,
+    /// Surfaces that show no lumels, since their material is another than it was.
+    blank: BTreeSet<SurfaceId>,
     /// The version of the scene that was followed last.
     followed: Option<u64>,
 }
@@ -130,8 +133,6 @@ impl LightmapSolver {
         beyond::go_on(&mut receiver_of, &points, scene, laid_out, &texels);
         let readers = beyond::readers(&receiver_of, &lumels, layout.page_size);
         let placed = placed(scene, &layout);
-        let still = scene.instances.iter().filter(|instance| instance.still);
-        let ids = still.map(|instance| (instance.node.0, instance.copy));
         Self {
             id,
             settings,
@@ -153,7 +154,8 @@ impl LightmapSolver {
             shows_probes: false,
             readers: Arc::new(readers),
             beside: Arc::new(empty_beside(&places, layout.page_size)),
-            without: ids.filter(|id| !placed.contains_key(id)).collect(),
+            without: instances::without(scene, |id| !placed.contains_key(id)),
+            blank: BTreeSet::new(),
             placed,
             moved: BTreeMap::new(),
             newcomers: BTreeMap::new(),
