@@ -11,6 +11,7 @@ use lumencast_transport::{Access, Key, Tls};
 use serde_json::json;
 
 use crate::arguments::{DEFAULT_PORT, GatherArguments, SceneArguments, TickArguments};
+use crate::charting::Lumels;
 use crate::{
     interrupt,
     output::{self, say, tell},
@@ -85,6 +86,8 @@ impl Serve {
         let mut gatherer = self.gather.gatherer(Levels::Two)?;
         let options = self.tick.options(&mut scene, &self.scene, &self.gather, &mut *gatherer)?;
         let mut config = ServerConfig::new(network);
+        let some = options.lightmap.as_ref().filter(|lumels| !lumels.layout.surfaces().is_empty());
+        let lumels = some.map(Lumels::of);
         config.tick = options;
         config.page = self.page.clone();
 
@@ -96,7 +99,7 @@ impl Serve {
             .context("cannot start the network threads")?;
         runtime.block_on(async {
             let server = Server::bind(scene, gatherer, config).await?;
-            self.announce(&server);
+            self.announce(&server, lumels);
             server.run(interrupt::first()).await?;
             Ok(())
         })
@@ -124,8 +127,8 @@ impl Serve {
         Ok(network)
     }
 
-    /// Says where the page is.
-    fn announce(&self, server: &Server) {
+    /// Says where the page is, and what lights it.
+    fn announce(&self, server: &Server, lumels: Option<Lumels>) {
         let scheme = if self.tls_cert.is_some() { "https" } else { "http" };
         let address = server.local_addr();
         let host = match address.ip() {
@@ -145,12 +148,13 @@ impl Serve {
         if self.json {
             let ready = json!({
                 "address": page, "scene": server.scene_name(), "port": address.port(),
-                "epoch": server.tick().catalog().epoch, "probes": probes,
+                "epoch": server.tick().catalog().epoch, "probes": probes, "lumels": lumels,
             });
             output::json_line(&ready);
             return;
         }
-        say!("{}: {probes} probes at {} Hz", server.scene_name(), self.tick.rate);
+        let pages = lumels.map_or(String::new(), |lumels| format!("; lumels on {lumels}"));
+        say!("{}: {probes} probes at {} Hz{pages}", server.scene_name(), self.tick.rate);
         say!("{page}");
         if !lumencast_server::page_is_embedded() && self.page.is_none() {
             tell!("warning: compiled without its page; give --page DIR, or build web/viewer first");

@@ -124,6 +124,8 @@ fn lumels_are_cast_to_native_clients() {
     let text = |path: &std::path::Path| path.to_str().expect("text").to_owned();
     let few = ["--volume", "2x2x2", "--lightmap", "64", "--fields", "lightmap,volume"];
     let server = Serving::start("cornell", &few);
+    let lumels = &server.ready["lumels"];
+    assert_eq!((&lumels["pages"], &lumels["page_size"]), (&1.into(), &64.into()), "{lumels}");
     let url = server.url();
     server.wait_for_metric("lumencast_ticks_total", |n| n > 20.0);
 

@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use super::cast::Cast;
 use super::quantile;
 use crate::arguments::{GatherArguments, SceneArguments, TickArguments};
+use crate::charting::Lumels;
 use crate::output::{self, say};
 
 /// Runs the server's tick without network and prints its times, samples and bytes.
@@ -54,6 +55,7 @@ impl BenchTick {
         let mut gatherer = self.gather.gatherer(Levels::Two)?;
         let options = self.tick.options(&mut scene, &self.scene, &self.gather, &mut *gatherer)?;
         let period = options.period;
+        let pages = options.lightmap.as_ref().map(Lumels::of);
         let mut cast = Cast::new(scene, gatherer, options)?;
         let end = SETTLING as f64 * period + self.seconds.max(period);
         let bar = output::bar((end / period).ceil() as u64, "Ticks");
@@ -87,6 +89,7 @@ impl BenchTick {
         if lumels > 0 {
             let of_second_half = sent.lumels - first_half.unwrap_or_default();
             figures["lightmap"] = json!({
+                "pages": pages,
                 "lumels": lumels,
                 "bytes_a_second": sent.lumels as f64 / end,
                 "bytes_a_second_of_second_half": of_second_half as f64 / (0.5 * end),
@@ -95,7 +98,7 @@ impl BenchTick {
         if self.json {
             return output::json(&figures);
         }
-        print_figures(&figures);
+        print_figures(&figures, pages);
         Ok(())
     }
 
@@ -214,7 +217,7 @@ impl Outlet for Sent {
     }
 }
 
-fn print_figures(figures: &Value) {
+fn print_figures(figures: &Value, pages: Option<Lumels>) {
     let number =
         |pointer: &str| figures.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
     say!(
@@ -258,9 +261,9 @@ fn print_figures(figures: &Value) {
             field["bytes_by_layer"],
         );
     }
-    if let Some(lumels) = figures["lightmap"]["lumels"].as_u64() {
+    if let Some((lumels, pages)) = figures["lightmap"]["lumels"].as_u64().zip(pages) {
         say!(
-            "lightmap    {lumels} lumels: {:.1} KB/s, in the second half {:.1} KB/s",
+            "lightmap    {pages}, {lumels} lumels: {:.1} KB/s, in the second half {:.1} KB/s",
             number("/lightmap/bytes_a_second") / 1e3,
             number("/lightmap/bytes_a_second_of_second_half") / 1e3,
         );
