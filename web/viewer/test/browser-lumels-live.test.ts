@@ -224,3 +224,29 @@ it('is lit by probes alone where the browser decodes no video, and the page says
   await page.close();
   expect(own).toEqual([]);
 });
+
+it('stays on all meshes while what is added takes another page', async () => {
+  const former = errors.length;
+  const [least, most] = await page.evaluate(async () => {
+    const { camera, light, session } = window.lumencast!;
+    const pages = () =>
+      session.catalog!.fields.reduce(
+        (sum, field) => sum + (field.kind === 'lightmap' ? field.shape.pages : 0),
+        0,
+      );
+    const before = pages();
+    let [least, most] = [light.lumelMeshes, light.lumelMeshes];
+    // Another room as large as all, in the middle of it.
+    await light.edit({ edit: 'add_instance', source: { mesh: 0 }, transform: { scale: [0.9, 0.9, 0.9] } });
+    while (pages() === before || most === least) {
+      await new Promise(requestAnimationFrame);
+      light.update(camera);
+      least = Math.min(least, light.lumelMeshes);
+      most = Math.max(most, light.lumelMeshes);
+    }
+    return [least, most] as const;
+  });
+  expect(least).toBe(STILL);
+  expect(most).toBeGreaterThan(STILL);
+  expect(errors.slice(former)).toEqual([]);
+});
