@@ -215,3 +215,44 @@ fn cases_from_outside() {
         assert!(r > 1.0 && g + b < 0.1 * r, "{red}");
     }
 }
+
+/// Where all moves, nothing has lumels: probes light it, and people are told.
+#[test]
+fn a_scene_without_still_surfaces_is_lit_by_probes() {
+    let folder = Folder::new("all-moves");
+    let moving = scene(&folder, |scene| {
+        let times = "data:application/octet-stream;base64,AAAAAAAAgD8=";
+        let more = [
+            ("buffers", json!({ "uri": times, "byteLength": 8 })),
+            ("bufferViews", json!({ "buffer": 1, "byteLength": 8 })),
+            (
+                "accessors",
+                json!({
+                    "bufferView": 1, "componentType": 5126, "type": "SCALAR", "count": 2,
+                    "min": [0], "max": [1],
+                }),
+            ),
+            (
+                "accessors",
+                json!({ "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 2 }),
+            ),
+        ];
+        for (list, one) in more {
+            scene[list].as_array_mut().expect("a list").push(one);
+        }
+        scene["animations"] = json!([{
+            "channels": [{ "sampler": 0, "target": { "node": 0, "path": "translation" } }],
+            "samplers": [{ "input": 1, "output": 2 }],
+        }]);
+    });
+    let light = folder.0.join("moving.light").to_str().expect("text").to_owned();
+    let few = ["--environment", "sky:1000", "--volume", "2x2x2", "--samples", "4"];
+    let baked = run(&[&["bake", &moving, "-o", &light], &few[..]].concat());
+    assert_eq!(baked.code, Some(0), "{baked:?}");
+    assert!(baked.stderr.contains("no still surface"), "{baked:?}");
+    let fields = &run(&["inspect", &light, "--json"]).json()["fields"];
+    assert_eq!((fields[0]["kind"].as_str(), &fields[1]), (Some("volume"), &Value::Null));
+    let server = Serving::start(&moving, &few);
+    assert_eq!(server.ready["lumels"], Value::Null);
+    server.wait_for_metric("lumencast_ticks_total", |n| n > 2.0);
+}
