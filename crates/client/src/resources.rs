@@ -15,10 +15,11 @@ pub(crate) async fn fetch(url: &str, hash: ResourceHash) -> Result<Vec<u8>, Clie
     let address =
         beside(url, &format!("resources/{hash}")).map_err(|error| failed(error.to_string()))?;
     let bytes = Fetch::new()?.get(&address).await?.all(limits::RESOURCE_BYTES).await?;
-    match ResourceHash::of(&bytes) {
-        of if of == hash => Ok(bytes),
-        other => Err(failed(format!("the server gave {other} for {hash}"))),
+    let other = ResourceHash::of(&bytes);
+    if other != hash {
+        return Err(failed(format!("the server gave {other} for {hash}")));
     }
+    Ok(bytes)
 }
 
 #[cfg(test)]

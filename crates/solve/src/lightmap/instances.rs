@@ -28,9 +28,7 @@ impl LightmapSolver {
         if is_same && self.moved.is_empty() && self.newcomers.is_empty() {
             return false;
         }
-        let still = scene.instances.iter().filter(|instance| instance.still);
-        let now: HashMap<InstanceId, &Instance> =
-            still.map(|instance| ((instance.node.0, instance.copy), instance)).collect();
+        let now: HashMap<InstanceId, &Instance> = still(scene).collect();
         self.follow_newcomers(&now, scene);
         let blank = blank(&self.layout, &now, scene);
         let mut is_other = blank != self.blank;
@@ -222,8 +220,12 @@ pub(super) fn without(
     scene: &Snapshot,
     is_without: impl Fn(&InstanceId) -> bool,
 ) -> BTreeMap<InstanceId, usize> {
-    let still = scene.instances.iter().filter(|instance| instance.still);
-    let all = still.map(|instance| ((instance.node.0, instance.copy), instance));
-    let chosen = all.filter(|(id, _)| is_without(id));
+    let chosen = still(scene).filter(|(id, _)| is_without(id));
     chosen.map(|(id, instance)| (id, showing(instance, scene))).collect()
+}
+
+/// The instances that are still, by number.
+fn still(scene: &Snapshot) -> impl Iterator<Item = (InstanceId, &Instance)> {
+    let all = scene.instances.iter().filter(|instance| instance.still);
+    all.map(|instance| ((instance.node.0, instance.copy), instance))
 }
