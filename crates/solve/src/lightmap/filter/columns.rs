@@ -37,8 +37,8 @@ pub(super) struct Columns {
     pub(super) normal: [Vec<f32>; 3],
     /// Irradiance, and the slope where any lumel has one.
     pub(super) values: Vec<Vec<f32>>,
+    /// 0 where nothing is known, as its variance.
     pub(super) luminance: Vec<f32>,
-    /// Variance of the luminance; 0 where nothing is known.
     pub(super) variance: Vec<f32>,
     /// 0 where nothing is known.
     pub(super) samples: Vec<f32>,
@@ -51,6 +51,9 @@ impl Columns {
         let column = |of: &dyn Fn(&Noisy) -> f32| -> Vec<f32> {
             window.iter().map(|lumel| lumel.as_ref().map_or(0.0, of)).collect()
         };
+        let known = |of: &dyn Fn(&Noisy) -> f32| {
+            column(&|lumel| if lumel.is_known() { of(lumel) } else { 0.0 })
+        };
         let three = |of: &dyn Fn(&Noisy) -> Vec3| [0, 1, 2].map(|k| column(&|lumel| of(lumel)[k]));
         let mut values: Vec<Vec<f32>> = three(&|lumel| lumel.irradiance).into();
         if window.iter().flatten().any(|lumel| lumel.slope != Vec3::ZERO) {
@@ -61,8 +64,8 @@ impl Columns {
             position: three(&|lumel| lumel.position),
             normal: three(&|lumel| lumel.normal),
             values,
-            luminance: column(&|lumel| luminance(lumel.irradiance)),
-            variance: column(&|lumel| if lumel.is_known() { lumel.variance } else { 0.0 }),
+            luminance: known(&|lumel| luminance(lumel.irradiance)),
+            variance: known(&|lumel| lumel.variance),
             samples: column(&|lumel| lumel.samples),
             known: column(&|lumel| f32::from(lumel.is_known())),
         }

@@ -6,6 +6,7 @@
 //! too noisy to tell, so the 5 × 5 about both are compared (non-local means: Buades et al. 2005; Rousselle
 //! et al. 2012, equation 3). Lumels that are known well are left alone.
 
+mod brightest;
 mod columns;
 mod means;
 mod numbers;
@@ -15,10 +16,11 @@ mod taps;
 
 use lumencast_gather::by_vectors;
 
+use brightest::Brightest;
 use columns::Columns;
 pub(crate) use columns::Noisy;
 use means::Means;
-use numbers::{add, after};
+use numbers::{add, after, squared};
 use pairs::Pairs;
 use patches::PATCH;
 use taps::taps;
@@ -28,6 +30,12 @@ const PASSES: u32 = 3;
 /// Lumels so far off count for a lumel: two steps and a patch in each pass, and one where its variance is
 /// doubted.
 pub(crate) const REACH: u32 = 2 * ((1 << PASSES) - 1) + PASSES * PATCH as u32 + 1;
+/// A lumel stands out that is so many times as bright as all but one about it, where there are so many at
+/// least.
+const STANDS_OUT: f32 = 1.25;
+const ABOUT: f32 = 2.0;
+/// One of so many samples does so by chance as likely as not.
+const FEW: f32 = 4.0;
 /// A neighbour on the surface is at most so many times as far in the world as on the page.
 pub(crate) const STRETCH: f32 = 1.5;
 
@@ -59,11 +67,13 @@ fn filter_all(window: &mut [Option<Noisy>], side: u32, texel: f32, margin: u32) 
     }
 }
 
-/// Gives lumels at least the mean variance of those about them that lie at most `near` metres off:
-/// among few samples, rare bright ones may all be missing.
+/// Gives lumels the variance that few samples hide, by those about them that lie at most `near` metres
+/// off. Rare bright samples may all be missing: a variance is at least the mean of those about it. Or a
+/// lumel has met several: it may be too bright by what it has more than all but one about it.
 #[inline(always)]
 fn doubt_low_variances(columns: &mut Columns, near: f32, pairs: &mut Pairs) {
     let (mut sums, mut counts) = (columns.variance.clone(), columns.known.clone());
+    let mut brightest = Brightest::new(counts.len());
     for tap in taps(1) {
         let shift = tap.shift(1, columns.side);
         let here = pairs.find(columns, 0..columns.known.len(), shift, near * near * tap.steps());
@@ -73,9 +83,17 @@ fn doubt_low_variances(columns: &mut Columns, near: f32, pairs: &mut Pairs) {
             add(&mut sums[here.clone()], &values[there.clone()], beside);
             add(&mut sums[there.clone()], &values[here.clone()], beside);
         }
+        brightest.take(&here, &columns.luminance[there.clone()], beside);
+        brightest.take(&there, &columns.luminance[here], beside);
     }
     for (i, variance) in columns.variance.iter_mut().enumerate() {
-        *variance = variance.max(columns.known[i] * sums[i] / counts[i].max(f32::MIN_POSITIVE));
+        let known = columns.known[i];
+        let mean = sums[i] / counts[i].max(f32::MIN_POSITIVE);
+        let (own, second) = (columns.luminance[i], brightest.second[i]);
+        let stands_out = counts[i] - known >= ABOUT && own > STANDS_OUT * second;
+        let excess = if stands_out { own - second } else { 0.0 };
+        let chance = FEW * FEW / (FEW * FEW + squared(columns.samples[i]));
+        *variance = variance.max(known * mean).max(known * chance * squared(excess));
     }
 }
 
@@ -144,6 +162,25 @@ mod tests {
         let mut clean = page(slope, 0.0);
         filter(&mut clean, SIDE, 0.1, 0);
         assert!(error(&clean, slope) < 1e-3, "{}", error(&clean, slope));
+    }
+
+    /// Two bright samples of two are thought chance, even beside another such lumel; of many, they are not.
+    #[test]
+    fn few_samples_are_doubted_where_they_stand_out() {
+        let middle = SIDE * SIDE / 2 + SIDE / 2;
+        for (samples, count) in [(2.0, 1), (2.0, 2), (256.0, 1), (256.0, 2)] {
+            let mut sparks = page(|_| 10.0, 1.0);
+            sparks.iter_mut().flatten().for_each(|lumel| lumel.samples = samples);
+            for spark in &mut sparks[middle as usize..][..count] {
+                let Some(lumel) = spark else { panic!("a lumel") };
+                (lumel.irradiance, lumel.variance) = (Vec3::splat(100.0), 0.0);
+            }
+            filter(&mut sparks, SIDE, 0.1, 0);
+            let shown = sparks[middle as usize].expect("a lumel").irradiance.x;
+            let is_chance = samples < 4.0;
+            assert_eq!(shown < 20.0, is_chance, "{count} of {samples} samples: {shown}");
+            assert_eq!(shown > 90.0, !is_chance, "{count} of {samples} samples: {shown}");
+        }
     }
 
     /// Of every sixteenth lumel something is known: the others lie between.
