@@ -93,7 +93,7 @@ fn doubt_low_variances(columns: &mut Columns, near: f32, pairs: &mut Pairs) {
         let stands_out = counts[i] - known >= ABOUT && own > STANDS_OUT * second;
         let excess = if stands_out { own - second } else { 0.0 };
         let chance = FEW * FEW / (FEW * FEW + squared(columns.samples[i]));
-        *variance = variance.max(known * mean).max(known * chance * squared(excess));
+        *variance = variance.max(known * mean).max(chance * squared(excess));
     }
 }
 
@@ -171,8 +171,7 @@ mod tests {
         for (samples, count) in [(2.0, 1), (2.0, 2), (256.0, 1), (256.0, 2)] {
             let mut sparks = page(|_| 10.0, 1.0);
             sparks.iter_mut().flatten().for_each(|lumel| lumel.samples = samples);
-            for spark in &mut sparks[middle as usize..][..count] {
-                let Some(lumel) = spark else { panic!("a lumel") };
+            for lumel in sparks[middle as usize..][..count].iter_mut().flatten() {
                 (lumel.irradiance, lumel.variance) = (Vec3::splat(100.0), 0.0);
             }
             filter(&mut sparks, SIDE, 0.1, 0);
