@@ -39,6 +39,8 @@ pub(crate) struct Shape<'a> {
     /// Metres: the object's, scaled as its instance is.
     pub(crate) positions: Vec<Vec3>,
     pub(crate) triangles: &'a [[u32; 3]],
+    /// Which of them have an area; the others have no chart.
+    pub(crate) has_area: Vec<bool>,
     /// Coordinates that cut it already, one a vertex.
     pub(crate) uv: Option<&'a [Vec2]>,
 }
@@ -78,11 +80,17 @@ impl Shape<'_> {
         self.triangles.iter().map(area).sum()
     }
 
+    /// The triangles that have an area, with their numbers.
+    fn with_area(&self) -> (Vec<usize>, Vec<[u32; 3]>) {
+        let triangles = self.triangles.iter().copied().enumerate();
+        triangles.filter(|(number, _)| self.has_area[*number]).unzip()
+    }
+
     /// Number of parts that touch each other nowhere, where triangles share no position. A chart lies on
     /// one part alone.
     fn parts(&self) -> u32 {
         let place = |vertex: u32| (self.positions[vertex as usize] + Vec3::ZERO).to_array();
-        parts(self.triangles.iter().map(|triangle| triangle.map(|v| place(v).map(f32::to_bits))))
+        parts(self.with_area().1.iter().map(|triangle| triangle.map(|v| place(v).map(f32::to_bits))))
     }
 }
 
@@ -96,20 +104,22 @@ pub(crate) fn cut(shape: &Shape<'_>, watch: Watch<'_>) -> Result<Cut, ChartError
     if parts > MOST_CHARTS {
         return Err(ChartError::TooManyCharts { charts: parts, most: MOST_CHARTS });
     }
+    // What has no area joins charts that do not lie beside each other.
+    let (numbers, triangles) = shape.with_area();
     let texels_per_unit = (FIRST_LUMELS / area).sqrt() as f32;
     let density = Density::Fixed { texels_per_unit, page_size: None };
     let options = Options { density, packing: Packing::Fast, padding: 1, ..Options::default() };
     let uv: Option<&[[f32; 2]]> = shape.uv.map(bytemuck::cast_slice);
     let input = MeshInput {
         existing_uvs: uv,
-        ..MeshInput::new(bytemuck::cast_slice(&shape.positions), shape.triangles.as_flattened())
+        ..MeshInput::new(bytemuck::cast_slice(&shape.positions), triangles.as_flattened())
     };
     let atlas = generate(input, &options, watch)?;
     if atlas.chart_count > MOST_CHARTS {
         return Err(ChartError::TooManyCharts { charts: atlas.chart_count, most: MOST_CHARTS });
     }
     let metres = UVec2::new(atlas.width, atlas.height).as_vec2() / atlas.texels_per_unit;
-    let mesh = checked(&atlas, shape.triangles)?;
+    let mesh = checked(&atlas, &triangles)?;
     let vertices = mesh.vertices.iter().map(|vertex| CutVertex {
         source: vertex.xref,
         chart: vertex.chart.unwrap_or(u32::MAX),
@@ -120,7 +130,7 @@ pub(crate) fn cut(shape: &Shape<'_>, watch: Watch<'_>) -> Result<Cut, ChartError
         let has_chart = triangle.iter().all(|v| vertices[*v as usize].chart < atlas.chart_count);
         if has_chart { *triangle } else { Charts::NOWHERE }
     });
-    let triangles: Vec<[u32; 3]> = triangles.collect();
+    let triangles = spread(numbers.into_iter().zip(triangles), shape.triangles.len());
     if uv.is_none() && overlapping(&vertices, &triangles, metres) > OVERLAPPING {
         return Err(ChartError::Unwrap("the unwrapper returned charts that overlap".into()));
     }
@@ -140,17 +150,24 @@ fn overlapping(vertices: &[CutVertex], triangles: &[[u32; 3]], metres: Vec2) -> 
     found.twice as f32 / found.all.max(1) as f32
 }
 
-/// Lays the charts of a surface out at a density, those that `keep` names. They share one rectangle as
-/// long as no side of it is longer than `most` lumels.
+/// As many triangles, some of which are these, by their numbers.
+fn spread(some: impl Iterator<Item = (usize, [u32; 3])>, count: usize) -> Vec<[u32; 3]> {
+    let mut all = vec![Charts::NOWHERE; count];
+    some.for_each(|(number, triangle)| all[number] = triangle);
+    all
+}
+
+/// Lays the charts of a surface, whose vertices lie at these positions, out at a density: those that
+/// `keep` names. They share one rectangle as long as no side of it is longer than `most` lumels.
 pub(crate) fn lay_out(
     cut: &Cut,
-    shape: &Shape<'_>,
+    positions: &[Vec3],
     keep: &dyn Fn(u32) -> bool,
     lumels_a_metre: f32,
     most: u32,
 ) -> Result<Charts, ChartError> {
     let positions: Vec<Vec3> =
-        cut.vertices.iter().map(|v| shape.positions[v.source as usize]).collect();
+        cut.vertices.iter().map(|v| positions[v.source as usize]).collect();
     let uv: Vec<[f32; 2]> = cut.vertices.iter().map(|v| v.at.to_array()).collect();
     let kept = |triangle: &[u32; 3]| {
         *triangle != Charts::NOWHERE && keep(cut.vertices[triangle[0] as usize].chart)
@@ -190,11 +207,8 @@ pub(crate) fn lay_out(
         let size = &mut sizes[vertex.rectangle as usize];
         *size = size.max(vertex.at.ceil().as_uvec2() + PADDING);
     }
-    let mut placed = vec![Charts::NOWHERE; cut.triangles.len()];
-    for (own, triangle) in kept.into_iter().zip(mesh.indices.as_chunks::<3>().0) {
-        placed[own] = *triangle;
-    }
-    Ok(Charts { sizes, vertices, triangles: placed })
+    let placed = kept.into_iter().zip(mesh.indices.as_chunks::<3>().0.iter().copied());
+    Ok(Charts { sizes, vertices, triangles: spread(placed, cut.triangles.len()) })
 }
 
 /// The density, lumels a metre, beyond which one of the charts that `keep` names is longer than `most`

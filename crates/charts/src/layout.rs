@@ -9,7 +9,7 @@ use lumencast_light::{Charts, Layout, Rectangle, Surface, SurfaceId};
 use lumencast_scene::LightmapSpec;
 use rayon::prelude::*;
 
-use crate::cut::{PADDING, Shape, lay_out};
+use crate::cut::{PADDING, lay_out};
 use crate::error::ChartError;
 use crate::sheet::Sheet;
 
@@ -306,8 +306,10 @@ fn key(sheet: &Sheet) -> (usize, Option<usize>) {
 }
 
 pub(crate) fn charts(sheet: &Sheet, density: f32, most: u32) -> Result<Charts, ChartError> {
-    let shape = Shape { positions: sheet.positions.to_vec(), triangles: &[], uv: None };
-    lay_out(&sheet.cut, &shape, &|chart| sheet.keeps(chart), density, most)
+    let keep = |chart| sheet.keeps(chart);
+    let mut charts = lay_out(&sheet.cut, &sheet.positions, &keep, density, most)?;
+    charts.vertices.iter_mut().for_each(|vertex| vertex.source = sheet.source(vertex.source));
+    Ok(charts)
 }
 
 /// Gives every rectangle a place.

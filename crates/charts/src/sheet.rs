@@ -30,6 +30,8 @@ pub struct Sheet {
     pub instance: usize,
     /// Its vertices, metres, in the orientation of the object or of the world.
     pub(crate) positions: Arc<[Vec3]>,
+    /// The file's numbers of its vertices, where they are not the same; else empty.
+    sources: Arc<[u32]>,
     pub(crate) cut: Arc<Cut>,
     /// Which charts are to have lumels, by number; all unless it says so.
     pub(crate) kept: Option<Arc<[bool]>>,
@@ -77,6 +79,11 @@ impl Sheet {
         Self { id, kept: Some(charts.into()), ..self.clone() }
     }
 
+    /// The file's number of a vertex.
+    pub(crate) fn source(&self, vertex: u32) -> u32 {
+        self.sources.get(vertex as usize).copied().unwrap_or(vertex)
+    }
+
     pub(crate) fn keeps(&self, chart: u32) -> bool {
         self.kept.as_ref().is_none_or(|kept| kept.get(chart as usize).copied().unwrap_or(false))
     }
@@ -107,6 +114,7 @@ struct Unique<'a> {
     instance: &'a Instance,
     primitive: usize,
     positions: Arc<[Vec3]>,
+    sources: Arc<[u32]>,
 }
 
 /// Cuts the still surfaces of a scene into charts, those on which lumels tell anything. `watch` is told
@@ -124,7 +132,8 @@ pub fn sheets(
     let mut surfaces = Vec::new();
     for (number, instance) in scene.instances.iter().enumerate().filter(|(_, i)| i.still) {
         for (index, primitive) in instance.mesh.primitives.iter().enumerate() {
-            if !takes_lumels(&scene.materials[primitive.material.0 as usize]) {
+            let material = scene.materials.get(primitive.material.0 as usize);
+            if primitive.triangles.is_empty() || !material.is_some_and(takes_lumels) {
                 continue;
             }
             let stretch = stretch(instance);
@@ -132,7 +141,8 @@ pub fn sheets(
             let unique = *known.entry(key).or_insert_with(|| {
                 let positions = primitive.vertices.positions.iter().map(|p| stretch * *p);
                 let positions = positions.collect();
-                uniques.push(Unique { instance, primitive: index, positions });
+                let sources = Arc::from(&primitive.sources[..]);
+                uniques.push(Unique { instance, primitive: index, positions, sources });
                 uniques.len() - 1
             });
             let (node, copy, primitive) = (instance.node.0, instance.copy, index as u32);
@@ -142,8 +152,9 @@ pub fn sheets(
     }
     let (cuts, notes) = cut_all(&uniques, store, watch)?;
     let sheet = |(instance, id, unique): (usize, SurfaceId, usize)| {
-        let (positions, cut) = (uniques[unique].positions.clone(), cuts[unique].clone()?);
-        Some(Sheet { id, instance, positions, cut, kept: None })
+        let Unique { positions, sources, .. } = &uniques[unique];
+        let (positions, sources) = (positions.clone(), sources.clone());
+        Some(Sheet { id, instance, positions, sources, cut: cuts[unique].clone()?, kept: None })
     };
     Ok(Sheets { sheets: surfaces.into_iter().filter_map(sheet).collect(), notes })
 }
@@ -194,8 +205,9 @@ fn cut_all(
             ));
         }
         let uv = own.ok().flatten();
-        let shape =
-            Shape { positions: unique.positions.to_vec(), triangles: &primitive.triangles, uv };
+        let triangles = &primitive.triangles[..];
+        let has_area = triangles.iter().map(|triangle| primitive.has_area(triangle)).collect();
+        let shape = Shape { positions: unique.positions.to_vec(), triangles, has_area, uv };
         let key = Key::of(&shape);
         match store.and_then(|store| store.load(key, &shape)) {
             Some(cut) => cuts[number] = Some(Arc::new(cut)),
@@ -262,8 +274,8 @@ fn own_coordinates(primitive: &Primitive) -> Result<Option<&[Vec2]>, &'static st
     if !uv.iter().all(within) {
         return Err("leave the square from 0 to 1");
     }
-    let corners = |triangle: &[u32; 3]| triangle.map(|v| uv[v as usize]);
-    if overlaps(primitive.triangles.iter().map(corners)).twice > 0 {
+    let drawn = primitive.triangles.iter().filter(|triangle| primitive.has_area(triangle));
+    if overlaps(drawn.map(|triangle| triangle.map(|v| uv[v as usize]))).twice > 0 {
         return Err("overlap");
     }
     Ok(Some(uv))

@@ -47,7 +47,11 @@ fn check(scene: &Snapshot, laid_out: &LaidOut) {
         }
         let (mut flat, mut curved) = (0.0, 0.0);
         for (number, own) in (0..).zip(&primitive.triangles) {
-            let corners = surface.charts.corners(number).expect("every triangle has a place");
+            if !primitive.has_area(own) {
+                assert_eq!(surface.charts.corners(number), None);
+                continue;
+            }
+            let corners = surface.charts.corners(number).expect("a place for what has an area");
             assert_eq!(&corners.map(|corner| corner.source), own);
             assert!(corners.iter().all(|corner| corner.rectangle == corners[0].rectangle));
             let [a, b, c] = corners.map(|corner| corner.at);
@@ -321,23 +325,84 @@ fn strip(columns: u32, uv: impl Fn(Vec2) -> Vec2) -> Primitive {
     primitive
 }
 
-/// A file's own second coordinates cut the surface where they are sound; otherwise they are named.
+/// The sheets of a strip of four columns with these second coordinates.
+fn sheets_of_strip(uv: impl Fn(Vec2) -> Vec2) -> Sheets {
+    let mut stage = Stage::default();
+    stage.material(grey());
+    stage.primitive(strip(4, uv), Affine3A::IDENTITY);
+    cut(&stage.snapshot())
+}
+
+/// A file's own second coordinates cut the surface where they are sound: here in the middle.
 #[test]
-fn second_coordinates_are_used_or_named() {
-    let sheets_of = |uv: fn(Vec2) -> Vec2| {
+fn sound_second_coordinates_are_used() {
+    let charts_of = |primitive: Primitive| {
         let mut stage = Stage::default();
         stage.material(grey());
-        stage.primitive(strip(4, uv), Affine3A::IDENTITY);
-        cut(&stage.snapshot())
+        stage.primitive(primitive, Affine3A::IDENTITY);
+        let Sheets { sheets, notes } = cut(&stage.snapshot());
+        assert!(notes.is_empty(), "{notes:?}");
+        check(&stage.snapshot(), &laid_out(&sheets, LightmapSpec::Texel(0.1)).unwrap());
+        sheets[0].charts()
     };
-    let sound = sheets_of(|at| 0.1 + 0.8 * at);
-    assert_eq!((sound.sheets.len(), sound.notes), (1, vec![]));
-    let outside = sheets_of(|at| 1.5 * at);
-    assert_eq!(outside.sheets.len(), 1);
+    let whole = Primitive { uv: Default::default(), ..strip(4, |at| at) };
+    // The right half has vertices of its own on the edge where it meets the left one.
+    let mut parted = whole.clone();
+    for vertex in [4, 5] {
+        parted.vertices.positions.push(whole.vertices.positions[vertex]);
+        parted.vertices.normals.push(Vec3::Z);
+    }
+    let right = parted.triangles[4..].iter_mut().flatten();
+    right.filter(|v| **v < 6).for_each(|v| *v += 6);
+    let across = [0.0, 0.2, 0.4, 0.8, 1.0, 0.6];
+    parted.uv[1] = (0..12).map(|v| Vec2::new(across[v / 2], (v % 2) as f32)).collect();
+    assert_eq!((charts_of(whole), charts_of(parted)), (1, 2));
+}
+
+/// Others are named, and the surface is cut as if it had none.
+#[test]
+fn bad_second_coordinates_are_named_and_left_alone() {
+    let mut bare = strip(4, |at| at);
+    bare.uv = Default::default();
+    let mut stage = Stage::default();
+    stage.material(grey());
+    stage.primitive(bare, Affine3A::IDENTITY);
+    let lay = |sheets: &Sheets| laid_out(&sheets.sheets, LightmapSpec::Size(64)).unwrap().layout;
+    let expected = lay(&cut(&stage.snapshot()));
+    let outside = sheets_of_strip(|at| 1.5 * at);
     assert!(outside.notes[0].contains("leave the square"), "{:?}", outside.notes);
-    let folded = sheets_of(|at| Vec2::new((2.0 * at.x - 1.0).abs(), at.y));
-    assert_eq!(folded.sheets.len(), 1);
+    let folded = sheets_of_strip(|at| Vec2::new((2.0 * at.x - 1.0).abs(), at.y));
     assert!(folded.notes[0].contains("overlap"), "{:?}", folded.notes);
+    for sheets in [outside, folded] {
+        assert_eq!(lay(&sheets), expected);
+    }
+}
+
+/// Triangles without area have no place, and all others have the place that they would have without
+/// them. Vertices are named by the file's numbers.
+#[test]
+fn triangles_without_area_keep_their_numbers() {
+    let laid_out_of = |primitive: &Primitive| {
+        let mut stage = Stage::default();
+        stage.material(grey());
+        stage.primitive(primitive.clone(), Affine3A::IDENTITY);
+        let layout = laid_out(&cut(&stage.snapshot()).sheets, LightmapSpec::Size(64)).unwrap().layout;
+        Charts::clone(&layout.surfaces()[0].charts)
+    };
+    let plain = strip(3, |at| 0.1 + 0.8 * at);
+    let mut more = plain.clone();
+    more.triangles.insert(0, [0, 2, 4]);
+    more.triangles.insert(3, [1, 3, 3]);
+    more.sources = (0..8).map(|vertex| 100 + vertex / 2).collect();
+    let (expected, mut charts) = (laid_out_of(&plain), laid_out_of(&more));
+    for number in [3, 0] {
+        assert_eq!(charts.triangles.remove(number), Charts::NOWHERE);
+    }
+    for (vertex, plain) in charts.vertices.iter_mut().zip(&expected.vertices) {
+        assert_eq!(vertex.source, 100 + plain.source / 2);
+        vertex.source = plain.source;
+    }
+    assert_eq!(charts, expected);
 }
 
 /// Vertices of a primitive that nothing good can be said of.
@@ -389,6 +454,8 @@ fn bad_meshes_have_lumels_or_are_named() {
         stage.primitive(primitive, Affine3A::IDENTITY);
         let Sheets { sheets, notes } = cut(&stage.snapshot());
         match &sheets[..] {
+            // There is nothing to light.
+            [_] if triangles == 0 => assert!(notes.is_empty(), "{notes:?}"),
             [_] => assert!(notes.iter().any(|n| n.starts_with("mesh 1, primitive 0")), "{name}"),
             [_, bad] => {
                 let laid_out = laid_out(&sheets, LightmapSpec::Size(256)).unwrap();

@@ -9,7 +9,7 @@ use crate::{Aabb, MaterialId};
 pub struct Mesh {
     /// Name in the file, for messages.
     pub name: String,
-    /// Triangle lists.
+    /// Triangle lists, as many as the file's mesh has: what is not drawn has no triangles.
     pub primitives: Vec<Primitive>,
     /// Default morph weights, one for each target.
     pub morph_weights: Vec<f32>,
@@ -35,6 +35,8 @@ impl Mesh {
 
 /// A triangle list with one material. Strips and fans are unrolled by the loader, which also
 /// guarantees that every index lies inside the vertices and every position and normal is finite.
+/// Its triangles are the file's, in their order, also those without area: clients that loaded the
+/// file by themselves know them by their numbers.
 #[derive(Clone, Debug, Default)]
 pub struct Primitive {
     /// Indices into the vertices; counter-clockwise as seen from the front.
@@ -56,11 +58,24 @@ pub struct Primitive {
     /// Whether the file has no normals. Then each triangle has three vertices of its own with the
     /// triangle's normal, also when it is deformed.
     pub flat: bool,
+    /// The file's number of each vertex, where some of the file's are split in several; else empty.
+    pub sources: Vec<u32>,
     /// Its material; glTF's default material has a number of its own.
     pub material: MaterialId,
 }
 
 impl Primitive {
+    /// The file's number of a vertex.
+    pub fn source(&self, vertex: u32) -> u32 {
+        self.sources.get(vertex as usize).copied().unwrap_or(vertex)
+    }
+
+    /// Whether a triangle has an area at rest.
+    pub fn has_area(&self, triangle: &[u32; 3]) -> bool {
+        let [a, b, c] = triangle.map(|v| self.vertices.positions[v as usize].as_dvec3());
+        (b - a).cross(c - a) != DVec3::ZERO
+    }
+
     /// Number of entries of four joints for each vertex; 0 where the mesh is not skinned.
     pub fn influence_sets(&self) -> usize {
         self.joints.len() / self.vertices.positions.len().max(1)

@@ -161,7 +161,8 @@ impl Charted {
 fn fits(charts: &Charts, primitive: &Primitive) -> bool {
     let is_own = |(triangle, own): (&[u32; 3], &[u32; 3])| {
         let source = |vertex: &u32| charts.vertices.get(*vertex as usize).map(|v| v.source);
-        *triangle == Charts::NOWHERE || triangle.iter().map(source).eq(own.iter().map(|v| Some(*v)))
+        *triangle == Charts::NOWHERE
+            || triangle.iter().map(source).eq(own.iter().map(|v| Some(primitive.source(*v))))
     };
     charts.triangles.len() == primitive.triangles.len()
         && charts.triangles.iter().zip(&primitive.triangles).all(is_own)

@@ -70,9 +70,10 @@ export function canHaveLumels(mesh: Mesh): boolean {
 /** Parts a geometry by charts; `undefined` where the charts of a side are not those of this geometry. */
 export function part(geometry: BufferGeometry, sides: Sides): Parted | undefined {
   const own = trianglesOf(geometry);
-  if (!sides.every((charts) => charts === undefined || fits(charts, own))) return undefined;
+  const corners = sides.map((charts) => charts && cornersOf(charts, own));
+  if (sides.some((charts, side) => charts && !corners[side])) return undefined;
   const vertices = new PartedVertices(sides, geometry.attributes.position?.count ?? 0, own.length);
-  const [front, back] = sides.map((charts) => charts?.triangles);
+  const [front, back] = corners;
   const index = new Uint32Array(own.length);
   for (let i = 0; i < own.length; i++) index[i] = vertices.of(own[i], front?.[i] ?? -1, back?.[i] ?? -1);
   const { sources, chartVertices } = vertices.found();
@@ -141,12 +142,35 @@ function trianglesOf({ index, attributes }: BufferGeometry): TypedArray {
   return index?.array ?? Uint32Array.from({ length: attributes.position?.count ?? 0 }, (_, i) => i);
 }
 
-/** Whether charts are of as many triangles, each with its own vertices. */
-function fits({ triangles, sources }: Charts, own: TypedArray): boolean {
-  if (triangles.length !== own.length) return false;
-  for (let i = 0; i < own.length; i++) {
-    if (triangles[i] >= 0 && sources[triangles[i]] !== own[i]) return false;
+/**
+ * Of each corner of a geometry's triangles the charts' vertex, or −1; `undefined` where the charts are not of
+ * as many triangles, each with its own vertices. GLTFLoader begins triangles of strips and fans at other
+ * corners than glTF, and leaves corners that make no whole triangle at the end.
+ */
+function cornersOf({ triangles, sources }: Charts, own: TypedArray): Int32Array | undefined {
+  const whole = own.length - (own.length % 3);
+  if (triangles.length !== whole) return undefined;
+  const corners = new Int32Array(own.length).fill(-1);
+  for (let first = 0; first < whole; first += 3) {
+    if (triangles[first] < 0) continue;
+    let turn = 0;
+    while (turn < 3 && !isTurned(triangles, sources, own, first, turn)) turn++;
+    if (turn === 3) return undefined;
+    for (let k = 0; k < 3; k++) corners[first + ((k + turn) % 3)] = triangles[first + k];
   }
+  return corners;
+}
+
+/** Whether a triangle of charts is the geometry's, so many corners further on. */
+function isTurned(
+  triangles: Charts['triangles'],
+  sources: Charts['sources'],
+  own: TypedArray,
+  first: number,
+  turn: number,
+): boolean {
+  for (let k = 0; k < 3; k++)
+    if (sources[triangles[first + k]] !== own[first + ((k + turn) % 3)]) return false;
   return true;
 }
 

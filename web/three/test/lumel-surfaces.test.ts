@@ -304,7 +304,32 @@ describe('light passes from probes to lumels, and back', () => {
   });
 });
 
+/** The square's triangles are 0 2 1 and 2 3 1. */
+it('triangles of charts may begin at any corner, and corners be left at the end', () => {
+  const charts = chartsOf([2, 1, 0, 1, 2, 3]);
+  charts.at.set([0, 1, 2, 3].flatMap((vertex) => [0.25 * vertex, 1]));
+  const geometry = new PlaneGeometry(2, 2);
+  geometry.setIndex([...geometry.index!.array, 0]);
+  const mesh = square(0, geometry);
+  surfaces.setLayouts([{ layout: layout(surface({ charts })), corner }]);
+  frame();
+  const { attributes, index } = mesh.geometry;
+  const places = [...index!.array].map((vertex) => attributes[LUMELS].getX(vertex));
+  expect(places).toEqual([...[0, 2, 1, 2, 3, 1].map((v) => FIRST + 2 + 0.25 * v), NO_LUMELS]);
+  const positions = (of: typeof mesh.geometry) =>
+    [...of.index!.array].map((vertex) => of.attributes.position.getX(vertex));
+  expect(positions(mesh.geometry)).toEqual(positions(geometry));
+});
+
 describe('probes alone light', () => {
+  it('what is wound the other way', () => {
+    const mesh = square(0);
+    surfaces.setLayouts([{ layout: layout(surface({ charts: chartsOf([2, 0, 1, 2, 3, 1]) })), corner }]);
+    frame();
+    expect(isLit(mesh)).toBe(false);
+    expect(warnings.length).toBe(1);
+  });
+
   it('what has other triangles, with one warning', () => {
     const meshes = [0, 1].map((node) => square(node, new PlaneGeometry(2, 2, 3)));
     meshes[0].name = 'wall';

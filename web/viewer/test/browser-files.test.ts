@@ -9,7 +9,8 @@ import { crc32, deflateSync } from 'node:zlib';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, it } from 'vitest';
 import { launchBrowser } from '../../testing/chromium.js';
-import { buildPage, cutOff, draw, look, onScreen, openPage, type Pixel, shoot } from './browser.js';
+import { buildPage, cutOff, draw, look, onScreen, openPage, PATIENCE, type Pixel, shoot } from './browser.js';
+import { lit } from './lumels.js';
 import { freePort, lumencastProgram, Server } from './server.js';
 
 const VIEWPORT = { width: 800, height: 600 };
@@ -214,5 +215,63 @@ it('shows instances and no hidden nodes', async () => {
     // What is hidden does not widen the view.
     expect(found.height).toBeLessThan(20);
     await shoot(page, 'instances.png');
+  });
+});
+
+/** Squares whose triangles three.js and the server read each in their way: their charts fit all the same. */
+it('lights meshes by lumels whatever their triangles are made of', async () => {
+  const corners = [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0.5, 0, 0];
+  const numbers: number[] = [];
+  const accessors: object[] = [];
+  const bufferViews: object[] = [];
+  const add = (type: 'SCALAR' | 'VEC2' | 'VEC3', values: readonly number[], more: object = {}) => {
+    bufferViews.push({ buffer: 0, byteOffset: 4 * numbers.length, byteLength: 4 * values.length });
+    // Floats and indices have four bytes each.
+    const words = type === 'SCALAR' ? Uint32Array.from(values) : Float32Array.from(values);
+    numbers.push(...new Uint32Array(words.buffer));
+    const [componentType, size] = type === 'SCALAR' ? [5125, 1] : [5126, type === 'VEC2' ? 2 : 3];
+    const count = values.length / size;
+    return accessors.push({ bufferView: bufferViews.length - 1, componentType, type, count, ...more }) - 1;
+  };
+  const POSITION = add('VEC3', corners, { min: [0, 0, 0], max: [1, 1, 0] });
+  const NORMAL = add('VEC3', new Array(5).fill([0, 0, 1]).flat());
+  // Mirrored on one of the two triangles: tangents split their vertices.
+  const TEXCOORD_0 = add('VEC2', [0, 0, 1, 0, 1, 1, 1, 0, 0, 0]);
+  const square = [0, 1, 2, 0, 2, 3];
+  const smooth = { POSITION, NORMAL };
+  const meshes = [
+    // Without area, in their midst; after points.
+    [
+      { mode: 0, attributes: { POSITION } },
+      { attributes: smooth, indices: add('SCALAR', [0, 1, 1, 0, 1, 2, 0, 4, 1, 0, 2, 3]) },
+    ],
+    // Without normals.
+    [{ attributes: { POSITION }, indices: add('SCALAR', square) }],
+    // A strip, a fan, and corners of no whole triangle.
+    [{ mode: 5, attributes: smooth, indices: add('SCALAR', [0, 1, 3, 2]) }],
+    [{ mode: 6, attributes: smooth, indices: add('SCALAR', [0, 1, 2, 3]) }],
+    [{ attributes: smooth, indices: add('SCALAR', [...square, 0]) }],
+    [{ attributes: { ...smooth, TEXCOORD_0 }, indices: add('SCALAR', square), material: 0 }],
+  ].map((primitives) => ({ primitives }));
+  const bytes = Buffer.from(Uint32Array.from(numbers).buffer);
+  const scene = writeScene('', {
+    extensionsUsed: ['KHR_lights_punctual'],
+    extensions: { KHR_lights_punctual: { lights: [{ type: 'point', intensity: 100 }] } },
+    buffers: [{ uri: `data:;base64,${bytes.toString('base64')}`, byteLength: bytes.length }],
+    bufferViews,
+    accessors,
+    images: [{ uri: png([128, 128, 255, 255]) }],
+    textures: [{ source: 0 }],
+    materials: [{ normalTexture: { index: 0 } }],
+    meshes,
+    nodes: [
+      ...meshes.map((_, mesh) => ({ mesh, translation: [1.5 * mesh, 0, 0] })),
+      { translation: [4, 1, 2], extensions: { KHR_lights_punctual: { light: 0 } } },
+    ],
+    scenes: [{ nodes: [...meshes.keys(), meshes.length] }],
+  });
+  await visit(scene, async (page) => {
+    await expect.poll(() => lit(page), { timeout: PATIENCE }).toBe(meshes.length);
+    await shoot(page, 'triangles.png');
   });
 });

@@ -11,17 +11,17 @@ use glam::{UVec2, Vec2, Vec3};
 pub struct Charts {
     /// Size of each rectangle, lumels.
     pub sizes: Vec<UVec2>,
-    /// Vertices; where charts part, a vertex of the primitive has several.
+    /// Vertices; where charts part, a vertex of the file has several.
     pub vertices: Vec<ChartVertex>,
-    /// As many triangles as the primitive has, in its order; [`Charts::NOWHERE`] for those that have no
-    /// lumels.
+    /// As many triangles as the file's primitive has, in its order; [`Charts::NOWHERE`] for those that
+    /// have no lumels.
     pub triangles: Vec<[u32; 3]>,
 }
 
 /// A vertex of a chart.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ChartVertex {
-    /// The primitive's vertex.
+    /// The vertex, as the file numbers those of the primitive.
     pub source: u32,
     /// Index into [`Charts::sizes`].
     pub rectangle: u32,

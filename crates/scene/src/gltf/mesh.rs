@@ -1,8 +1,7 @@
 //! Converts glTF meshes to triangle lists.
 //!
 //! Results are as [`Primitive`] promises: indices inside the vertices, finite positions, unit
-//! normals. Triangles without area are removed. Of meshes that deform, only those that name a
-//! vertex twice are, since others may gain area.
+//! normals. Primitives and triangles keep their numbers, since charts name them by these.
 
 use std::collections::BTreeMap;
 
@@ -36,12 +35,13 @@ pub(super) fn read(
         }
         if primitive.mode < 4 {
             notes.warnings.push(format!("{}: points and lines are not drawn", here()));
+            primitives.push(Primitive::default());
             continue;
         }
         let first = notes.warnings.len();
         let read = read_primitive(accessors, primitive, materials, &mut notes).at(here)?;
         notes.warnings[first..].iter_mut().for_each(|w| *w = format!("{}: {w}", here()));
-        primitives.extend(read);
+        primitives.push(read);
     }
     let targets = targets.unwrap_or(0);
     let mut morph_weights = json.weights.clone();
@@ -62,10 +62,10 @@ fn read_primitive(
     json: &json::Primitive,
     materials: &[Material],
     notes: &mut Notes,
-) -> Result<Option<Primitive>, Fault> {
+) -> Result<Primitive, Fault> {
     let Some(&position) = json.attributes.get("POSITION") else {
         notes.warnings.push("without positions it is not drawn".into());
-        return Ok(None);
+        return Ok(Primitive::default());
     };
     if accessors.count(position)? > u64::from(u32::MAX) {
         return Err(invalid("more vertices than 32-bit indices can name"));
@@ -75,9 +75,8 @@ fn read_primitive(
     primitive.material = material(json, materials)?;
     primitive.triangles = read_triangles(accessors, json, primitive.vertices.positions.len())?;
     check_positions(&mut primitive, notes)?;
-    drop_degenerate(&mut primitive);
     if primitive.triangles.is_empty() {
-        return Ok(None);
+        return Ok(Primitive::default());
     }
     if primitive.vertices.normals.is_empty() {
         make_flat(&mut primitive, accessors)?;
@@ -91,7 +90,7 @@ fn read_primitive(
         accessors.budget.geometry::<Vec4>(primitive.vertices.positions.len())?;
         tangents::generate(&mut primitive, map);
     }
-    Ok(Some(primitive))
+    Ok(primitive)
 }
 
 fn material(json: &json::Primitive, materials: &[Material]) -> Result<MaterialId, Fault> {
@@ -261,19 +260,6 @@ fn read_triangles(
         }
         mode => return Err(invalid(format!("unknown primitive mode {mode}"))),
     })
-}
-
-fn drop_degenerate(primitive: &mut Primitive) {
-    let deforms = !primitive.joints.is_empty() || !primitive.morph_targets.is_empty();
-    let positions = &primitive.vertices.positions;
-    primitive.triangles.retain(|&[a, b, c]| {
-        a != b && b != c && c != a && (deforms || doubled_area([a, b, c], positions) > 0.0)
-    });
-}
-
-fn doubled_area(triangle: [u32; 3], positions: &[Vec3]) -> f64 {
-    let [a, b, c] = triangle.map(|i| positions[i as usize].as_dvec3());
-    (b - a).cross(c - a).length()
 }
 
 /// The unit normal of a triangle whose front is counter-clockwise; +Y where it has none.

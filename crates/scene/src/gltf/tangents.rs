@@ -1,8 +1,8 @@
 //! Computes tangents for normal maps where the file has none.
 //!
 //! At each vertex, the directions of growing u over its triangles are averaged, weighted by angle
-//! (as in MikkTSpace). The mean is made orthogonal to the normal. A vertex between triangles with
-//! mirrored and unmirrored texture is split in two.
+//! (as in MikkTSpace). The mean is made orthogonal to the normal. Triangles without area have no
+//! say. A vertex between triangles with mirrored and unmirrored texture is split in two.
 //!
 //! Texture coordinates are those of the normal map's set, transformed (KHR_texture_transform). A
 //! primitive has one material, so it has one normal map and its own tangents.
@@ -22,7 +22,7 @@ pub(super) fn generate(primitive: &mut Primitive, map: &TextureRef) {
     let (vertices, uv) = (&primitive.vertices, &turned_uv(primitive, map));
     let mut sums = vec![Vec3::ZERO; vertices.positions.len()];
     let mut mirrored = vec![false; vertices.positions.len()];
-    for &triangle in &primitive.triangles {
+    for &triangle in primitive.triangles.iter().filter(|triangle| primitive.has_area(triangle)) {
         let corners = triangle.map(|i| vertices.positions[i as usize]);
         let frame = Frame::new(corners, triangle.map(|i| uv[i as usize]));
         for (k, index) in triangle.into_iter().enumerate() {

@@ -50,6 +50,7 @@ pub(super) fn select_vertices(primitive: &mut Primitive, order: &[u32]) {
         }
     }
     let sets = primitive.influence_sets() as u32;
+    primitive.sources = order.iter().map(|vertex| primitive.source(*vertex)).collect();
     select(&mut primitive.vertices.positions, order);
     select(&mut primitive.vertices.normals, order);
     select(&mut primitive.vertices.tangents, order);

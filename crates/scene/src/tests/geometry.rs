@@ -65,15 +65,35 @@ fn points_and_lines_are_left_out_with_a_warning() {
     assert_eq!(scene.snapshot().instances.len(), 1);
 }
 
+/// What charts name by number: the file's triangles and vertices, also where some are of no use.
 #[test]
-fn triangles_without_area_are_left_out() {
+fn triangles_and_primitives_keep_their_numbers() {
     let mut w = Writer::default();
     let positions = w.floats("VEC3", &[0., 0., 0., 1., 0., 0., 0., 1., 0., 2., 0., 0.]);
     let normals = w.vectors(&[Vec3::Z; 4]);
-    let indices = w.indices(&[[0, 1, 2], [0, 1, 1], [0, 1, 3]]);
-    let attributes = json!({ "POSITION": positions, "NORMAL": normals });
-    show(&mut w, json!({ "indices": indices, "attributes": attributes }));
-    assert_eq!(primitive(w).triangles, [[0, 1, 2]]);
+    let triangles = [[0, 1, 1], [0, 1, 3], [3, 1, 2]];
+    let indices = w.indices(&triangles);
+    let points = json!({ "mode": 0, "attributes": { "POSITION": positions } });
+    let smooth = json!({ "POSITION": positions, "NORMAL": normals });
+    let primitives = json!([
+        points,
+        { "indices": indices, "attributes": smooth },
+        { "indices": indices, "attributes": { "POSITION": positions } },
+    ]);
+    w.add("meshes", json!({ "primitives": primitives }));
+    w.node(json!({ "mesh": 0 }));
+    let scene = load(w);
+    let [points, smooth, flat] = &scene.meshes()[0].primitives[..] else {
+        panic!("other primitives")
+    };
+    assert!(points.triangles.is_empty());
+    assert_eq!(smooth.triangles, triangles);
+    assert_eq!(flat.triangles, [[0, 1, 2], [3, 4, 5], [6, 7, 8]]);
+    for primitive in [smooth, flat] {
+        let sources = primitive.triangles.iter().map(|t| t.map(|v| primitive.source(v)));
+        assert!(sources.eq(triangles));
+        assert!(primitive.vertices.normals.iter().all(|normal| normal.is_normalized()));
+    }
 }
 
 #[test]
@@ -169,13 +189,16 @@ fn tangents_follow_the_texture_and_its_mirroring() {
         "POSITION": w.vectors(&positions), "NORMAL": w.vectors(&[Vec3::Z; 6]),
         "TEXCOORD_0": w.floats("VEC2", &uv),
     });
-    let indices = w.indices(&[[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]);
+    let triangles = [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]];
+    let indices = w.indices(&triangles);
     w.add("images", json!({ "uri": TEXEL }));
     w.add("textures", json!({ "source": 0 }));
     w.add("materials", json!({ "normalTexture": { "index": 0 } }));
     show(&mut w, json!({ "attributes": attributes, "indices": indices, "material": 0 }));
     let p = primitive(w);
     assert_eq!(p.vertices.positions.len(), 8, "the shared edge is split");
+    let sources = p.triangles.iter().map(|triangle| triangle.map(|vertex| p.source(vertex)));
+    assert!(sources.eq(triangles), "by the file's numbers");
     let corner_tangents = |t: usize| p.triangles[t].map(|i| p.vertices.tangents[i as usize]);
     for (triangle, tangent) in [(0, Vec4::new(1., 0., 0., 1.)), (3, Vec4::new(-1., 0., 0., -1.))] {
         for t in corner_tangents(triangle) {

@@ -241,6 +241,25 @@ fn what_no_chart_reads_does_not_show() {
 }
 
 /// Lumels of other vertices than the scene's are left alone, and light without lumels takes its place.
+/// Charts name the file's vertices, which the loader may have split.
+#[test]
+fn split_vertices_are_those_of_the_file() {
+    let scene = scene();
+    let light = light(&scene);
+    let mut split = Mesh::clone(&scene.instances[0].mesh);
+    let primitive = &mut split.primitives[0];
+    primitive.sources = primitive.triangles.iter().flatten().copied().collect();
+    primitive.triangles = vec![[0, 1, 2], [3, 4, 5]];
+    for values in [&mut primitive.vertices.positions, &mut primitive.vertices.normals] {
+        *values = primitive.sources.iter().map(|v| values[*v as usize]).collect();
+    }
+    primitive.uv = Default::default();
+    let split = Arc::new(split);
+    let mut other = Snapshot::clone(&scene);
+    other.instances.iter_mut().for_each(|instance| instance.mesh = split.clone());
+    assert_eq!(draw(&other, &light), draw(&scene, &light));
+}
+
 #[test]
 fn charts_of_another_mesh_are_left_alone() {
     let scene = scene();
