@@ -6,7 +6,7 @@ use glam::{UVec2, Vec2, Vec3};
 use lumencast_cache::{Cache, CacheError};
 use lumencast_codec::{
     Catalog, Coding, DecodeError, EncodedRegion, Epoch, FieldInfo, LightFile, LightTrack,
-    LightmapShape, LumelCoding, LumelEncoder, Resource, ResourceHash, SceneInfo, StateFrame,
+    LightmapShape, LumelCoding, LumelEncoder, Qp, Resource, ResourceHash, SceneInfo, StateFrame,
     UpdateInfo, layout_resources,
 };
 use lumencast_light::{
@@ -48,15 +48,19 @@ struct Server {
 
 impl Server {
     fn new(epoch: u64, layout: Layout) -> Self {
+        Self::of_coding(epoch, layout, LumelCoding::Halves)
+    }
+
+    fn of_coding(epoch: u64, layout: Layout, coding: LumelCoding) -> Self {
         let resources = layout_resources(&layout);
         let lightmap = Lightmap::dark(FieldId(FIELD), Arc::new(layout));
-        let shape = LightmapShape::of(&lightmap, Coding::Halves);
+        let shape = LightmapShape::of(&lightmap, coding.coding());
         let scene = SceneInfo { name: "room".into(), root: "room.glb".into() };
         let fields = vec![FieldInfo::of_lightmap(lightmap.id, shape.clone(), None, "a test")];
         let epoch = Epoch(epoch);
         Self {
             catalog: Catalog { epoch, scene, tick_seconds: TICK, fields, unknown: vec![] },
-            encoder: LumelEncoder::new(shape, LumelCoding::Halves),
+            encoder: LumelEncoder::new(shape, coding),
             lightmap,
             resources,
             update: 0,
@@ -153,6 +157,38 @@ fn each_tile_has_the_age_of_its_own_newest_light() {
     // What came before again is no newer light.
     assert_eq!(add(&mut cache, &first[3], 5.0), Ok(false));
     assert_eq!(ages(&cache, 5.0).seconds[3], Some(1.0));
+}
+
+/// Of video, what cannot be read leaves the picture before it, and so does all that builds on it.
+#[test]
+fn damaged_pictures_leave_what_is_shown_until_a_keyframe() {
+    let coding = LumelCoding::H264(Qp::new(12).unwrap());
+    let mut server = Server::of_coding(1, Layout::new(64, 1, vec![]), coding);
+    let mut cache = Cache::new();
+    cache.add_catalog(&server.catalog.encode(), 0.0).unwrap();
+    add_all(&mut cache, &server.update(1.0), 0.0);
+    add_all(&mut cache, &server.update(1.1), 0.0);
+    let before = shown(&mut cache, 1.0);
+    assert!((before[0] - 1.1).abs() < 0.05, "{before:?}");
+    let mut damaged = server.update(1.3).remove(0);
+    let picture = damaged.bytes.len() / 2;
+    damaged.bytes[picture..].fill(0xFF);
+    assert!(matches!(add(&mut cache, &damaged, 1.0), Err(CacheError::Decode(_))));
+    let next = loop {
+        let other = 1.4 + 0.2 * (server.update % 2) as f32;
+        let frame = server.update(other).remove(0);
+        if frame.new_group {
+            break frame;
+        }
+        let refused = add(&mut cache, &frame, 2.0);
+        assert!(
+            matches!(refused, Err(CacheError::Decode(DecodeError::MissingBase { .. }))),
+            "{refused:?}"
+        );
+        assert_eq!(shown(&mut cache, 3.0), before);
+    };
+    assert_eq!(add(&mut cache, &next, 4.0), Ok(true));
+    assert!(shown(&mut cache, 9.0)[0] > 1.35);
 }
 
 #[test]

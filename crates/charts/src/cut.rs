@@ -90,7 +90,9 @@ impl Shape<'_> {
     /// one part alone.
     fn parts(&self) -> u32 {
         let place = |vertex: u32| (self.positions[vertex as usize] + Vec3::ZERO).to_array();
-        parts(self.with_area().1.iter().map(|triangle| triangle.map(|v| place(v).map(f32::to_bits))))
+        parts(
+            self.with_area().1.iter().map(|triangle| triangle.map(|v| place(v).map(f32::to_bits))),
+        )
     }
 }
 
@@ -166,8 +168,7 @@ pub(crate) fn lay_out(
     lumels_a_metre: f32,
     most: u32,
 ) -> Result<Charts, ChartError> {
-    let positions: Vec<Vec3> =
-        cut.vertices.iter().map(|v| positions[v.source as usize]).collect();
+    let positions: Vec<Vec3> = cut.vertices.iter().map(|v| positions[v.source as usize]).collect();
     let uv: Vec<[f32; 2]> = cut.vertices.iter().map(|v| v.at.to_array()).collect();
     let kept = |triangle: &[u32; 3]| {
         *triangle != Charts::NOWHERE && keep(cut.vertices[triangle[0] as usize].chart)
@@ -267,4 +268,63 @@ fn checked<'a>(atlas: &'a Atlas, triangles: &[[u32; 3]]) -> Result<&'a OutputMes
         return Err(wrong("coordinates out of range"));
     }
     Ok(mesh)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIANGLES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
+
+    /// What the library makes of a square.
+    fn square() -> Atlas {
+        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let input = MeshInput::new(&positions, TRIANGLES.as_flattened());
+        let density = Density::Fixed { texels_per_unit: 8.0, page_size: None };
+        generate(input, &Options { density, ..Options::default() }, &|_| true).unwrap()
+    }
+
+    #[test]
+    fn wrong_atlases_are_refused() {
+        let changed = |change: &dyn Fn(&mut Atlas)| {
+            let mut atlas = square();
+            change(&mut atlas);
+            checked(&atlas, &TRIANGLES).map(drop)
+        };
+        assert_eq!(changed(&|_| ()), Ok(()));
+        let wrong: [&dyn Fn(&mut Atlas); 9] = [
+            &|a| a.meshes.clear(),
+            &|a| a.meshes.push(OutputMesh::default()),
+            &|a| a.meshes[0].indices.truncate(3),
+            &|a| a.meshes[0].indices.swap(0, 1),
+            &|a| a.meshes[0].indices[4] = 99,
+            &|a| a.meshes[0].vertices[1].uv = [0.5, 1.5],
+            &|a| a.meshes[0].vertices[1].uv = [f32::NAN; 2],
+            &|a| a.meshes[0].vertices[2].page = Some(7),
+            &|a| a.meshes[0].vertices[2].chart = Some(7),
+        ];
+        for (number, change) in wrong.iter().enumerate() {
+            assert!(matches!(changed(change), Err(ChartError::Unwrap(_))), "{number}");
+        }
+    }
+
+    #[test]
+    fn overlaps_are_told_by_their_share() {
+        let at = |x: f32, y: f32| CutVertex { source: 0, chart: 0, at: Vec2::new(x, y) };
+        let vertices =
+            [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0), (4.0, 2.0)].map(|(x, y)| at(x, y));
+        let share = |triangles: &[[u32; 3]]| overlapping(&vertices, triangles, Vec2::splat(4.0));
+        assert_eq!(share(&[[0, 1, 2], [0, 2, 3], Charts::NOWHERE]), 0.0);
+        let half = share(&[[0, 1, 2], [0, 1, 4]]);
+        assert!((half - 0.5).abs() < 0.02, "{half}");
+    }
+
+    #[test]
+    fn panics_are_errors() {
+        let watch = |_: usize| -> bool { panic!("as the library may") };
+        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let input = MeshInput::new(&positions, TRIANGLES.as_flattened());
+        let found = generate(input, &Options::default(), &watch);
+        assert!(matches!(found, Err(ChartError::Unwrap(_))), "{found:?}");
+    }
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Quat, UVec2, Vec2, Vec3};
 use lumencast_charts::{
-    ChartError, Extended, LaidOut, MOST_PAGES, PAGE, Sheets, chart_count, extended, laid_out,
-    lumels, sheets,
+    ChartError, Extended, LaidOut, Lumel, MOST_PAGES, PAGE, Sheets, UnionFind, chart_count,
+    extended, laid_out, lumels, sheets,
 };
 use lumencast_light::{Charts, Surface};
 use lumencast_scene::{
@@ -70,11 +70,31 @@ fn check(scene: &Snapshot, laid_out: &LaidOut) {
             let off = (at - lumel.at.as_vec2() - 0.5).abs().max_element();
             assert!(off <= if lumel.holds_middle { 0.04 } else { 0.501 }, "{lumel:?}: {off}");
         }
+        let clusters = clusters(&lumels(&surface.charts));
+        assert_eq!(clusters, chart_count(&surface.charts), "{:?}: charts lie apart", surface.id);
     }
+}
+
+/// Number of groups of lumels that have at least two others between them: what filtering reads, and what
+/// shares its colour as it is sent, is of one chart.
+fn clusters(lumels: &[Lumel]) -> usize {
+    let place = |lumel: &Lumel| (lumel.rectangle, lumel.at.x as i32, lumel.at.y as i32);
+    let mut sets = UnionFind::default();
+    let numbers: HashMap<_, _> = lumels.iter().map(|lumel| (place(lumel), sets.add())).collect();
+    let mut count = numbers.len();
+    for ((rectangle, x, y), number) in &numbers {
+        let near = (-2..=2).flat_map(|i| (-2..=2).map(move |j| (*rectangle, x + i, y + j)));
+        for other in near.filter_map(|at| numbers.get(&at)) {
+            count -= usize::from(sets.unite(*number, *other));
+        }
+    }
+    count
 }
 
 #[test]
 fn built_in_scenes_fill_one_page_of_their_own_size() {
+    // The paper's table 4.1.
+    let sizes = [("cornell", 256), ("door", 512), ("tomb", 1024)];
     for name in BUILTINS {
         let mut scene = Scene::open(name).unwrap();
         let snapshot = scene.snapshot();
@@ -91,6 +111,7 @@ fn built_in_scenes_fill_one_page_of_their_own_size() {
                 "{name}"
             );
         }
+        assert!(sizes.contains(&(name, laid_out.layout.page_size)), "{name}");
         assert_eq!(spec, LightmapSpec::Size(laid_out.layout.page_size));
         let covered: usize =
             laid_out.layout.surfaces().iter().map(|s| lumels(&s.charts).len()).sum();
@@ -386,7 +407,8 @@ fn triangles_without_area_keep_their_numbers() {
         let mut stage = Stage::default();
         stage.material(grey());
         stage.primitive(primitive.clone(), Affine3A::IDENTITY);
-        let layout = laid_out(&cut(&stage.snapshot()).sheets, LightmapSpec::Size(64)).unwrap().layout;
+        let layout =
+            laid_out(&cut(&stage.snapshot()).sheets, LightmapSpec::Size(64)).unwrap().layout;
         Charts::clone(&layout.surfaces()[0].charts)
     };
     let plain = strip(3, |at| 0.1 + 0.8 * at);

@@ -124,6 +124,21 @@ fn still_light_costs_almost_nothing() {
     assert!(keyframes <= 3, "{keyframes} keyframes in 8 seconds");
 }
 
+/// Groups end after two seconds or 50 pictures, whichever is sooner.
+#[test]
+fn groups_of_changing_light_are_short_at_any_rate() {
+    for (seconds, most) in [(0.01, 50), (0.04, 50), (0.2, 10), (5.0, 1)] {
+        let mut encoder = encoder(&lightmap(64, 1, 0), LumelCoding::H264(qp(18)));
+        let updates = (0..3 * most + 1).filter(|u| {
+            let info = UpdateInfo { time: seconds * *u as f64, ..update(*u) };
+            let frames = encoder.encode(&lightmap(64, 1, *u as u32), info, |_| true);
+            frames.expect("frames")[0].new_group
+        });
+        let expected: Vec<u64> = (0..=3).map(|group| group * most).collect();
+        assert_eq!(updates.collect::<Vec<u64>>(), expected, "every {seconds} s");
+    }
+}
+
 #[test]
 fn changing_light_has_a_keyframe_every_two_seconds() {
     let light = lightmap(64, 1, 0);

@@ -283,7 +283,7 @@ impl Controls {
 
 #[cfg(test)]
 mod tests {
-    use egui::{Event, Modifiers, PointerButton, RawInput, Rect, Shape, pos2};
+    use egui::{Event, Modifiers, PointerButton, Pos2, RawInput, Rect, Shape, pos2};
 
     use super::*;
 
@@ -326,11 +326,20 @@ mod tests {
             words
         }
 
-        /// Clicks on a word.
-        fn click(&mut self, word: &str) {
+        /// The middle of a word.
+        fn at(&mut self, word: &str) -> Pos2 {
             let words = self.frame(vec![]);
             let found = words.iter().find(|(shown, _)| shown == word);
-            let pos = found.unwrap_or_else(|| panic!("no {word} among {words:?}")).1.center();
+            found.unwrap_or_else(|| panic!("no {word} among {words:?}")).1.center()
+        }
+
+        /// Clicks on a word.
+        fn click(&mut self, word: &str) {
+            let at = self.at(word);
+            self.click_at(at);
+        }
+
+        fn click_at(&mut self, pos: Pos2) {
             let click = |pressed| Event::PointerButton {
                 pos,
                 button: PointerButton::Primary,
@@ -341,6 +350,22 @@ mod tests {
             self.frame(vec![click(true)]);
             self.frame(vec![click(false)]);
         }
+    }
+
+    /// A slider begins at the left of the row that its word ends.
+    #[test]
+    fn strengths_have_a_slider_each() {
+        let mut panel = Panel::new();
+        let usual = panel.controls.settings.strengths;
+        let row = panel.at("Static").y;
+        panel.click_at(pos2(10.0, row));
+        let strengths = panel.controls.settings.strengths;
+        assert!(strengths.still < 0.5 * usual.still, "{strengths:?}");
+        assert_eq!(strengths.moving, usual.moving);
+        let row = panel.at("Dynamic").y;
+        panel.click_at(pos2(10.0, row));
+        assert_eq!(panel.controls.settings.strengths.still, strengths.still);
+        assert!(panel.controls.settings.strengths.moving < 0.5 * usual.moving);
     }
 
     #[test]

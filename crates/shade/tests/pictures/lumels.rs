@@ -9,7 +9,7 @@ use lumencast_light::{
     ChartVertex, Charts, Field, FieldId, Grid, Layout, Light, Lightmap, OnTriangle, Order, Place,
     ProbeVolume, Rectangle, Surface, SurfaceId,
 };
-use lumencast_scene::{Mesh, MeshId, Snapshot, View};
+use lumencast_scene::{Material, Mesh, MeshId, Snapshot, View};
 use lumencast_shade::{Lighting, Settings, Strengths};
 use lumencast_testkit::scenes::{Stage, lambert};
 
@@ -42,7 +42,7 @@ pub(super) fn scene() -> Arc<Snapshot> {
         .materials
         .iter()
         .cloned()
-        .map(|material| lumencast_scene::Material { double_sided: true, ..material })
+        .map(|material| Material { double_sided: true, ..material })
         .collect();
     Arc::new(snapshot)
 }
@@ -241,6 +241,24 @@ fn what_no_chart_reads_does_not_show() {
 }
 
 /// Lumels of other vertices than the scene's are left alone, and light without lumels takes its place.
+/// Specular light stays the probes': metal, which scatters no other, is as it is without lumels.
+#[test]
+fn metal_reflects_probes_alone() {
+    let scene = scene();
+    let light = light(&scene);
+    let volumes = Light::new(light.volumes().cloned());
+    let mut metal = Snapshot::clone(&scene);
+    let of_metal =
+        |material: &Material| Material { metallic: 1.0, roughness: 0.3, ..material.clone() };
+    metal.materials = metal.materials.iter().map(of_metal).collect();
+    let metal = Arc::new(metal);
+    let drawn = draw(&metal, &light);
+    assert_eq!(drawn, draw(&metal, &volumes));
+    let brightest = drawn.iter().flatten().map(|pixel| pixel.max_element());
+    assert!(brightest.fold(0.0, f32::max) > 0.1);
+    assert_ne!(draw(&scene, &light), draw(&scene, &volumes));
+}
+
 /// Charts name the file's vertices, which the loader may have split.
 #[test]
 fn split_vertices_are_those_of_the_file() {
@@ -257,7 +275,7 @@ fn split_vertices_are_those_of_the_file() {
     let split = Arc::new(split);
     let mut other = Snapshot::clone(&scene);
     other.instances.iter_mut().for_each(|instance| instance.mesh = split.clone());
-    assert_eq!(draw(&other, &light), draw(&scene, &light));
+    assert_eq!(draw(&Arc::new(other), &light), draw(&scene, &light));
 }
 
 #[test]

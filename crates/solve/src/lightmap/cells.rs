@@ -459,6 +459,28 @@ mod tests {
         }
     }
 
+    /// Half the turns go to all blocks alike, half by how noisy they are.
+    #[test]
+    fn noisy_blocks_have_more_turns() {
+        let (places, mut cells) = cells();
+        let all = all(&places);
+        for block in 0..4 {
+            cells.set_noise(block, if block == 0 { 4.0 } else { 0.0 });
+        }
+        cells.budgets(u64::from(PAGE * PAGE), 1, &all, |_| false);
+        let mut samples = [0_u64; 4];
+        for _ in 0..400 {
+            for budget in cells.budgets(u64::from(PAGE * PAGE), 1, &all, |_| false) {
+                let block = cells.block_of(cells.cell_of(budget.receiver));
+                samples[block] += u64::from(budget.samples);
+            }
+        }
+        let all = samples.iter().sum::<u64>() as f32;
+        let shares = samples.map(|of| of as f32 / all);
+        assert!((shares[0] - (0.5 / 4.0 + 0.5)).abs() < 0.03, "{shares:?}");
+        assert!(shares[1..].iter().all(|share| (share - 0.5 / 4.0).abs() < 0.03), "{shares:?}");
+    }
+
     /// Cells whose light changes, and those about them, have glances with each job, up to a quarter of the
     /// samples; others one now and then; an edit takes all samples, until every cell had one.
     #[test]
