@@ -252,7 +252,21 @@ fn a_scene_without_still_surfaces_is_lit_by_probes() {
     assert!(baked.stderr.contains("no still surface"), "{baked:?}");
     let fields = &run(&["inspect", &light, "--json"]).json()["fields"];
     assert_eq!((fields[0]["kind"].as_str(), &fields[1]), (Some("volume"), &Value::Null));
+    run(&["bake", &moving, "-o", &light, "--fields", "lightmap"])
+        .failed_saying(&["nothing can hold the light", "--fields lightmap,volume"]);
     let server = Serving::start(&moving, &few);
     assert_eq!(server.ready["lumels"], Value::Null);
     server.wait_for_metric("lumencast_ticks_total", |n| n > 2.0);
+}
+
+#[test]
+fn lumels_without_room_leave_all_to_probes() {
+    let folder = Folder::new("no-room");
+    let light = folder.0.join("small.light").to_str().expect("text").to_owned();
+    let few = ["--lightmap", "64", "--volume", "2x2x2", "--samples", "4"];
+    let baked = run(&[&["bake", "door", "-o", &light], &few[..]].concat());
+    assert_eq!(baked.code, Some(0), "{baked:?}");
+    assert!(baked.stderr.contains("warning: no surface has lumels"), "{baked:?}");
+    let fields = &run(&["inspect", &light, "--json"]).json()["fields"];
+    assert_eq!((fields[0]["kind"].as_str(), &fields[1]), (Some("volume"), &Value::Null));
 }

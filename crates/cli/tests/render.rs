@@ -196,6 +196,12 @@ fn lumels_are_baked_and_drawn() {
     assert_eq!((&told["pages"], &told["lumel_samples"]), (&1.into(), &64.into()));
     assert!(both > probes + 1.0, "{both} dB, and {probes} dB by probes alone");
 
+    // The same light, computed for the picture.
+    let few = ["--probe-samples", "256", "--lumel-samples", "64", "--texel", "0.05"];
+    let drawn = draw(&[&["--lighting", "indirect"], &few[..]].concat());
+    let own = compare(&reference, &drawn, None, 67.0).expect("of one size").psnr;
+    assert!(own > probes + 1.0, "{own} dB, and {probes} dB by probes alone");
+
     std::fs::create_dir(&pages).expect("a folder");
     let report = run(&["inspect", text(&light), "--pages", text(&pages), "--json"]).json();
     let field = &report["fields"][1];

@@ -6,6 +6,7 @@ use std::io::Write;
 use std::net::{TcpListener, TcpStream, UdpSocket};
 
 use common::{Folder, Serving, run};
+use lumencast_picture::Loaded;
 
 #[test]
 fn answers_over_http() {
@@ -122,7 +123,7 @@ fn lumels_are_cast_to_native_clients() {
     let [pages, picture] = ["pages", "a.exr"].map(|name| folder.0.join(name));
     std::fs::create_dir(&pages).expect("a folder");
     let text = |path: &std::path::Path| path.to_str().expect("text").to_owned();
-    let few = ["--volume", "2x2x2", "--lightmap", "64", "--fields", "lightmap,volume"];
+    let few = ["--volume", "2x2x2", "--lightmap", "64", "--lumel-coding", "h264-stacked"];
     let server = Serving::start("cornell", &few);
     let lumels = &server.ready["lumels"];
     assert_eq!((&lumels["pages"], &lumels["page_size"]), (&1.into(), &64.into()), "{lumels}");
@@ -135,7 +136,8 @@ fn lumels_are_cast_to_native_clients() {
     assert_eq!((&field["kind"], &field["pages"]), (&"lightmap".into(), &1.into()));
     assert!(field["lightmap"]["surfaces"].as_u64() >= Some(3), "{field}");
     assert!(field["lightmap"]["illuminance"]["mean"].as_f64() > Some(0.1), "{field}");
-    assert!(pages.join("field1-page0.exr").is_file());
+    let page = Loaded::read(&pages.join("field1-page0.exr")).expect("a page").linear();
+    assert!(page.pixels().iter().filter(|lumel| lumel.x > 0.1).count() > 64 * 64 / 2);
 
     let hash = field["layout"].as_str().expect("a hash");
     let layout = server.get(&format!("/resources/{hash}"));

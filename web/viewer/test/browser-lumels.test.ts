@@ -12,6 +12,8 @@ import { lit, POINTS, seen, setStrengths, settled, STILL, SURFACES } from './lum
 import { freePort, lumencastProgram, Server } from './server.js';
 
 const VIEWPORT = { width: 760, height: 560 };
+/** What lumels can be shown as, in the page's words. */
+const LOOKS = { light: 'Light', lumels: 'Lumels, one square each', age: 'Age, green to red' };
 
 let folder: string;
 let browser: Browser;
@@ -109,8 +111,11 @@ describe.each(['webgl', 'webgpu'] as const)('drawn by %s, a room', (renderer) =>
   });
 
   it('shows its lumels as squares, and by their age', async () => {
-    const rows = async (what: 'light' | 'lumels' | 'age') => {
-      await page.evaluate((what) => (window.lumencast!.light.look = what), what);
+    await page.keyboard.press('l');
+    await draw(page);
+    const rows = async (what: keyof typeof LOOKS) => {
+      await page.selectOption('.lumels [aria-label="Show"]', LOOKS[what]);
+      expect(await page.evaluate(() => window.lumencast!.light.look)).toBe(what);
       await draw(page);
       await shoot(page, `look-${what}-${renderer}.png`);
       const [x, y] = await onScreen(page, [0.5, 1.6, -1]);
@@ -125,6 +130,7 @@ describe.each(['webgl', 'webgpu'] as const)('drawn by %s, a room', (renderer) =>
     const [red, green, blue] = age[0];
     expect(Math.max(red, green)).toBeGreaterThan(2 * blue);
     expect(await rows('light')).toEqual(light);
+    await page.keyboard.press('l');
   });
 
   it('shows its pages', async () => {
@@ -159,8 +165,12 @@ describe.each(['webgl', 'webgpu'] as const)('drawn by %s, a room', (renderer) =>
     await slide('Dynamic', '0.1');
     const [[same]] = await seen(page, wall);
     expect(same).toBe(dim);
-    await slide('Static', '1');
+    await slide('Static', '0');
+    const faint = await seenAll(page, 'indirect');
     await slide('Dynamic', '1');
+    expect(brightness(await seenAll(page, 'indirect'))).toBeGreaterThan(2 * brightness(faint));
+    await page.evaluate(() => window.lumencast!.setMode('both'));
+    await slide('Static', '1');
     await page.keyboard.press('l');
   });
 

@@ -1,6 +1,6 @@
 //! Which kinds of fields hold the light.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use lumencast_charts::LaidOut;
 use lumencast_codec::{LumelCoding, Qp};
@@ -139,6 +139,11 @@ impl FieldsArguments {
     ) -> Result<Wanted> {
         let volumes = if self.volumes() { volumes.volumes(scene, gatherer)? } else { Vec::new() };
         let lightmap = self.lumels(scene, gatherer)?;
+        if volumes.is_empty() && lightmap.is_none() {
+            bail!(
+                "nothing can hold the light: no surface has lumels (--fields lightmap,volume adds probes)"
+            );
+        }
         Ok(Wanted { volumes, lightmap, directional: self.directional })
     }
 
@@ -163,5 +168,36 @@ impl FieldsArguments {
     pub(crate) fn effort(&self, effort: &EffortArguments, samples: u32) -> Effort {
         let lumel_samples = self.lumel_samples.min(samples);
         Effort { lumel_samples, ..effort.with(samples) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        fields: LiveFieldsArguments,
+    }
+
+    /// How pages are sent that have these lumels a side.
+    fn coding(words: &[&str], page_size: u32) -> LumelCoding {
+        let words = ["lumencast"].iter().chain(words);
+        Command::try_parse_from(words).expect("arguments").fields.coding(page_size)
+    }
+
+    #[test]
+    fn lumels_are_sent_as_told() {
+        let qp = |qp: u8| Qp::new(qp).expect("a parameter");
+        for (page_size, usual) in [(64, 9), (256, 9), (512, 12), (1024, 18)] {
+            assert_eq!(coding(&[], page_size), LumelCoding::H264(qp(usual)));
+        }
+        let stacked = ["--lumel-coding", "h264-stacked", "--qp", "20"];
+        assert_eq!(coding(&stacked, 256), LumelCoding::H264Stacked(qp(20)));
+        assert_eq!(coding(&["--lumel-coding", "halves"], 256), LumelCoding::Halves);
+        assert!(Command::try_parse_from(["lumencast", "--qp", "37"]).is_err());
     }
 }

@@ -32,8 +32,8 @@ pub(crate) struct TickArguments {
     /// the ratio alone.
     #[arg(long, default_value = "3.5", value_parser = parse_positive)]
     significance: f32,
-    /// Lets paths go on, where they end, in the light of the tick before: all bounces for the price
-    /// of few, as coarse as the probes are.
+    /// Lets paths go on, where they end, in the light of the tick before, of lumels where there are
+    /// some: all bounces for the price of few, as coarse as that light is.
     #[arg(long)]
     feedback: bool,
     #[command(flatten)]
