@@ -136,7 +136,7 @@ fn lumels_are_cast_to_native_clients() {
     assert_eq!((&field["kind"], &field["pages"]), (&"lightmap".into(), &1.into()));
     assert!(field["lightmap"]["surfaces"].as_u64() >= Some(3), "{field}");
     assert!(field["lightmap"]["illuminance"]["mean"].as_f64() > Some(0.1), "{field}");
-    let page = Loaded::read(&pages.join("field1-page0.exr")).expect("a page").linear();
+    let page = Loaded::read(pages.join("field1-page0.exr")).expect("a page").linear();
     assert!(page.pixels().iter().filter(|lumel| lumel.x > 0.1).count() > 64 * 64 / 2);
 
     let hash = field["layout"].as_str().expect("a hash");

@@ -95,7 +95,7 @@ fn pictures_of_a_field_and_a_server_need_no_display() {
     }
     // Lumels take the place of probes on what stands still: all that lies above the ball.
     let upper = |name: &str| {
-        let picture = Loaded::read(&folder.0.join(format!("{name}.png"))).expect("a picture");
+        let picture = Loaded::read(folder.0.join(format!("{name}.png"))).expect("a picture");
         picture.linear().pixels()[..320 * 100].to_vec()
     };
     let saved = upper("saved");
