@@ -86,13 +86,11 @@ impl Shape<'_> {
         triangles.filter(|(number, _)| self.has_area[*number]).unzip()
     }
 
-    /// Number of parts that touch each other nowhere, where triangles share no position. A chart lies on
+    /// Number of parts of these triangles that touch each other nowhere, where triangles share no position. A chart lies on
     /// one part alone.
-    fn parts(&self) -> u32 {
+    fn parts(&self, triangles: &[[u32; 3]]) -> u32 {
         let place = |vertex: u32| (self.positions[vertex as usize] + Vec3::ZERO).to_array();
-        parts(
-            self.with_area().1.iter().map(|triangle| triangle.map(|v| place(v).map(f32::to_bits))),
-        )
+        parts(triangles.iter().map(|triangle| triangle.map(|v| place(v).map(f32::to_bits))))
     }
 }
 
@@ -102,12 +100,12 @@ pub(crate) fn cut(shape: &Shape<'_>, watch: Watch<'_>) -> Result<Cut, ChartError
     if !(area > 0.0 && area.is_finite()) {
         return Err(ChartError::NoArea);
     }
-    let parts = shape.parts();
+    // What has no area joins charts that do not lie beside each other.
+    let (numbers, triangles) = shape.with_area();
+    let parts = shape.parts(&triangles);
     if parts > MOST_CHARTS {
         return Err(ChartError::TooManyCharts { charts: parts, most: MOST_CHARTS });
     }
-    // What has no area joins charts that do not lie beside each other.
-    let (numbers, triangles) = shape.with_area();
     let texels_per_unit = (FIRST_LUMELS / area).sqrt() as f32;
     let density = Density::Fixed { texels_per_unit, page_size: None };
     let options = Options { density, packing: Packing::Fast, padding: 1, ..Options::default() };
@@ -274,12 +272,13 @@ fn checked<'a>(atlas: &'a Atlas, triangles: &[[u32; 3]]) -> Result<&'a OutputMes
 mod tests {
     use super::*;
 
+    const POSITIONS: [[f32; 3]; 4] =
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
     const TRIANGLES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
 
     /// What the library makes of a square.
     fn square() -> Atlas {
-        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
-        let input = MeshInput::new(&positions, TRIANGLES.as_flattened());
+        let input = MeshInput::new(&POSITIONS, TRIANGLES.as_flattened());
         let density = Density::Fixed { texels_per_unit: 8.0, page_size: None };
         generate(input, &Options { density, ..Options::default() }, &|_| true).unwrap()
     }
@@ -322,8 +321,7 @@ mod tests {
     #[test]
     fn panics_are_errors() {
         let watch = |_: usize| -> bool { panic!("as the library may") };
-        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
-        let input = MeshInput::new(&positions, TRIANGLES.as_flattened());
+        let input = MeshInput::new(&POSITIONS, TRIANGLES.as_flattened());
         let found = generate(input, &Options::default(), &watch);
         assert!(matches!(found, Err(ChartError::Unwrap(_))), "{found:?}");
     }

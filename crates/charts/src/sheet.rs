@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{Mat3, Vec2, Vec3};
 use lumencast_light::SurfaceId;
-use lumencast_scene::{Instance, Material, Primitive, Snapshot};
+use lumencast_scene::{Instance, Material, Mesh, Primitive, Snapshot};
 use rayon::prelude::*;
 
 use crate::cut::{Cut, Shape, cut, densest};
@@ -30,8 +30,8 @@ pub struct Sheet {
     pub instance: usize,
     /// Its vertices, metres, in the orientation of the object or of the world.
     pub(crate) positions: Arc<[Vec3]>,
-    /// The file's numbers of its vertices, where they are not the same; else empty.
-    sources: Arc<[u32]>,
+    /// The mesh that it is of.
+    mesh: Arc<Mesh>,
     pub(crate) cut: Arc<Cut>,
     /// Which charts are to have lumels, by number; all unless it says so.
     pub(crate) kept: Option<Arc<[bool]>>,
@@ -81,7 +81,7 @@ impl Sheet {
 
     /// The file's number of a vertex.
     pub(crate) fn source(&self, vertex: u32) -> u32 {
-        self.sources.get(vertex as usize).copied().unwrap_or(vertex)
+        self.mesh.primitives[self.id.primitive as usize].source(vertex)
     }
 
     pub(crate) fn keeps(&self, chart: u32) -> bool {
@@ -114,7 +114,6 @@ struct Unique<'a> {
     instance: &'a Instance,
     primitive: usize,
     positions: Arc<[Vec3]>,
-    sources: Arc<[u32]>,
 }
 
 /// Cuts the still surfaces of a scene into charts, those on which lumels tell anything. `watch` is told
@@ -132,8 +131,7 @@ pub fn sheets(
     let mut surfaces = Vec::new();
     for (number, instance) in scene.instances.iter().enumerate().filter(|(_, i)| i.still) {
         for (index, primitive) in instance.mesh.primitives.iter().enumerate() {
-            let material = scene.materials.get(primitive.material.0 as usize);
-            if primitive.triangles.is_empty() || !material.is_some_and(takes_lumels) {
+            if !takes_lumels(primitive, &scene.materials) {
                 continue;
             }
             let stretch = stretch(instance);
@@ -141,8 +139,7 @@ pub fn sheets(
             let unique = *known.entry(key).or_insert_with(|| {
                 let positions = primitive.vertices.positions.iter().map(|p| stretch * *p);
                 let positions = positions.collect();
-                let sources = Arc::from(&primitive.sources[..]);
-                uniques.push(Unique { instance, primitive: index, positions, sources });
+                uniques.push(Unique { instance, primitive: index, positions });
                 uniques.len() - 1
             });
             let (node, copy, primitive) = (instance.node.0, instance.copy, index as u32);
@@ -152,18 +149,19 @@ pub fn sheets(
     }
     let (cuts, notes) = cut_all(&uniques, store, watch)?;
     let sheet = |(instance, id, unique): (usize, SurfaceId, usize)| {
-        let Unique { positions, sources, .. } = &uniques[unique];
-        let (positions, sources) = (positions.clone(), sources.clone());
-        Some(Sheet { id, instance, positions, sources, cut: cuts[unique].clone()?, kept: None })
+        let (positions, cut) = (uniques[unique].positions.clone(), cuts[unique].clone()?);
+        let mesh = scene.instances[instance].mesh.clone();
+        Some(Sheet { id, instance, positions, mesh, cut, kept: None })
     };
     Ok(Sheets { sheets: surfaces.into_iter().filter_map(sheet).collect(), notes })
 }
 
-/// Whether lumels on a surface of this material would be seen: light passes through glass, and what is
-/// unlit or black shows none.
-pub fn takes_lumels(material: &Material) -> bool {
+/// Whether lumels on a primitive would be seen: some have no triangles, light passes through glass, and
+/// what is unlit or black shows none.
+pub fn takes_lumels(primitive: &Primitive, materials: &[Material]) -> bool {
+    let material = &materials[primitive.material.0 as usize];
     let is_black = material.base_color.truncate() == Vec3::ZERO;
-    !material.unlit && material.transmission == 0.0 && !is_black
+    !primitive.triangles.is_empty() && !material.unlit && material.transmission == 0.0 && !is_black
 }
 
 /// World from object without the instance's place and, where it is scaled alike in all directions,

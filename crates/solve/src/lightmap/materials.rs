@@ -28,6 +28,6 @@ pub(super) fn blank(
 }
 
 fn shows(instance: &Instance, primitive: usize, scene: &Snapshot) -> bool {
-    let primitive = instance.mesh.primitives.get(primitive).filter(|p| !p.triangles.is_empty());
-    primitive.is_some_and(|p| takes_lumels(&scene.materials[p.material.0 as usize]))
+    let primitive = instance.mesh.primitives.get(primitive);
+    primitive.is_some_and(|primitive| takes_lumels(primitive, &scene.materials))
 }
