@@ -123,8 +123,9 @@ fn lumels_are_cast_to_native_clients() {
     let [pages, picture] = ["pages", "a.exr"].map(|name| folder.0.join(name));
     std::fs::create_dir(&pages).expect("a folder");
     let text = |path: &std::path::Path| path.to_str().expect("text").to_owned();
-    let few = ["--volume", "2x2x2", "--lightmap", "64", "--lumel-coding", "h264-stacked"];
-    let server = Serving::start("cornell", &few);
+    let fields = ["--volume", "2x2x2", "--lightmap", "64", "--fields", "lightmap,volume"];
+    let stacked = ["--lumel-coding", "h264-stacked"];
+    let server = Serving::start("cornell", &[&fields[..], &stacked].concat());
     let lumels = &server.ready["lumels"];
     assert_eq!((&lumels["pages"], &lumels["page_size"]), (&1.into(), &64.into()), "{lumels}");
     let url = server.url();

@@ -14,7 +14,7 @@ const VIEWPORT = { width: 480, height: 270 };
 const BRIGHT = 24;
 
 const sponza = sharedScene('sponza/Sponza.glb');
-/** `seen`: the meshes with lumels that the first camera sees. */
+/** `seen`: the meshes with lumels, all that stand still. */
 const scenes = [
   { name: 'door', scene: 'door', pages: 1, seen: 10 },
   ...(sponza ? [{ name: 'Sponza', scene: sponza, pages: 3, seen: 25 }] : []),

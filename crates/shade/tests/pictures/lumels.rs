@@ -240,7 +240,6 @@ fn what_no_chart_reads_does_not_show() {
     }
 }
 
-/// Lumels of other vertices than the scene's are left alone, and light without lumels takes its place.
 /// Specular light stays the probes': metal, which scatters no other, is as it is without lumels.
 #[test]
 fn metal_reflects_probes_alone() {
@@ -278,6 +277,7 @@ fn split_vertices_are_those_of_the_file() {
     assert_eq!(draw(&Arc::new(other), &light), draw(&scene, &light));
 }
 
+/// Lumels of other vertices than the scene's are left alone, and light without lumels takes its place.
 #[test]
 fn charts_of_another_mesh_are_left_alone() {
     let scene = scene();
